@@ -37,10 +37,33 @@ export interface Config {
   places: Place[];
   /** Where the consoles of the robots of its system are: `ADDRESS:PORT`, without an address on the same machine. */
   fleet: Record<string, string>;
+  /** What this visitor may do: `view`, `operate` or `configure`. */
+  role: string;
 }
 
 export class ConfigError extends Error {
   override name = "ConfigError";
+}
+
+/** The robot does not know who this is. */
+export class LockedError extends ConfigError {
+  override name = "LockedError";
+}
+
+/** Returns the token of a link, of what is behind its `#`; empty if it has none. */
+export function tokenOf(link: string): string {
+  return /[#&]token=([\w-]+)/.exec(link)?.[1] ?? "";
+}
+
+/** Shows the robot a token; from then on, the browser has a cookie for it. Throws a ConfigError if it is wrong. */
+export async function logIn(token: string, url = "/console/login"): Promise<void> {
+  let response: Response;
+  try {
+    response = await fetch(url, { method: "POST", body: token });
+  } catch {
+    throw new ConfigError("The robot does not answer. Is it switched on, and is this device in its network?");
+  }
+  if (!response.ok) throw new LockedError("This link is wrong, or has been renewed.");
 }
 
 /** Fetches the configuration. Throws a ConfigError that a person can read. */
@@ -51,8 +74,9 @@ export async function fetchConfig(url = "/console/config"): Promise<Config> {
   } catch {
     throw new ConfigError("The robot does not answer. Is it switched on, and is this device in its network?");
   }
-  if (response.status === 401 || response.status === 403) {
-    throw new ConfigError("The robot does not let this browser in. Open the link that `rbxcompose up` printed.");
+  if (response.status === 401) throw new LockedError("The robot does not know you yet.");
+  if (response.status === 403) {
+    throw new ConfigError("The robot does not answer under this name. Open the link that `rbxcompose up` printed.");
   }
   if (!response.ok) throw new ConfigError(`The robot answered with an error (${response.status}).`);
   let json: unknown;
@@ -72,6 +96,7 @@ export function parseConfig(json: unknown): Config {
     robot: text(json.robot) || "robot",
     about: text(json.about),
     firstPage: text(json.first_page),
+    role: text(json.role) || "configure",
     drive: isMessage(json.drive) ? parseDrive(json.drive) : null,
     fleet: Object.fromEntries(
       Object.entries(isMessage(json.fleet) ? json.fleet : {}).map(([name, address]) => [name, text(address)]),

@@ -1,6 +1,6 @@
 /** How values are written: with the same number of digits always, so that nothing jumps, and a real minus sign. */
 
-const DIGITS: Record<string, number> = { "%": 0, V: 1, A: 1, "m/s": 2, "rad/s": 2, "°C": 0 };
+const DIGITS: Record<string, number> = { "%": 0, V: 1, A: 1, "m/s": 2, "rad/s": 2, "°C": 0, "°": 0, mm: 0 };
 export const MINUS = "\u2212";
 export const UNKNOWN = "\u2013";
 

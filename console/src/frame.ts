@@ -23,6 +23,24 @@ export function showState(kind: "loading" | "error", text: string, retry?: () =>
   document.body.replaceChildren(h("main", { class: `state ${kind}` }, h("h1", {}, "Robot console"), ...children));
 }
 
+/** Shows where a visitor says who they are; `enter` takes the link or its token, and throws an error that says why not. */
+export function showDoor(text: string, enter: (given: string) => Promise<void>): void {
+  const input = h("input", { id: "token", type: "password", autocomplete: "off", required: "" });
+  const says = h("p", { role: "alert" }, text);
+  const button = h("button", {}, "Open");
+  const form = h("form", { class: "door" }, h("label", { for: "token" }, "The link, or its token"), input, button);
+  const help = h("p", { class: "label" }, "On the robot, `rbxcompose console` prints the link, with a code for the camera of a phone.");
+  form.onsubmit = (event) => {
+    event.preventDefault();
+    button.disabled = true;
+    enter(input.value.trim())
+      .catch((error: Error) => setText(says, error.message))
+      .finally(() => (button.disabled = false));
+  };
+  document.body.replaceChildren(h("main", { class: "state" }, h("h1", {}, "Robot console"), icon("person"), says, form, help));
+  input.focus();
+}
+
 /** Shows the frame with the page that the address names, else the first one of the robot. */
 export function showFrame(config: Config, link: Rosbridge): void {
   const notice = h("div", { class: "notice", role: "status" });
@@ -39,7 +57,7 @@ export function showFrame(config: Config, link: Rosbridge): void {
   };
   const title = h("h1", {}, config.robot);
   const tabs = h("nav", { "aria-label": "Pages" });
-  const bar = h("header", {}, h("div", { class: "who" }, title, h("p", {}, config.about)), connection(link));
+  const bar = h("header", {}, h("div", { class: "who" }, title, h("p", {}, config.about)), connection(link, config.role));
   const stops = stopButtons(link, robot.stopped, robot.notify);
   const host = h("main", { id: "page" });
   const banner = stoppedBanner();
@@ -81,7 +99,8 @@ function route(host: HTMLElement, tabs: HTMLElement, robot: Robot): void {
   open();
 }
 
-function connection(link: Rosbridge): HTMLElement {
+function connection(link: Rosbridge, role: string): HTMLElement {
+  const looksOnly = role === "view";
   const box = h("p", { class: "connection", role: "status" });
   const words: Record<LinkState["is"], string> = {
     connecting: "Connecting",
@@ -92,7 +111,8 @@ function connection(link: Rosbridge): HTMLElement {
   link.state.watch((state) => {
     box.dataset.state = state.is;
     const picture = { connecting: "wait", open: "link", lost: "unlink", closed: "unlink" } as const;
-    box.replaceChildren(icon(picture[state.is]), h("span", {}, words[state.is]));
+    const word = state.is === "open" && looksOnly ? "Connected, to look only" : words[state.is];
+    box.replaceChildren(icon(picture[state.is]), h("span", {}, word));
   });
   return box;
 }

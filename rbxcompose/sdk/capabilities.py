@@ -224,10 +224,12 @@ class NeedsExtra(Capability):
 
 @dataclass(frozen=True, slots=True)
 class ServesPage(Capability):
-    """It serves a page for browsers of this machine; `up` shows the link."""
+    """It serves a page for browsers; `up` shows the link."""
 
     port: Setting[int]
     """TCP port."""
+    is_lan: Setting[bool] = Setting(False)
+    """Whether other machines may open it, with a token."""
     commands: Setting[str] = Setting("")
     """The topic on which people drive by it, by its full name; empty if they cannot."""
     fleet: Setting[Mapping[str, str]] = Setting(MappingProxyType({}))

@@ -11,6 +11,7 @@ from rbxcompose.commands.story import StoryWriter, summary
 from rbxcompose.commands.targets import missing_extras
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan, extent
+from rbxcompose.domains.console.links import show_link
 from rbxcompose.domains.devices.openable import look_at, port_findings
 from rbxcompose.domains.devices.serial_ports import serial_ports
 from rbxcompose.runtime.folder import RobotFolder, RunOptions
@@ -92,7 +93,7 @@ class _Watch:
                 if not self._options.is_stepped:
                     for instance in self._plan.instances:
                         for page in declared(instance.type, instance.config, ServesPage):
-                            emit(f"console: http://127.0.0.1:{page.port.value}/")
+                            show_link(name, page.port.value, is_lan=page.is_lan.value)
                 if self._options.is_detached:
                     self._started.let_go()
                     return 0

@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+from rbxcompose.domains.console.access import Role
 from rbxcompose.domains.console.lease import DriveLimits
 from rbxcompose.domains.console.protocol import Bridge, BusRequest
 from rbxcompose.msgs.types import Message
@@ -46,13 +47,13 @@ class Graph:
 class Room:
     """The bridge, with the requests to the bus since the last look, at a time that only `now` changes."""
 
-    def __init__(self, drive: DriveLimits | None = LIMITS) -> None:
+    def __init__(self, drive: DriveLimits | None = LIMITS, **access: Any) -> None:
         self.graph, self.now = Graph(), 0.0
-        self.bridge = Bridge(self.graph, drive)
+        self.bridge = Bridge(self.graph, drive, **access)
         self.requests: list[BusRequest] = []
 
-    def client(self) -> Client:
-        return Client(self, self.bridge.open())
+    def client(self, role: Role = Role.CONFIGURE, who: str = "") -> Client:
+        return Client(self, self.bridge.open(role, who))
 
     def arrives(self, topic: str, message: Message) -> None:
         self.bridge.arrived(topic, message, self.now)

@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.console import json_messages
+from rbxcompose.domains.console.access import Role
 from rbxcompose.domains.console.json_messages import WrongMessageError, from_json, numbers_of, to_json
 from rbxcompose.domains.console.protocol import (
     LARGEST,
@@ -278,7 +279,7 @@ def test_what_is_no_window_is_refused(path: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "op", ["advertise_service", "unadvertise_action", "action_result", "fragment", "png", "cbor-raw", "auth"]
+    "op", ["advertise_service", "unadvertise_action", "action_result", "fragment", "png", "cbor-raw"]
 )
 def test_what_is_not_served_yet_is_said(op: str) -> None:
     (status,) = Room().client().does(op, id="a")
@@ -526,3 +527,51 @@ def test_lists_of_numbers_are_of_their_type(type_: str, data: list[Any]) -> None
 def test_lists_of_numbers_are_taken_as_javascript_writes_them(type_: str, data: list[Any]) -> None:
     made = numbers_of(type_, data)
     assert (made.dtype, made.tolist()) == (np.dtype(type_), data)
+
+
+def test_what_a_role_may_not_is_refused_and_answered() -> None:
+    room = Room()
+    client = room.client(Role.VIEW)
+    assert client.does("subscribe", topic="/level") == []
+    (status,) = client.does("publish", topic="/level", msg={"data": 1})
+    assert status["msg"] == "this needs the role 'operate'; yours is 'view'"
+    assert client.calls("/rosapi/topics")["topics"]
+    (answer,) = client.does("call_service", service="/lamp", id="a")
+    assert (answer["result"], answer["id"]) == (False, "a")
+    assert client.does("call_service", service="/console/stop") == []
+    (asked,) = (request for request in room.asked() if isinstance(request, AskRobot))
+    assert asked.request == {"type": "robot.StopRobot"}
+
+
+def test_names_may_be_guarded_by_patterns() -> None:
+    room = Room(guarded={"/l*": Role.CONFIGURE})
+    client = room.client(Role.OPERATE)
+    (status,) = client.does("publish", topic="level", msg={"data": 1})
+    assert "the role 'configure'" in status["msg"]
+    assert client.does("subscribe", topic="/level") == []
+
+
+def test_a_token_of_the_operation_auth_gives_a_role_and_never_takes_one() -> None:
+    room = Room(admit=lambda token: {"o": Role.OPERATE, "v": Role.VIEW}.get(token, Role.NOBODY))
+    client = room.client(Role.NOBODY)
+    (status,) = client.does("subscribe", topic="/level")
+    assert "the role 'view'; yours is 'nobody'" in status["msg"]
+    assert client.does("auth", mac="o") == []
+    assert client.does("publish", topic="/level", msg={"data": 1}) == []
+    assert client.does("auth", mac="v") == []
+    assert room.bridge.role(client.number) is Role.OPERATE
+    (status,) = Room().client(Role.NOBODY).does("auth", mac="x")
+    assert status["msg"] == "'mac' is no token of this robot"
+
+
+def test_the_log_says_once_who_does_what() -> None:
+    room = Room()
+    client = room.client(Role.OPERATE, "192.168.1.7")
+    for value in range(3):
+        client.does("publish", topic="/level", msg={"data": value})
+    client.does("subscribe", topic="/odom")
+    client.does("call_service", service="/lamp", args=[True])
+    assert list(room.bridge.notes) == [
+        "192.168.1.7 (operate): publish /level",
+        "192.168.1.7 (operate): call_service /lamp",
+    ]

@@ -69,7 +69,11 @@ def test_a_robot_that_does_not_drive_has_a_console_too(tmp_path: Path) -> None:
     assert (config.drive, config.max_speed) == (None, math.inf)
 
 
-def test_nobody_beyond_this_machine_is_served_yet(tmp_path: Path) -> None:
-    project = Project(tmp_path)
-    project.check(f"{BASE}console:\n  listen: lan\n")
-    assert [(finding.code, finding.span and finding.span.line) for finding in project.findings] == [("RBX9601", 9)]
+def test_the_network_is_served_with_roles_by_names(tmp_path: Path) -> None:
+    guard = "{/arm/*: configure}"
+    config = gateway(tmp_path, f"{BASE}console: {{listen: lan, guard: {guard}, origins: ['http://localhost:8181']}}\n")
+    assert (config.listen, config.guard, config.origins) == (
+        "lan",
+        {"/arm/*": "configure"},
+        ("http://localhost:8181",),
+    )

@@ -11,9 +11,11 @@ import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
+from types import MappingProxyType
 from typing import Any, Protocol
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.domains.console.access import Role, needed
 from rbxcompose.domains.console.json_messages import WrongMessageError, arguments, encoded, from_json, to_json
 from rbxcompose.domains.console.lease import LATEST, DriveLease, DriveLimits, Lateness, limited, moves
 from rbxcompose.msgs import registry
@@ -35,7 +37,7 @@ LONGEST_PATIENCE = 60.0  # [s]
 LEVELS = ("info", "warning", "error", "none")
 LATER = re.compile(
     r"(un)?advertise_(service|action)|(send|cancel)_action_goal|action_(feedback|result)|service_response"
-    r"|fragment|png|cbor(-raw)?|auth"
+    r"|fragment|png|cbor(-raw)?"
 )
 """Operations of the protocol that are not served yet."""
 
@@ -132,6 +134,9 @@ class AskRobot:
 
     number: int
     request: Mapping[str, Any]
+    role: Role
+    """Of who asks: commands need more than queries."""
+    who: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,8 +240,9 @@ class _Stream:
 class _Client:
     """One connection: what it wants, and what waits for it."""
 
-    def __init__(self, number: int) -> None:
-        self.number = number
+    def __init__(self, number: int, role: Role, who: str) -> None:
+        self.number, self.role, self.who = number, role, who
+        self.noted = ""  # last in the log
         self.level = LEVELS.index("warning")
         self.frames: deque[str] = deque()
         self.streams: dict[str, _Stream] = {}  # by the name that it uses; the next to be served is the first
@@ -302,10 +308,20 @@ class _Advertised:
 class Bridge:
     """All clients of one robot."""
 
-    def __init__(self, graph: GraphView, drive: DriveLimits | None = None) -> None:
+    def __init__(
+        self,
+        graph: GraphView,
+        drive: DriveLimits | None = None,
+        guarded: Mapping[str, Role] = MappingProxyType({}),
+        admit: Callable[[str], Role] = lambda _: Role.NOBODY,
+    ) -> None:
+        """Have no clients yet; `guarded` are least roles by patterns of names, `admit` returns the role of a token."""
+        self._guarded, self._admit = guarded, admit
         self.lease = DriveLease()
         self.woken: set[int] = set()
         """Clients for which something new waits; who sends takes them out."""
+        self.notes: deque[str] = deque(maxlen=MOST_FRAMES)
+        """Who did what, for the log; who writes it takes them out."""
         self._graph, self._drive = graph, drive
         self._clients: dict[int, _Client] = {}
         self._listened: dict[str, _Listened] = {}
@@ -321,11 +337,16 @@ class Bridge:
         """Return how many clients there are."""
         return len(self._clients)
 
-    def open(self) -> int:
-        """Return the number of a new client."""
+    def open(self, role: Role = Role.CONFIGURE, who: str = "") -> int:
+        """Return the number of a new client; `who` is what the log calls it."""
         self._clients_so_far += 1
-        self._clients[self._clients_so_far] = _Client(self._clients_so_far)
-        return self._clients_so_far
+        number = self._clients_so_far
+        self._clients[number] = _Client(number, role, who or f"client {number}")
+        return number
+
+    def role(self, number: int) -> Role:
+        """Return what a client may do."""
+        return self._clients[number].role
 
     def receive(self, number: int, frame: str | bytes, now: float, stamp: int) -> list[BusRequest]:
         """Carry out a frame of a client; return what the bus has to do for it."""
@@ -432,11 +453,39 @@ class Bridge:
         if not isinstance(data.get("id"), str | int | float | None):
             raise BadFrameError("an 'id' is a text")
         if (operation := _OPERATIONS.get(op)) is not None:
+            if op not in _ANSWERED:
+                self._require(client, data)
             operation(self, client, data)
         elif LATER.fullmatch(op):
             raise BadFrameError(f"the operation '{op}' is not yet served")
         else:
             raise BadFrameError(f"there is no operation '{_short(op)}'")
+
+    def _require(self, client: _Client, data: Mapping[str, Any]) -> None:
+        """Refuse what a client's role may not, and note what changes something.
+
+        Raises:
+            BadFrameError: if another role is needed.
+        """
+        least = needed(data, self._guarded)
+        if client.role < least:
+            raise BadFrameError(f"this needs the role '{least.word}'; yours is '{client.role.word}'")
+        if least > Role.VIEW:
+            name = next((str(data[key]) for key in ("topic", "service", "action", "id") if key in data), "")
+            if data["op"] != "publish" or _full(name) not in client.advertised:
+                self._note(client, f"{data['op']} {_short(name)}")
+
+    def _note(self, client: _Client, text: str) -> None:
+        if client.noted != text:
+            client.noted = text
+            self.notes.append(f"{client.who} ({client.role.word}): {text}")
+
+    def _auth(self, client: _Client, data: Mapping[str, Any]) -> None:
+        """Give a client the role of its token, which is the `mac` of rosbridge's `auth`."""
+        role = self._admit(token) if isinstance(token := data.get("mac"), str) else Role.NOBODY
+        if role is Role.NOBODY:
+            raise BadFrameError("'mac' is no token of this robot")
+        client.role = max(client.role, role)
 
     def _subscribe(self, client: _Client, data: Mapping[str, Any]) -> None:
         name, topic = _topic_of(data)
@@ -543,6 +592,7 @@ class Bridge:
         self._calls[number] = _Waiting(client.number, data.get("id"), name)
         client.open_calls += 1
         try:
+            self._require(client, data)
             rosapi = full.removeprefix("/rosapi/")
             if rosapi != full and rosapi not in ROSAPI:
                 raise BadFrameError(f"'{full}' is not yet served")
@@ -597,18 +647,19 @@ class Bridge:
         if not self.lease.take(client.number, shown, self._now):
             holder = self.lease.holder
             return {"success": False, "holder": holder, "message": f"'{holder}' drives"}
+        client.who = f"{shown}, {client.who.rpartition(', ')[2]}"
         return {"success": True, "holder": shown, "message": ""}
 
     def _stop_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
-        self._requests.append(AskRobot(number, STOP))
+        self._requests.append(AskRobot(number, STOP, Role.CONFIGURE, client.who))  # anyone may
 
     def _release_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
-        self._requests.append(AskRobot(number, RELEASE))
+        self._requests.append(AskRobot(number, RELEASE, client.role, client.who))
 
     def _ask_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
         if not isinstance(given.get("type"), str):
             raise WrongMessageError("'type' is the name of a request, such as 'mission.ListMissions'")
-        self._requests.append(AskRobot(number, given))
+        self._requests.append(AskRobot(number, given, client.role, client.who))
 
     def _rosapi(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
         """Return the answer of `/rosapi/NAME`."""
@@ -743,6 +794,7 @@ class Bridge:
 
 _OPERATIONS: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any]], None]] = {
     "advertise": Bridge._advertise,
+    "auth": Bridge._auth,
     "unadvertise": Bridge._unadvertise_op,
     "publish": Bridge._publish,
     "subscribe": Bridge._subscribe,
@@ -751,6 +803,7 @@ _OPERATIONS: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any]], None]] 
     "set_level": Bridge._set_level,
     "status": Bridge._take_status,
 }
+_ANSWERED = frozenset({"call_service"})  # operations whose refusal is an answer of their own
 
 
 _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str, Any] | None]] = {

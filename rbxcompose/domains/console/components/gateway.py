@@ -1,4 +1,4 @@
-"""The gateway: serves the console's page and rosbridge to browsers and clients on this machine."""
+"""The gateway: serves the console's page and rosbridge to browsers and clients."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from contextlib import suppress
 from functools import cached_property, partial
 from pathlib import Path
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from rbxcompose.base.clock import SteppedClock
 from rbxcompose.base.config import AngularSpeed, Config, Speed
@@ -24,6 +24,7 @@ from rbxcompose.bus.transport import Closable
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import NAME, Guest
 from rbxcompose.commands.lookup import place_of
+from rbxcompose.domains.console.access import LOCAL_NAMES, Door, Role, network_names, own_secret, role_of, secret_path
 from rbxcompose.domains.console.lease import DriveLimits
 from rbxcompose.domains.console.protocol import (
     LARGEST,
@@ -50,12 +51,11 @@ from rbxcompose.sdk.capabilities import ServesPage
 from rbxcompose.sdk.ports import BULK
 
 if TYPE_CHECKING:
-    from starlette.requests import Request
+    from starlette.requests import HTTPConnection, Request
     from starlette.responses import Response
     from starlette.websockets import WebSocket
 
 STATIC = Path(__file__).parents[1] / "static"  # the built page
-HOST = "127.0.0.1"
 MOST_CLIENTS = 64
 PACKAGES = ("starlette", "uvicorn", "websockets")
 SOCKETS = ("/", "/rosbridge")  # where WebSockets are taken
@@ -66,7 +66,9 @@ _PING = 5.0  # [s] until a client that does not read counts as gone
 _FAREWELL = 1  # [s] for clients to let go
 _GOODBYE = 3.0  # [s] to wait for the thread to end
 _STOPPED = 1.0  # [s] for all processes to answer to a stop over the bus
-_NAMES = ("127.0.0.1", "localhost", "[::1]")  # of this machine
+_SHY = 5.0  # [s] for a client to say who it is
+_LONGEST_LOGIN = 4096  # [bytes]
+_COOKIE_AGE = 365 * 24 * 3600  # [s]
 _POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; object-src 'none'"
 _HEADERS = (
     (b"x-content-type-options", b"nosniff"),
@@ -100,6 +102,12 @@ class GatewayConfig(Config):
     """What it is for."""
     port: int = 8080
     """TCP port."""
+    listen: Literal["local", "lan"] = "local"
+    """Who may open it."""
+    origins: tuple[str, ...] = ()
+    """Pages of other servers that may talk to it."""
+    guard: dict[str, str] = {}
+    """Least roles by patterns of names of topics, services and actions."""
     first_page: str = "drive"
     """The page that is shown first."""
     drive_topic: str = ""
@@ -130,7 +138,7 @@ class GatewayConfig(Config):
 
 @component("gateway")
 class Gateway(Component[GatewayConfig]):
-    """Serves the console, and rosbridge, to browsers and clients on this machine.
+    """Serves the console, and rosbridge, to browsers and clients.
 
     Example:
         gateway: {type: gateway, robot: turtlebot}
@@ -143,8 +151,13 @@ class Gateway(Component[GatewayConfig]):
     def capabilities(cls, config: GatewayConfig) -> tuple[Capability, ...]:
         """Declare the page, and what it needs."""
         needed = (NeedsExtra(Setting(package), Setting("console")) for package in PACKAGES)
-        settings = Setting(config.port, "port"), Setting(config.drive_topic, "drive_topic")
-        return (ServesPage(*settings, Setting(config.fleet, "fleet")), *needed)
+        page = ServesPage(
+            Setting(config.port, "port"),
+            Setting(config.listen == "lan", "listen"),
+            Setting(config.drive_topic, "drive_topic"),
+            Setting(config.fleet, "fleet"),
+        )
+        return (page, *needed)
 
     def configure(self) -> None:
         """Serve nothing yet: the robot must be known from outside first."""
@@ -172,6 +185,8 @@ class Gateway(Component[GatewayConfig]):
             return TaskStatus(Level.OK, "serves nobody on a stepped clock")
         while not self.server.said.empty():
             self.warn(self.server.said.get())
+        while not self.server.done.empty():
+            self.info(self.server.done.get())
         return TaskStatus(*self.server.status)
 
 
@@ -180,6 +195,7 @@ class GatewayThread:
 
     def __init__(self, config: GatewayConfig) -> None:
         self.said: SimpleQueue[str] = SimpleQueue()  # warnings for the log
+        self.done: SimpleQueue[str] = SimpleQueue()  # what visitors did
         self.status: tuple[Level, str] = (Level.OK, "starts")
         self._config = config
         self._thread = threading.Thread(target=self._run, name="gateway", daemon=True)
@@ -221,8 +237,13 @@ class GatewayThread:
         if (folder := await self._own_folder()) is None:
             return
         with Guest(place_of(folder), stays=True) as guest:
-            session = GatewaySession(self._config, folder, guest)
-            self.status = (Level.OK, f"serves http://{HOST}:{self._config.port}/")
+            try:
+                session = GatewaySession(self._config, folder, guest, self.done.put)
+            except OSError as error:
+                self._complain(f"the console is not served: {secret_path()}: {error.strerror}")
+                return
+            whom = "the network" if self._config.listen == "lan" else "this machine"
+            self.status = (Level.OK, f"serves {whom} at port {self._config.port}")
             try:
                 await session.serve(self._listener, self._stop)
             finally:
@@ -249,7 +270,7 @@ class GatewayThread:
         listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            listener.bind((HOST, self._config.port))
+            listener.bind(("" if self._config.listen == "lan" else LOCAL_NAMES[0], self._config.port))
             listener.listen()
         except OSError as error:
             listener.close()
@@ -324,7 +345,12 @@ class LiveGraph:
 def _places(addresses: Iterable[str]) -> Iterator[str]:
     """Yield the hosts with ports of pages; one without a host is on this machine, by each of its names."""
     for address in addresses:
-        yield from (f"{name}{address}" for name in _NAMES) if address.startswith(":") else (address,)
+        yield from (f"{name}{address}" for name in LOCAL_NAMES) if address.startswith(":") else (address,)
+
+
+def _address(request: HTTPConnection) -> str:
+    """Return where a request comes from."""
+    return request.client.host if request.client else "?"
 
 
 def _types(names: Sequence[GraphName]) -> dict[str, str]:
@@ -334,14 +360,17 @@ def _types(names: Sequence[GraphName]) -> dict[str, str]:
 class GatewaySession:
     """The web application, the bridge and the bus, all in one event loop."""
 
-    def __init__(self, config: GatewayConfig, folder: RobotFolder, guest: Guest) -> None:
-        self._config, self._folder, self._guest = config, folder, guest
+    def __init__(self, config: GatewayConfig, folder: RobotFolder, guest: Guest, note: Callable[[str], None]) -> None:
+        self._config, self._folder, self._guest, self._note = config, folder, guest, note
+        self._secret = own_secret() if config.listen == "lan" else None
         self._graph = LiveGraph(guest)
         guest.graph()  # a round trip, after which the tokens of all others are here, too
-        self._bridge = Bridge(self._graph, config.drive)
+        guarded = {pattern: Role[role.upper()] for pattern, role in config.guard.items()}
+        self._bridge = Bridge(self._graph, config.drive, guarded, self._role_of)
         self._bus = guest.bus()
         self._ends: dict[tuple[type[BusRequest], str], Any] = {}  # publishers, subscriptions and clients, by name
         self._wakes: dict[int, asyncio.Event] = {}  # by client
+        self._unknown: set[int] = set()  # clients that did not say in time who they are
         self._loop = asyncio.get_running_loop()
         self._pump_timer: asyncio.TimerHandle | None = None
         self._lease_timer: asyncio.TimerHandle | None = None
@@ -410,7 +439,22 @@ class GatewaySession:
         from starlette.staticfiles import StaticFiles
 
         async def config(request: Request) -> Response:
-            return JSONResponse(self._shown_config(), headers={"cache-control": "no-store"})
+            role = self._role(request)
+            if role < Role.VIEW:
+                return JSONResponse({"message": "this needs a link with a token"}, 401)
+            return JSONResponse(self._shown_config() | {"role": role.word}, headers={"cache-control": "no-store"})
+
+        async def log_in(request: Request) -> Response:
+            if int(request.headers.get("content-length") or _LONGEST_LOGIN + 1) > _LONGEST_LOGIN:
+                return JSONResponse({"message": "this is no token"}, 413)
+            token = (await request.body()).decode("ascii", "replace").strip()
+            role = self._role_of(token)
+            self._note(f"{_address(request)}: {'logs in to ' + role.word if role else 'is refused: a wrong token'}")
+            if role is Role.NOBODY:
+                return JSONResponse({"message": "the token is wrong, or was renewed"}, 401)
+            answer = JSONResponse({"role": role.word})
+            answer.set_cookie(self._cookie, token, _COOKIE_AGE, httponly=True, samesite="strict")
+            return answer
 
         async def not_built(request: Request) -> Response:
             return HTMLResponse(_NOT_BUILT.read_text(encoding="utf-8"))
@@ -418,7 +462,23 @@ class GatewaySession:
         is_built = (STATIC / "index.html").exists()
         page: BaseRoute = Mount("/", StaticFiles(directory=STATIC, html=True)) if is_built else Route("/", not_built)
         sockets = [WebSocketRoute(path, self._talk) for path in SOCKETS]
-        return Starlette(routes=[*sockets, Route("/console/config", config), page])
+        own = [Route("/console/config", config), Route("/console/login", log_in, methods=["POST"])]
+        return Starlette(routes=[*sockets, *own, page])
+
+    @property
+    def _cookie(self) -> str:
+        return f"rbxcompose-{self._config.port}"  # cookies are for all ports of a host
+
+    def _role_of(self, token: str) -> Role:
+        return role_of(self._secret, self._folder.path.name, token) if self._secret else Role.CONFIGURE
+
+    def _role(self, request: HTTPConnection) -> Role:
+        """Return the role of who sends a request: all that this machine lets in may do everything."""
+        if self._secret is None:
+            return Role.CONFIGURE
+        kind, _, bearer = request.headers.get("authorization", "").partition(" ")
+        shown = (bearer.strip() if kind.lower() == "bearer" else "", request.cookies.get(self._cookie, ""))
+        return max(map(self._role_of, filter(None, shown)), default=Role.NOBODY)
 
     def _shown_config(self) -> dict[str, object]:
         config, shown = self._config, None
@@ -433,11 +493,10 @@ class GatewaySession:
 
     def _guarded(self, application: Any) -> Callable[..., Awaitable[None]]:
         """Return the application behind a door that pages of others do not pass."""
-        port = self._config.port
-        hosts = {f"{name}{end}" for name in _NAMES for end in (f":{port}", "")}
-        origins = {f"http://{host}" for host in hosts if port == 80 or host.endswith(f":{port}")}
         fleet = sorted(_places(self._config.fleet.values()))  # a page shows all robots of its system
-        origins |= {f"http://{place}" for place in fleet}
+        origins = frozenset((*self._config.origins, *(f"http://{place}" for place in fleet)))
+        is_lan = self._secret is not None
+        door = Door(self._config.port, is_lan, network_names() if is_lan else (), origins)
         # A policy cannot name addresses of IPv6.
         policy = "; connect-src ".join(
             (_POLICY, " ".join(("'self'", *(f"ws://{place}" for place in fleet if "[" not in place))))
@@ -446,10 +505,8 @@ class GatewaySession:
 
         async def guarded(scope: MutableMapping[str, Any], receive: Any, send: Any) -> None:
             headers = dict(scope["headers"])
-            origin = headers.get(b"origin", b"").decode("latin-1").lower()
-            is_known = headers.get(b"host", b"").decode("latin-1").lower() in hosts and (
-                not origin or origin in origins
-            )
+            host, origin = (headers.get(name, b"").decode("latin-1") for name in (b"host", b"origin"))
+            is_known = door.lets_in(host, origin)
             if scope["type"] == "websocket":
                 if is_known and scope["path"] in SOCKETS:
                     await application(scope, receive, send)
@@ -477,8 +534,9 @@ class GatewaySession:
         if len(self._bridge) >= MOST_CLIENTS:
             await web_socket.close(1013)
             return
-        number = self._bridge.open()
+        number = self._bridge.open(self._role(web_socket), _address(web_socket))
         self._wakes[number] = asyncio.Event()
+        shy = self._loop.call_later(_SHY, self._ask_who, number)
         sender = asyncio.create_task(self._send(web_socket, number))
         try:
             while (message := await web_socket.receive())["type"] == "websocket.receive":
@@ -486,14 +544,21 @@ class GatewaySession:
                 frame = text if text is not None else message.get("bytes") or b""
                 self._do(self._bridge.receive(number, frame, self._now, self._stamp))
         finally:
+            shy.cancel()
             sender.cancel()
             del self._wakes[number]
             self._do(self._bridge.close(number, self._now, self._stamp))
 
+    def _ask_who(self, number: int) -> None:
+        """Let a client go that has no role after a while."""
+        if self._bridge.role(number) is Role.NOBODY:
+            self._unknown.add(number)
+            self._wakes[number].set()
+
     async def _send(self, web_socket: WebSocket, number: int) -> None:
         """Send a client what is due for it; one that reads slowly holds up only itself."""
         wake = self._wakes[number]
-        while not self._bridge.is_overrun(number):
+        while not self._bridge.is_overrun(number) and number not in self._unknown:
             wake.clear()
             if (frame := self._bridge.next_frame(number, self._now)) is not None:
                 await web_socket.send_text(frame)
@@ -503,6 +568,7 @@ class GatewaySession:
             await wake.wait()
             if timer is not None:
                 timer.cancel()
+        self._unknown.discard(number)
         await web_socket.close(1008)
 
     # The bus
@@ -510,6 +576,8 @@ class GatewaySession:
     def _do(self, requests: Sequence[BusRequest]) -> None:
         for request in requests:
             self._carry_out(request)
+        while self._bridge.notes:
+            self._note(self._bridge.notes.popleft())
         self._pump()
         until = self._bridge.lease.until
         if self._lease_timer is None and math.isfinite(until):
@@ -597,7 +665,7 @@ class GatewaySession:
 
     async def _ask_robot(self, request: AskRobot) -> None:
         """Send a request as the command line does; a stop also reaches a robot whose supervisor is slow."""
-        answer, refusal = await self._asked(request.request)
+        answer, refusal = await self._asked(request.request, request.role, request.who)
         if refusal and request.request is STOP:
             stopped = await asyncio.to_thread(self._guest.ask, stop_key(self._folder.path.name), _STOPPED)
             if names := ", ".join(sorted(name.decode() for name in stopped)):
@@ -605,13 +673,19 @@ class GatewaySession:
         self._bridge.robot_answered(request.number, answer, refusal)
         self._pump()
 
-    async def _asked(self, request: Mapping[str, Any], *, may_change: bool = True) -> tuple[Any, str]:
+    async def _asked(
+        self, request: Mapping[str, Any], role: Role, who: str = "", *, may_change: bool = True
+    ) -> tuple[Any, str]:
         """Return the answer of the robot, or why there is none; ask in a thread: its supervisor may be slow."""
         name = request["type"]
         if name not in self._is_command:
             await self._learn_requests()
         if name not in self._is_command or (self._is_command[name] and not may_change):
             return None, f"there is no {'request' if may_change else 'query'} '{name[:_SHOWN]}'"
+        if self._is_command[name]:
+            if role < Role.OPERATE:
+                return None, f"'{name}' needs the role '{Role.OPERATE.word}'"
+            self._note(f"{who}: asks {name}")
         return await self._answer(request)
 
     async def _answer(self, request: Mapping[str, Any]) -> tuple[Any, str]:
@@ -631,7 +705,7 @@ class GatewaySession:
         while True:
             is_due = asyncio.Event()
             self._loop.call_later(watch.period, is_due.set)
-            answer, refusal = await self._asked(watch.request, may_change=False)
+            answer, refusal = await self._asked(watch.request, Role.VIEW, may_change=False)
             self._bridge.seen(watch.window, answer, self._now, refusal)
             self._pump()
             await is_due.wait()

@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from rbxcompose.base.config import AngularSpeed, Config, Speed
-from rbxcompose.base.findings import kind
 from rbxcompose.compiler.model.robot import PortEnd, RobotComponent, resolve
 from rbxcompose.compiler.model.values import value_of
 from rbxcompose.compiler.sections.bus import bus
@@ -19,7 +18,6 @@ from rbxcompose.manifest.section import OVERLAY, ROBOT, Contents, Reading, Wante
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.sdk.capabilities import Drives, Forwards, Setting
 
-NOT_BEYOND_THIS_MACHINE = kind("RBX9601")
 GATEWAY = "gateway"
 _TELEOP = "teleop"  # the input of a mux that is for people
 _VELOCITIES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
@@ -40,7 +38,11 @@ class ConsoleModel(Config):
     """The page that the robot serves."""
 
     listen: Literal["local", "lan"] = "local"
-    """Who may open it: programs of this machine. `lan`, everybody in the network, is not offered yet."""
+    """Who may open it: programs of this machine, or with `lan` also others in the network, by a link with a token."""
+    origins: list[Annotated[str, Field(pattern=r"^https?://[^/\s]+$")]] = []
+    """Pages of other servers that may talk to it, such as `http://localhost:8181`."""
+    guard: dict[Annotated[str, Field(pattern=r"^/\S+$")], Literal["view", "operate", "configure"]] = {}
+    """The role that visitors need at least for topics, services and actions, by patterns: `/right_arm/*: configure`."""
     port: int = Field(8080, ge=1, le=65535)
     """TCP port of the page."""
     first_page: Literal["drive"] = "drive"
@@ -59,6 +61,9 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         "robot": name,
         "about": about,
         "port": read.port,
+        "listen": read.listen,
+        "origins": read.origins,
+        "guard": read.guard,
         "first_page": read.first_page,
         **_drive(read.drive, components, namespace),
         "values": _values(contents, components, namespace),
@@ -151,9 +156,4 @@ def console(reading: Reading[ConsoleModel]) -> ConsoleModel | None:
           drive:
             max_speed: 0.3 m/s
     """
-    read = reading.whole()
-    if read is not None and read.listen == "lan":
-        message = "the console cannot be opened from other machines yet: anybody there could drive the robot"
-        help_text = f"write 'listen: local', and reach it by 'ssh -L {read.port}:127.0.0.1:{read.port} ROBOT'"
-        reading.report.add(NOT_BEYOND_THIS_MACHINE.at(reading.value("console", "listen"), message, help=help_text))
-    return read
+    return reading.whole()

@@ -1,0 +1,200 @@
+"""Who may do what by the console: roles, the tokens that give them, and which pages may talk to it.
+
+A console of this machine trusts its users, as the bus does. One that is open to the network gives each visitor the
+role of the token that it shows: by a link, the cookie that the page got for it, a header `Authorization`, or the
+operation `auth`.
+"""
+
+import base64
+import hashlib
+import hmac
+import ipaddress
+import os
+import secrets
+import socket
+from collections.abc import Mapping
+from enum import IntEnum
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+from rbxcompose.base.dataclass import dataclass
+
+LOCAL_NAMES = ("127.0.0.1", "localhost", "[::1]")  # of this machine
+_SECRET_BYTES = 32
+
+
+class Role(IntEnum):
+    """What a visitor may do; each role may do what those before it may."""
+
+    NOBODY = 0
+    VIEW = 1
+    OPERATE = 2
+    CONFIGURE = 3
+
+    @property
+    def word(self) -> str:
+        """Return its name for people."""
+        return self.name.lower()
+
+
+_ROLES = {
+    "subscribe": Role.VIEW,
+    "unsubscribe": Role.VIEW,
+    "set_level": Role.VIEW,
+    "status": Role.VIEW,
+    "fragment": Role.VIEW,  # what it is a part of is judged when it is whole
+    "auth": Role.NOBODY,
+    "advertise_service": Role.CONFIGURE,  # others would believe its answers
+    "advertise_action": Role.CONFIGURE,
+}
+_SERVICES = {
+    "/console/stop": Role.VIEW,  # whoever sees that something goes wrong
+    "/console/ask": Role.VIEW,  # the request decides
+    "/rosapi/set_param": Role.CONFIGURE,
+    "/rosapi/delete_param": Role.CONFIGURE,
+}
+_NAMES = ("topic", "service", "action")
+
+
+def needed(frame: Mapping[str, Any], guarded: Mapping[str, Role]) -> Role:
+    """Return the least role that may have a frame of rosbridge carried out.
+
+    Args:
+        frame: the frame.
+        guarded: least roles by patterns of names of topics, services and actions: `/arm/*`.
+    """
+    op = frame.get("op")
+    least = _ROLES.get(op, Role.OPERATE) if isinstance(op, str) else Role.VIEW
+    name = next((f"/{value.lstrip('/')}" for key in _NAMES if isinstance(value := frame.get(key), str)), "")
+    if op == "call_service":
+        least = _SERVICES.get(name, Role.VIEW if name.startswith("/rosapi/") else Role.OPERATE)
+    if least <= Role.VIEW and op != "call_service":
+        return least  # looking harms nobody
+    return max(least, *(role for pattern, role in guarded.items() if fnmatchcase(name, pattern)), Role.NOBODY)
+
+
+# Tokens
+
+
+def secret_path() -> Path:
+    """Return the file of which the tokens of this user's robots are made."""
+    home = os.environ.get("XDG_STATE_HOME") or Path("~/.local/state").expanduser()
+    return Path(home) / "rbxcompose" / "console_secret"
+
+
+def own_secret() -> bytes:
+    """Return the secret of this user; made, for nobody else to read, if there is none.
+
+    Raises:
+        OSError: if it can neither be read nor written.
+    """
+    path = secret_path()
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        renew_secret()
+        return path.read_bytes()
+
+
+def renew_secret() -> None:
+    """Make another secret: no link that was given away opens anything any more.
+
+    Raises:
+        OSError: if it cannot be written.
+    """
+    path = secret_path()
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    new = path.with_name(f"{path.name}.{os.getpid()}")
+    handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    try:
+        os.write(handle, secrets.token_bytes(_SECRET_BYTES))
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+    new.replace(path)
+
+
+def token_of(secret: bytes, robot: str, role: Role) -> str:
+    """Return the token that gives a role at a robot."""
+    digest = hmac.digest(secret, f"{robot}\n{role.word}".encode(), hashlib.sha256)
+    return base64.urlsafe_b64encode(digest).decode().rstrip("=")
+
+
+def role_of(secret: bytes, robot: str, token: str) -> Role:
+    """Return the role that a token gives at a robot; it takes as long for a wrong one as for a right one."""
+    given = token.encode(errors="replace")
+    found = Role.NOBODY
+    for role in (Role.VIEW, Role.OPERATE, Role.CONFIGURE):
+        if hmac.compare_digest(token_of(secret, robot, role).encode(), given):
+            found = role
+    return found
+
+
+# Pages
+
+
+@dataclass(frozen=True, slots=True)
+class Door:
+    """Which pages may talk to the console: its own, those of its system, and those that the manifest names.
+
+    A name that others may point to this machine is none of its own: a page of theirs would pass as one of the robot.
+    """
+
+    port: int
+    is_lan: bool
+    names: tuple[str, ...] = ()
+    """Of this machine in the network."""
+    origins: frozenset[str] = frozenset()
+    """Of other pages: `http://localhost:8181`."""
+
+    def lets_in(self, host: str, origin: str) -> bool:
+        """Return whether a request with these headers comes from a page that may, or from no page."""
+        host, origin = host.lower(), origin.lower()
+        name, _, port = host.rpartition(":") if host.rpartition(":")[2].isdecimal() else (host, "", str(self.port))
+        if port != str(self.port) or not self._is_own(name):
+            return False
+        if not origin or origin in self.origins:
+            return True
+        shown = origin.removeprefix("http://")
+        shown = shown if self.port != 80 or ":" in shown else f"{shown}:80"
+        return origin.startswith("http://") and self._is_page(shown, f"{name}:{port}")
+
+    def _is_page(self, shown: str, asked: str) -> bool:
+        if shown == asked:
+            return True
+        own = {f"{name}:{self.port}" for name in LOCAL_NAMES}
+        return shown in own and asked in own
+
+    def _is_own(self, name: str) -> bool:
+        if name in LOCAL_NAMES:
+            return True
+        if not self.is_lan:
+            return False
+        try:
+            ipaddress.ip_address(name.strip("[]"))
+        except ValueError:
+            return name in self.names
+        return True
+
+
+def network_names() -> tuple[str, ...]:
+    """Return the names by which others in the network know this machine."""
+    name = socket.gethostname().lower()
+    return tuple(dict.fromkeys((name, f"{name.partition('.')[0]}.local")))
+
+
+def network_address() -> str:
+    """Return the address that others in the network reach this machine by; of this machine only, if there is none."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as chosen:
+        try:
+            chosen.connect(("192.0.2.1", 9))  # documentation's network: nothing is sent
+        except OSError:
+            return LOCAL_NAMES[0]
+        return str(chosen.getsockname()[0])
+
+
+def link(host: str, port: int, token: str = "") -> str:
+    """Return the address of the page; what is behind `#` is not sent by browsers, and in no log of a server."""
+    return f"http://{host}:{port}/" + (f"#token={token}" if token else "")

@@ -1,0 +1,114 @@
+"""Who may do what by the console."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rbxcompose.domains.console.access import (
+    Door,
+    Role,
+    needed,
+    network_address,
+    own_secret,
+    renew_secret,
+    role_of,
+    secret_path,
+    token_of,
+)
+
+ROLES = [Role.VIEW, Role.OPERATE, Role.CONFIGURE]
+SECRET = bytes(32)
+
+
+@pytest.mark.parametrize(
+    ("frame", "least"),
+    [
+        ({"op": "subscribe", "topic": "/odom"}, Role.VIEW),
+        ({"op": "subscribe", "topic": "/arm/state"}, Role.VIEW),
+        ({"op": "publish", "topic": "/cmd_vel"}, Role.OPERATE),
+        ({"op": "publish", "topic": "arm/goal"}, Role.CONFIGURE),
+        ({"op": "call_service", "service": "/console/stop"}, Role.VIEW),
+        ({"op": "call_service", "service": "console/release"}, Role.OPERATE),
+        ({"op": "call_service", "service": "/rosapi/topics"}, Role.VIEW),
+        ({"op": "call_service", "service": "rosapi/set_param"}, Role.CONFIGURE),
+        ({"op": "call_service", "service": "/dock"}, Role.OPERATE),
+        ({"op": "call_service", "service": "/arm/home"}, Role.CONFIGURE),
+        ({"op": "send_action_goal", "action": "/go_to"}, Role.OPERATE),
+        ({"op": "advertise_service", "service": "/x"}, Role.CONFIGURE),
+        ({"op": "auth", "mac": "x"}, Role.NOBODY),
+        ({"op": "who knows"}, Role.OPERATE),
+        ({}, Role.VIEW),
+    ],
+    ids=lambda value: " ".join(map(str, value.values())) if isinstance(value, dict) else None,
+)
+def test_each_operation_and_name_has_its_least_role(frame: dict[str, str], least: Role) -> None:
+    assert needed(frame, {"/arm/*": Role.CONFIGURE}) is least
+
+
+@given(st.dictionaries(st.sampled_from(["op", "topic", "service", "action"]), st.text() | st.integers() | st.none()))
+def test_any_frame_has_a_role(frame: dict[str, object]) -> None:
+    assert needed(frame, {"/*": Role.OPERATE}) in Role
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_a_token_gives_its_role_at_its_robot_only(role: Role) -> None:
+    token = token_of(SECRET, "digger", role)
+    assert role_of(SECRET, "digger", token) is role
+    assert role_of(SECRET, "patrol", token) is Role.NOBODY
+    assert role_of(bytes(31) + b"x", "digger", token) is Role.NOBODY
+
+
+@given(st.text())
+def test_no_other_text_gives_a_role(text: str) -> None:
+    assert role_of(SECRET, "digger", text) is Role.NOBODY
+
+
+def test_a_secret_stays_until_it_is_renewed_and_nobody_else_reads_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    first = own_secret()
+    assert own_secret() == first
+    assert len(first) == 32
+    assert stat.S_IMODE(secret_path().stat().st_mode) == 0o600
+    renew_secret()
+    assert own_secret() != first
+    assert os.listdir(secret_path().parent) == [secret_path().name]
+
+
+@pytest.mark.parametrize(
+    ("host", "origin", "on_lan", "on_machine"),
+    [
+        ("127.0.0.1:8080", "", True, True),
+        ("localhost:8080", "http://localhost:8080", True, True),
+        ("localhost:8080", "http://127.0.0.1:8080", True, True),
+        ("192.168.1.7:8080", "http://192.168.1.7:8080", True, False),
+        ("192.168.1.7:8080", "http://192.168.1.8:8080", False, False),
+        ("robot.local:8080", "http://robot.local:8080", True, False),
+        ("evil.example:8080", "http://evil.example:8080", False, False),
+        ("127.0.0.1:8080", "http://evil.example", False, False),
+        ("127.0.0.1:8080", "https://127.0.0.1:8080", False, False),
+        ("127.0.0.1:8080", "null", False, False),
+        ("127.0.0.1:9999", "", False, False),
+        ("127.0.0.1:8080", "http://old.page:8181", True, True),
+        ("", "", False, False),
+    ],
+)
+def test_only_own_pages_and_named_ones_pass(host: str, origin: str, *, on_lan: bool, on_machine: bool) -> None:
+    more = {"names": ("robot.local",), "origins": frozenset({"http://old.page:8181"})}
+    assert Door(8080, is_lan=True, **more).lets_in(host, origin) is on_lan  # type: ignore[arg-type]
+    assert Door(8080, is_lan=False, **more).lets_in(host, origin) is on_machine  # type: ignore[arg-type]
+
+
+def test_at_the_port_of_the_web_a_browser_names_no_port() -> None:
+    assert Door(80, is_lan=False).lets_in("localhost", "http://localhost")
+
+
+def test_a_machine_has_an_address() -> None:
+    assert network_address().count(".") == 3

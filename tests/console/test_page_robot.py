@@ -1,0 +1,159 @@
+"""The page of the robot's components in a real browser."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.console.browser import CHROMIUM
+from tests.console.fake_gateway import RUNNING, FakeGateway
+from tests.console.looks import PHONE, overflows, too_small, violations
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
+
+DESCRIBED = "robot/DescribeRobot"
+_PORT = {"unit": "", "skill": "", "is_command": False, "claims": "", "is_pausable": False}
+_HINTS: dict[str, dict[str, Any]] = {"measures": {}, "choices": {}, "outcomes": {}}
+
+
+def port(name: str, kind: str, topic: str, type_: str, **more: Any) -> dict[str, Any]:
+    return {"name": name, "kind": kind, "topic": topic, "type": type_, **_PORT, **_HINTS, **more}
+
+
+def component(name: str, type_: str, *ports: dict[str, Any], **more: Any) -> dict[str, Any]:
+    about = f"What a {type_} does."
+    return {"name": name, "type": type_, "about": about, "process": "robot", "ports": list(ports)} | {
+        "capabilities": {},
+        "requests": {},
+        **more,
+    }
+
+
+def state(name: str, **more: Any) -> dict[str, Any]:
+    plain = {"state": "active", "process": "robot", "pid": 7, "restarts": 0, "waits_for": None, "note": ""}
+    return {"name": name, **plain, **more}
+
+
+STRANGER = component(
+    "sprayer",
+    "acme_sprayer",
+    port("flow", "out", "/flow", "std_msgs/msg/Float32", unit="V"),
+    port("spray", "serves_action", "/spray", "acme_msgs/action/Spray", skill="spray")
+    | {"measures": {"angle": "rad", "amount": "0 to 1"}, "choices": {"nozzle": ["fine", "wide"]}},
+    port("rinse", "serves", "/rinse", "std_srvs/srv/Trigger", skill="rinse"),
+    port("set_level", "serves", "/set_level", "acme_msgs/srv/SetLevel", skill="set_level", unit="%"),
+)
+BASE = component(
+    "base",
+    "diff_drive_sim",
+    port("cmd_vel", "in", "/cmd_vel", "geometry_msgs/msg/Twist", is_command=True),
+    port("odom", "out", "/odom", "nav_msgs/msg/Odometry"),
+    capabilities={"Drives": [{"commands": "cmd_vel", "odometry": "odom", "max_speed": 0.5, "max_turn_rate": 1.5}]},
+)
+MUX = component("cmd_vel", "mux", port("output", "out", "/cmd_vel", "geometry_msgs/msg/Twist"))
+SERVOS = component(
+    "servos",
+    "servo_bus",
+    port("joint_states", "out", "/joint_states", "sensor_msgs/msg/JointState"),
+    port("pan_enable", "serves", "/pan/enable", "std_srvs/srv/SetBool", skill="enable_pan"),
+    port("pan_relax", "serves", "/pan/relax", "std_srvs/srv/Trigger", skill="relax_pan"),
+    port("slide_enable", "serves", "/slide/enable", "std_srvs/srv/SetBool", skill="enable_slide"),
+)
+
+
+def definition(type_: str, **fields: str) -> dict[str, Any]:
+    names, types = list(fields), list(fields.values())
+    return {"type": type_, "fieldnames": names, "fieldtypes": types, "fieldarraylen": [-1] * len(names)}
+
+
+LEVEL = definition("acme_msgs/SetLevel_Request", value="float32")
+SPRAY = definition("acme_msgs/Spray_Goal", nozzle="string", angle="float64", amount="float64", dry="boolean")
+
+
+@pytest.fixture
+def robot(gateway: FakeGateway) -> FakeGateway:
+    gateway.windows[DESCRIBED] = [STRANGER, BASE, MUX, SERVOS]
+    gateway.windows[RUNNING] = {
+        "stop": None,
+        "components": [state("sprayer", state="failed", restarts=3, note="no water"), state("base"), state("cmd_vel")],
+    }
+    gateway.answers |= {
+        "/rosapi/service_request_details": lambda _: {"typedefs": [LEVEL]},
+        "/rosapi/action_goal_details": lambda _: {"typedefs": [SPRAY]},
+        "/rinse": lambda _: {"success": False, "message": "no water"},
+        "/set_level": lambda _: {"success": True, "message": "set"},
+    }
+    gateway.latched["/robot_description"] = {"data": "<robot><joint name='slide' type='prismatic'/></robot>"}
+    gateway.latched["/odom"] = {"twist": {"twist": {"linear": {"x": 0.25}, "angular": {"z": 0}}}}
+    gateway.latched["/flow"] = {"data": 3.25}
+    gateway.latched["/joint_states"] = {"name": ["pan", "slide"], "position": [0.7853981, 0.012]}
+    return gateway
+
+
+def test_a_component_that_nobody_knows_has_a_card_with_all_it_offers(
+    open_page: Callable[..., Page], robot: FakeGateway
+) -> None:
+    page = open_page(page_name="robot")
+    card = page.get_by_label("sprayer", exact=True)
+    expect(card).to_contain_text("What a acme_sprayer does.")
+    expect(card.get_by_role("status").first).to_have_text("Failed (no water)")
+    expect(card).to_contain_text("3.3\u202fV")
+    card.get_by_role("button", name="Rinse").click()
+    expect(card).to_contain_text("Failed: no water")
+    card.get_by_text("Set level").click()
+    card.get_by_label("Value").fill("120")
+    card.get_by_role("button", name="Set level").click()
+    expect(card).to_contain_text("value: at most 100")
+    card.get_by_label("Value").fill("40")
+    card.get_by_role("button", name="Set level").click()
+    expect(card).to_contain_text("Done: set")
+    assert robot.calls("/set_level") == [{"value": 40}]
+    assert violations(page) == []
+
+
+def test_cards_of_what_is_known_show_what_matters(open_page: Callable[..., Page], robot: FakeGateway) -> None:
+    page = open_page(page_name="robot")
+    servos = page.get_by_label("servos", exact=True)
+    expect(servos.get_by_role("row", name="Pan")).to_contain_text("45\u202f\u00b0")
+    expect(servos.get_by_role("row", name="Slide")).to_contain_text("12\u202fmm")
+    servos.get_by_role("button", name="Relax pan").click()
+    expect(servos).to_contain_text("Pan: relaxed")
+    assert robot.calls("/pan/relax") == [{}]
+    expect(page.get_by_label("base", exact=True)).to_contain_text("0.25\u202fm/s of 0.50\u202fm/s")
+
+
+def test_it_is_seen_how_components_are_wired_and_which_processes_run_them(
+    open_page: Callable[..., Page], robot: FakeGateway
+) -> None:
+    page = open_page(page_name="robot")
+    page.get_by_role("button", name="Wiring").click()
+    expect(page.get_by_role("img", name="cmd_vel to base: /cmd_vel")).to_be_visible()
+    assert violations(page) == []
+    page.get_by_role("button", name="Processes").click()
+    row = page.get_by_role("row", name="sprayer")
+    expect(row).to_contain_text("Failed (no water)")
+    expect(row).to_contain_text("3")
+    page.get_by_label("Find a component").fill("spray")
+    expect(page.get_by_role("row", name="base")).to_be_hidden()
+    expect(row).to_be_visible()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_fits_a_phone(open_page: Callable[..., Page], robot: FakeGateway, scheme: str) -> None:
+    page = open_page(page_name="robot", viewport=PHONE, color_scheme=scheme, has_touch=True)
+    expect(page.get_by_label("sprayer", exact=True)).to_be_visible()
+    page.get_by_text("Spray", exact=True).first.click()
+    expect(page.get_by_label("Nozzle")).to_be_visible()
+    assert not overflows(page)
+    assert too_small(page) == []
+    assert violations(page) == []
+
+
+def test_without_an_answer_it_says_why(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+    page = open_page(page_name="robot")
+    expect(page.get_by_text("Asking the robot what it is made of")).to_be_visible()
+    gateway.say(f"/console/windows/{DESCRIBED}", {"refused": "the supervisor does not answer"})
+    expect(page.get_by_text("the supervisor does not answer")).to_be_visible()
