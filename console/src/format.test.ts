@@ -50,13 +50,15 @@ it.each<[string, number | null]>([
 });
 
 it("a configuration has defaults, and a robot without a base has no drive", () => {
-  expect(parseConfig({})).toMatchObject({ robot: "robot", about: "", firstPage: "", drive: null, values: [] });
-  const { drive, values } = parseConfig({
+  expect(parseConfig({})).toMatchObject({ robot: "robot", about: "", firstPage: "", drive: null, values: [], places: [] });
+  const { drive, values, places } = parseConfig({
     drive: { topic: "/cmd", max_speed: null },
     values: { a: { topic: "/a" }, b: 3 },
+    places: { dock: { x: 1, y: 2, heading: 0 }, lost: { x: 1 } },
   });
   expect(drive).toEqual({ topic: "/cmd", type: "geometry_msgs/Twist", maxSpeed: 0.5, maxTurnRate: 1 });
   expect(values).toEqual([{ name: "a", topic: "/a", type: "", field: "data", unit: "" }]);
+  expect(places).toEqual([{ name: "dock", x: 1, y: 2, heading: 0, colour: "" }]);
 });
 
 it.each([null, [], "x", 3])("%j is no configuration", (json) => expect(() => parseConfig(json)).toThrow(ConfigError));

@@ -115,17 +115,18 @@ def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> No
     page.mouse.up()
 
 
-def finger_drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> None:
+def move_fingers(page: Page, start: list[tuple[float, float]], end: list[tuple[float, float]]) -> None:
     session = page.context.new_cdp_session(page)
-    for kind, points in (("touchStart", [start]), ("touchMove", [end]), ("touchEnd", [])):
-        given = [{"x": x, "y": y} for x, y in points]
+    nowhere: list[tuple[float, float]] = []
+    for kind, points in (("touchStart", start), ("touchMove", end), ("touchEnd", nowhere)):
+        given = [{"x": x, "y": y, "id": number} for number, (x, y) in enumerate(points)]
         session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": given})
 
 
 def is_goal(frame: dict[str, Any], x: float, y: float, heading: float) -> bool:
     """Return whether a frame sends the robot to a pose, to the pixel."""
     sent = frame["args"]["pose"]
-    assert frame["action"], frame["action_type"] == ("/go_to", NAVIGATE)
+    assert (frame["action"], frame["action_type"]) == ("/go_to", NAVIGATE)
     assert sent["header"]["frame_id"] == "map"
     position, orientation = sent["pose"]["position"], sent["pose"]["orientation"]
     return bool(
@@ -190,13 +191,31 @@ def test_a_finger_sends_the_same_goal_and_escape_gives_up(open_page: Callable[..
     page = open_page(page_name="map", has_touch=True)
     expect(page.get_by_text("Robot: x 1.00")).to_be_visible()
     tool(page, "Go").tap()
-    finger_drag(page, at(page, 0.2, 0.1), at(page, 0.7, 0.1))
+    move_fingers(page, [at(page, 0.2, 0.1)], [at(page, 0.7, 0.1)])
     expect(state(page)).to_have_text("Driving to (0.20, 0.10)")
     (goal,) = rolling.goals()
     assert is_goal(goal, 0.2, 0.1, 0.0)
     tool(page, "Go").tap()
-    canvas(page).press("Escape")
+    page.mouse.move(*at(page, 0.2, 0.1))
+    page.mouse.down()
+    page.keyboard.press("Escape")
+    page.mouse.up()
     expect(tool(page, "Move view")).to_have_attribute("aria-pressed", "true")
+    assert len(rolling.goals()) == 1
+
+
+def test_two_fingers_and_the_wheel_zoom_and_send_no_goal(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
+    page = open_page(page_name="map", has_touch=True)
+    expect(page.get_by_text("Robot: x 1.00")).to_be_visible()
+    tool(page, "Go").tap()
+    narrow, wide = ([at(page, MIDDLE[0] + side * half, MIDDLE[1]) for side in (-1, 1)] for half in (0.25, 0.375))
+    move_fingers(page, narrow, wide)
+    page.mouse.move(*at(page, *MIDDLE))
+    page.mouse.wheel(0, -math.log(1.2) / math.log(1.0015))
+    drag(page, at(page, 0.3, 0.1, 1.8 * SCALE), at(page, 0.3, 0.0, 1.8 * SCALE))
+    expect(state(page)).to_have_text("Driving to (0.30, 0.10)")
+    (goal,) = rolling.goals()
+    assert is_goal(goal, 0.3, 0.1, -math.pi / 2)
 
 
 def test_a_grid_is_drawn_where_its_origin_and_its_frame_put_it(
@@ -211,10 +230,10 @@ def test_a_grid_is_drawn_where_its_origin_and_its_frame_put_it(
     wait_for_colour(page, 0.25, 0.25, free)
     wait_for_colour(page, 0.25, 0.35, ground)
     wait_for_colour(page, 0.15, 0.15, free)
-    wait_for_colour(page, 0.15, 0.25, [156, 161, 166, 255])
+    wait_for_colour(page, 0.15, 0.25, [156, 160, 166, 255])
     wait_for_colour(page, 0.15, 0.35, occupied)
     wait_for_colour(page, 0.35, 0.15, ground)
-    page.get_by_role("button", name="/map OccupancyGrid").click()
+    page.get_by_role("button", name="/map Obstacles").click()
     wait_for_colour(page, 0.25, 0.15, ground)
 
 
@@ -344,7 +363,7 @@ def test_it_fits_the_window_and_the_finger(
     page = open_page(page_name="map", viewport=size, color_scheme=scheme)
     page.get_by_text("Another pose").click()
     page.get_by_role("button", name="Go to Dock").click()
-    expect(page.get_by_role("button", name="/scan LaserScan")).to_be_visible()
+    expect(page.get_by_role("button", name="/scan Laser: red dots")).to_be_visible()
     assert not overflows(page)
     assert too_small(page) == []
     assert violations(page) == []

@@ -64,6 +64,15 @@ def test_names_are_those_on_the_bus(tmp_path: Path) -> None:
     assert config.values == {"charge": level, "door": text}
 
 
+def test_the_page_gets_the_places_with_their_colours(tmp_path: Path) -> None:
+    places = "places:\n  dock: {x: 50 cm, y: -1 m, heading: 180 deg, colour: red}\n  door: {x: 1 m, y: 2 m}\n"
+    config = gateway(tmp_path, f"{BASE}{places}console: {{}}")
+    assert config.places == {
+        "dock": {"x": 0.5, "y": -1.0, "heading": math.pi, "colour": "red"},
+        "door": {"x": 1.0, "y": 2.0, "heading": 0.0, "colour": ""},
+    }
+
+
 def test_a_robot_that_does_not_drive_has_a_console_too(tmp_path: Path) -> None:
     config = gateway(tmp_path, "components:\n  battery: {type: battery_sim, runtime: 45 s}\nconsole: {}")
     assert (config.drive, config.max_speed) == (None, math.inf)

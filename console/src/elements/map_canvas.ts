@@ -71,8 +71,8 @@ const KEYS: Record<string, readonly [right: number, down: number]> = {
 };
 
 export class MapCanvas extends HTMLElement {
-  /** Called when a drag with a tool ends, and when one is given up. */
-  onDrag: (drag: Drag | null) => void = () => undefined;
+  /** Called when a drag with a tool has ended. */
+  onDrag: (drag: Drag) => void = () => undefined;
 
   #scene: Scene = { robot: null, isOld: false, trail: [], places: [], grids: [], paths: [], scans: [], goal: null };
   #view: View = fitted([], 1, 1);
@@ -139,6 +139,7 @@ export class MapCanvas extends HTMLElement {
   set tool(tool: Tool) {
     this.#tool = tool;
     this.dataset.tool = tool;
+    if (this.#drag) this.#pointers.clear(); // what is held down has lost its meaning
     this.#drag = null;
     if (tool !== "measure") this.#measured = null;
     this.#schedule();
@@ -232,7 +233,6 @@ export class MapCanvas extends HTMLElement {
     this.#schedule();
     if (this.#tool === "move") return;
     if (isMeant) this.onDrag({ tool: this.#tool, pose: this.#posed(drag), end: toWorld(this.#view, drag.to) });
-    else this.onDrag(null);
   }
 
   /** Returns the pose of a drag; a tap looks away from the robot, which comes from there. */
@@ -255,7 +255,6 @@ export class MapCanvas extends HTMLElement {
     else if (event.key === "+" || event.key === "=") this.zoom(ZOOM);
     else if (event.key === "-") this.zoom(1 / ZOOM);
     else if (event.key === "0" || event.key === "Home") this.fit();
-    else if (event.key === "Escape" && this.#tool !== "move") this.onDrag(null);
     else return;
     event.preventDefault();
   }

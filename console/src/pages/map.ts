@@ -49,11 +49,27 @@ const ICONS: Record<Exclude<TripState["is"], "none">, Icon> = {
   unknown: "unlink",
 };
 
-/** Topics that are drawn, by type: the time between two messages [ms], and how one is read. */
-const LAYERS: Record<string, { throttle: number; read: (message: Message) => Drawn | null }> = {
-  Path: { throttle: 500, read: (path) => ({ is: "path", frame: frameOf(path), points: readPath(path) }) },
-  LaserScan: { throttle: 200, read: (scan) => ({ is: "scan", frame: frameOf(scan), points: readScan(scan) }) },
+interface Layer {
+  words: string;
+  /** [ms] between two messages */
+  throttle: number;
+  read(message: Message): Drawn | null;
+}
+
+/** Topics that are drawn, by type. */
+const LAYERS: Record<string, Layer> = {
+  Path: {
+    words: "Path: green line",
+    throttle: 500,
+    read: (path) => ({ is: "path", frame: frameOf(path), points: readPath(path) }),
+  },
+  LaserScan: {
+    words: "Laser: red dots",
+    throttle: 200,
+    read: (scan) => ({ is: "scan", frame: frameOf(scan), points: readScan(scan) }),
+  },
   OccupancyGrid: {
+    words: "Obstacles",
     throttle: 1_000,
     read: (message) => {
       const grid = readGrid(message);
@@ -100,6 +116,7 @@ class MapView {
   readonly #drawn = new Map<string, Drawn | null>();
   readonly #followed = new Map<string, () => void>();
   #base = "";
+  #odometry = ""; // the topic of the base that drives; there may be others
   #fixed = "map";
   #pose: Pose | null = null;
   #seenAt = -Infinity; // when the position came [ms]
@@ -129,6 +146,9 @@ class MapView {
     this.#numbers = this.#numbersForm();
     this.element = h("div", { class: "map" }, this.#chart(), this.#side());
     this.#canvas.onDrag = (drag) => this.#dragged(drag);
+    this.element.onkeydown = ({ key }) => {
+      if (key === "Escape") this.#choose("move");
+    };
     this.#choose("move");
     const ticker = setInterval(() => this.#tick(), TICK);
     this.#closers.push(
@@ -160,7 +180,7 @@ class MapView {
     ];
     const tools = h("div", { class: "map-tools", role: "group", "aria-label": "What a drag does" }, ...this.#tools.values());
     const keys =
-      "Drag or arrow keys move the view; wheel, pinch, + and \u2212 zoom; 0 fits everything. x points right, y up.";
+      "Drag or arrow keys move the view; wheel, pinch, + and \u2212 zoom; 0 fits everything. x points right, y up; the dotted line is where the robot was in the last minute.";
     return h(
       "section",
       { class: "card map-chart", "aria-label": "View" },
@@ -224,6 +244,10 @@ class MapView {
     this.#navigator = (servers.find(({ isDeclared }) => isDeclared) ?? servers[0])?.port ?? null;
     const docks = components.flatMap(({ capabilities }) => capabilities.Charges ?? []).map(({ place }) => place ?? null);
     this.#docks = new Set(docks.filter(isMessage).map(({ name }) => String(name)));
+    const drives = components.flatMap(({ ports, capabilities }) =>
+      ports.filter(({ name }) => name === capabilities.Drives?.[0]?.odometry),
+    );
+    this.#odometry = drives[0]?.topic ?? "";
     this.#isDescribed = components.length > 0;
     this.#showTrip(this.#trip.state.value);
     this.#tick();
@@ -271,13 +295,13 @@ class MapView {
       this.#followed.set(topic, link.subscribe(topic, (message) => this.#onTransforms(message), { type }));
     } else if (kind === "Odometry") {
       const options = { type, throttle: ODOMETRY };
-      this.#followed.set(topic, link.subscribe(topic, (message) => this.#onOdometry(message), options));
+      this.#followed.set(topic, link.subscribe(topic, (message) => this.#onOdometry(topic, message), options));
     } else if (LAYERS[kind]) {
       this.#addLayer(topic, type, LAYERS[kind]);
     }
   }
 
-  #addLayer(topic: string, type: string, { throttle, read }: (typeof LAYERS)[string]): void {
+  #addLayer(topic: string, type: string, { words, throttle, read }: Layer): void {
     const listen = () =>
       this.#robot.link.subscribe(
         topic,
@@ -288,7 +312,7 @@ class MapView {
         { type, throttle },
       );
     let isShown = true;
-    const toggle = button([icon("check"), topic, h("small", { class: "label" }, type.split("/").at(-1)!)], () => {
+    const toggle = button([icon("check"), topic, h("small", { class: "label" }, words)], () => {
       isShown = !isShown;
       this.#followed.get(topic)?.();
       this.#followed.set(topic, isShown ? listen() : () => undefined);
@@ -320,11 +344,11 @@ class MapView {
   }
 
   /** Takes the pose of an odometry for a transform, unless somebody publishes that as well. */
-  #onOdometry(message: Message): void {
+  #onOdometry(topic: string, message: Message): void {
     const child = String(message.child_frame_id ?? "").replace(/^\//, "");
     const transform = isMessage(message.pose) ? readTransform(message.pose.pose) : null;
     if (!child || !transform) return;
-    this.#base ||= child;
+    if (!this.#base || topic === this.#odometry) this.#base = child;
     this.#seenAt = performance.now();
     if (!this.#published.has(child)) this.#frames.set(frameOf(message), child, transform);
     this.#moved();
@@ -464,15 +488,15 @@ class MapView {
     this.#showHint();
   }
 
-  #dragged(drag: Drag | null): void {
-    if (drag?.tool === "measure") {
+  #dragged(drag: Drag): void {
+    if (drag.tool === "measure") {
       this.#measured = `${formatNumber(distance(drag.pose, drag.end), "m")}\u202fm`;
       this.#showHint();
       return;
     }
     this.#choose("move"); // so that the next touch moves the view and not the robot
-    if (drag?.tool === "go") this.#go(drag.pose, nameOf(drag.pose), this.#fixed);
-    if (drag?.tool === "initial") this.#setInitial(drag.pose);
+    if (drag.tool === "go") this.#go(drag.pose, nameOf(drag.pose), this.#fixed);
+    if (drag.tool === "initial") this.#setInitial(drag.pose);
   }
 
   #go({ x, y, heading }: Pose, name: string, frame: string): void {

@@ -80,19 +80,6 @@ _SHOWN = 60  # characters of a name that is wrong
 _NOT_BUILT = Path(__file__).parents[1] / "not_built.html"
 
 
-class ShownPlace(Config):
-    """A place as the page shows it, a pose in `map`."""
-
-    x: float
-    """Position along x [m]."""
-    y: float
-    """Position along y [m]."""
-    heading: float
-    """Direction, measured from x towards y [rad]."""
-    colour: str = ""
-    """How it is drawn."""
-
-
 class GatewayConfig(Config):
     """What the page shows."""
 
@@ -124,8 +111,8 @@ class GatewayConfig(Config):
     """Where the pages of the robots of its system are: `ADDRESS:PORT`, without an address on the same host."""
     values: dict[str, dict[str, str]] = {}
     """The values of the manifest: topic, type and field of each, and the unit of the number in the message."""
-    places: dict[str, ShownPlace] = {}
-    """The places of the manifest."""
+    places: dict[str, dict[str, Any]] = {}
+    """The places of the manifest: `x` and `y` [m], `heading` [rad] and `colour` of each."""
 
     @property
     def drive(self) -> DriveLimits | None:
@@ -487,8 +474,7 @@ class GatewaySession:
             finite = {name: limit if math.isfinite(limit) else None for name, limit in limits.items()}
             shown = {"topic": drive.topic, "type": drive.type, **finite}
         about = {"robot": self._folder.path.name, "about": config.about, "first_page": config.first_page}
-        places = {name: place.model_dump() for name, place in config.places.items()}
-        lists = {"values": config.values, "places": places, "fleet": config.fleet}
+        lists = {"values": config.values, "places": config.places, "fleet": config.fleet}
         return {**about, "drive": shown, **lists, "stop": "/console/stop"}
 
     def _guarded(self, application: Any) -> Callable[..., Awaitable[None]]:
