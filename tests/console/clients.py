@@ -23,6 +23,7 @@ class Graph:
     def __init__(self) -> None:
         self.known = {"/odom": "nav_msgs/msg/Odometry", "/level": "std_msgs/msg/Float32", TELEOP: TWIST}
         self.served = {"/lamp": "std_srvs/srv/SetBool", "/strange": "toy_msgs/srv/Strange"}
+        self.acted = {"/go_to": "nav2_msgs/action/NavigateToPose"}
         self.latched: set[str] = set()
 
     def topics(self) -> dict[str, str]:
@@ -30,6 +31,12 @@ class Graph:
 
     def services(self) -> dict[str, str]:
         return self.served
+
+    def actions(self) -> dict[str, str]:
+        return self.acted
+
+    def servers(self, service: str) -> Sequence[str]:
+        return ["/base"] if service in self.served else []
 
     def nodes(self) -> Sequence[str]:
         return ["/base"]

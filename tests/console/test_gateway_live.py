@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import shutil
 import socket
 import subprocess
@@ -236,6 +237,27 @@ def test_roslibpy_does_all_that_it_can(robot: Robot) -> None:
     assert told["parameters"]["values"][0]["double_value"] == 0.5
     assert told["lease"]["success"]
     assert "no service" in told["failure"]
+
+
+def test_roslib_does_all_that_pages_do(robot: Robot) -> None:
+    if not (ROOT / "console/node_modules/roslib").exists():
+        pytest.skip("roslib is not installed: the page of the console was not built here")
+    client = ROOT / "tests/console/roslib_client.mjs"
+    path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    command = [str(shutil.which("node", path=path)), str(client), str(ROOT / "console"), str(PORT)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=50)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert "/base" in told["nodes"]
+    assert "/go_to" in told["actions"]
+    assert told["raw"] == ["std_msgs/Header header", "string child_frame_id"]
+    assert set(told["decoded"]) == {"linear", "angular"}
+    assert (told["speed"], "/base:max_speed" in told["names"]) == (0.5, True)
+    assert told["fed_back"]
+    assert "there is no action '/nothing'" in told["refused"]
+    assert told["statuses"] == [1, 3]  # active, succeeded
+    assert told["canceled"] == 2
+    assert told["bell"] == {"success": True, "message": "ding"}
 
 
 def test_a_cut_socket_stops_the_robot_at_once(robot: Robot) -> None:

@@ -178,7 +178,10 @@ def test_each_failed_call_is_answered_with_values() -> None:
         ("/strange", {}, "is not known here"),
         ("/lamp", {"datum": 1}, "has no field 'datum'"),
         ("/lamp", [True, True], "has 1 fields"),
-        ("/rosapi/set_param", {}, "not yet served"),
+        ("/rosapi/set_param", {}, "'name' is a text"),
+        ("/rosapi/get_param", {"name": "/nobody:speed"}, "no node with a parameter"),
+        ("/rosapi/message_details", {"type": "toy_msgs/Toy"}, "is not known here"),
+        ("/rosapi/nonsense", {}, "there is no service"),
         ("/rosapi/topic_type", {}, "'topic' is a text"),
         ("/console/drive", {"take": "yes"}, "true or false"),
         ("/console/drive", 7, "a map or a list"),
@@ -278,9 +281,7 @@ def test_what_is_no_window_is_refused(path: str) -> None:
     assert "a subject, a query, and its fields" in status["msg"]
 
 
-@pytest.mark.parametrize(
-    "op", ["advertise_service", "unadvertise_action", "action_result", "fragment", "png", "cbor-raw"]
-)
+@pytest.mark.parametrize("op", ["unadvertise_action", "action_result", "fragment", "png", "cbor-raw"])
 def test_what_is_not_served_yet_is_said(op: str) -> None:
     (status,) = Room().client().does(op, id="a")
     assert status == {"op": "status", "level": "error", "msg": f"the operation '{op}' is not yet served", "id": "a"}

@@ -10,16 +10,21 @@ import math
 import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.domains.console import old_actions, rosapi
 from rbxcompose.domains.console.access import Role, needed
 from rbxcompose.domains.console.json_messages import WrongMessageError, arguments, encoded, from_json, to_json
 from rbxcompose.domains.console.lease import LATEST, DriveLease, DriveLimits, Lateness, limited, moves
+from rbxcompose.domains.console.rosapi import GraphView
 from rbxcompose.msgs import registry
-from rbxcompose.msgs.types import Message, Service
+from rbxcompose.msgs.rcl_interfaces import GetParameters, ListParameters, SetParameters
+from rbxcompose.msgs.types import Action, Message, Service
+from rbxcompose.sdk import parameters
+from rbxcompose.sdk.bound import Ended, Outcome
 
 LARGEST = 8 * 1024 * 1024  # [characters] of a frame
 MOST_PER_SECOND = 200  # frames of a client
@@ -34,11 +39,9 @@ LOOK = 0.2  # [s] between two looks at the robot itself, unless its clients want
 PATIENCE = 10.0  # [s] for an answer, if a client does not say
 LONGEST_PATIENCE = 60.0  # [s]
 
+_STATUSES = {Outcome.SUCCEEDED: 4, Outcome.CANCELED: 5, Outcome.ABORTED: 6}  # of action_msgs/GoalStatus
 LEVELS = ("info", "warning", "error", "none")
-LATER = re.compile(
-    r"(un)?advertise_(service|action)|(send|cancel)_action_goal|action_(feedback|result)|service_response"
-    r"|fragment|png|cbor(-raw)?"
-)
+LATER = re.compile(r"(un)?advertise_action|action_(feedback|result)|fragment|png|cbor(-raw)?")
 """Operations of the protocol that are not served yet."""
 
 WINDOWS = "/console/windows/"
@@ -48,34 +51,6 @@ _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"\w+(/(msg|srv|action))?/\w+", re.ASCII)
 _LONGEST_ROS_NAME = 247
 _SHOWN = 60  # characters of what a client sent, in a status
-
-
-class GraphView(Protocol):
-    """What is on the bus now; all names are absolute."""
-
-    def topics(self) -> Mapping[str, str]:
-        """Return the types of the topics."""
-        ...
-
-    def services(self) -> Mapping[str, str]:
-        """Return the types of the services."""
-        ...
-
-    def nodes(self) -> Sequence[str]:
-        """Return the names of the nodes."""
-        ...
-
-    def publishers(self, topic: str) -> Sequence[str]:
-        """Return the names of the nodes that publish on a topic."""
-        ...
-
-    def subscribers(self, topic: str) -> Sequence[str]:
-        """Return the names of the nodes that subscribe to a topic."""
-        ...
-
-    def is_latched(self, topic: str) -> bool:
-        """Return whether the last message of a topic is kept for late subscribers."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +104,48 @@ class ServiceCall:
 
 
 @dataclass(frozen=True, slots=True)
+class Serve:
+    """Serve a service, and pass each request to `Bridge.requested`."""
+
+    service: str
+    type: type[Service[Any, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class Unserve:
+    """No client serves this any more."""
+
+    service: str
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """Answer a request; without a response, by why there is none."""
+
+    number: int
+    response: Message | None
+    error: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class SendGoal:
+    """Send a goal to an action; pass what comes back to `Bridge.fed_back`, and its end to `Bridge.ended`."""
+
+    number: int
+    action: str
+    type: type[Action[Any, Any, Any]]
+    goal: Message
+    wants_feedback: bool
+
+
+@dataclass(frozen=True, slots=True)
+class CancelGoal:
+    """Cancel a goal; its end still follows."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
 class AskRobot:
     """Send a request to the robot itself, as `commands` do, and pass its answer to `Bridge.robot_answered`."""
 
@@ -155,7 +172,22 @@ class Unwatch:
     window: str
 
 
-BusRequest = Subscribe | Unsubscribe | Advertise | Unadvertise | Publish | ServiceCall | AskRobot | Watch | Unwatch
+BusRequest = (
+    Subscribe
+    | Unsubscribe
+    | Advertise
+    | Unadvertise
+    | Publish
+    | ServiceCall
+    | Serve
+    | Unserve
+    | Answer
+    | SendGoal
+    | CancelGoal
+    | AskRobot
+    | Watch
+    | Unwatch
+)
 
 
 class BadFrameError(ValueError):
@@ -247,7 +279,7 @@ class _Client:
         self.frames: deque[str] = deque()
         self.streams: dict[str, _Stream] = {}  # by the name that it uses; the next to be served is the first
         self.advertised: dict[str, type[Message]] = {}
-        self.open_calls = 0
+        self.open_calls = 0  # with goals
         self.asks_for_lease = False  # before it drives
         self.lateness = Lateness()
         self._allowed, self._since = float(MOST_PER_SECOND), -math.inf
@@ -284,16 +316,38 @@ class _Waiting:
     client: int
     id: object
     service: str
+    then: Callable[[Any], dict[str, Any] | None] | None = None
+    """What makes the answer of a response, or asks on and returns None."""
+
+
+@dataclass(slots=True)
+class _Served:
+    """A service that a client serves, and the requests that it has not answered."""
+
+    client: int
+    type: type[Service[Any, Any]]
+    open: set[int] = field(default_factory=set)
+
+
+@dataclass(slots=True)
+class _Goal:
+    """A goal that has not ended: of the client that sent it, or of one that is gone."""
+
+    client: int
+    id: object
+    name: str  # by which the client knows the action
+    action: str
+    is_old: bool  # came by the topics of ROS 1
 
 
 @dataclass(slots=True)
 class _Listened:
     """A topic or a window to which at least one client listens."""
 
-    message: type[Message] | None  # None for a window
+    message: type[Message] | None  # None for what is made here
     is_latched: bool
     streams: list[tuple[int, _Stream]] = field(default_factory=list)  # each with the number of its client
-    last: _Shared | None = None  # of a latched one
+    last: deque[_Shared] = field(default_factory=lambda: deque(maxlen=1))  # of a latched one, of each publisher
     period: float = math.inf  # [s] of a window
 
 
@@ -327,6 +381,9 @@ class Bridge:
         self._listened: dict[str, _Listened] = {}
         self._advertised: dict[str, _Advertised] = {}
         self._calls: dict[int, _Waiting] = {}
+        self._served: dict[str, _Served] = {}
+        self._goals: dict[int, _Goal] = {}
+        self._old_statuses: dict[str, dict[object, tuple[int, str]]] = {}  # by name of an action, then of a goal
         self._clients_so_far = self._calls_so_far = 0
         self._requests: list[BusRequest] = []
         self._now, self._stamp = 0.0, 0
@@ -376,6 +433,9 @@ class Bridge:
         for topic in client.advertised:
             self._unadvertise(topic)
         self._calls = {call: waiting for call, waiting in self._calls.items() if waiting.client != number}
+        for service in [service for service, served in self._served.items() if served.client == number]:
+            self._end_serving(service)
+        # Goals go on, as missions do: a phone that sleeps must not leave a robot where it is.
         self.woken.discard(number)
         return self._done()
 
@@ -408,24 +468,78 @@ class Bridge:
         """Pass what the robot answers to a query on, or why it refuses, if that is another answer than before."""
         listened = self._listened.get(window)
         text = json.dumps(_finite({"refused": refusal} if refusal else {"answer": answer}), separators=(",", ":"))
-        if listened is not None and (listened.last is None or listened.last.text != text):
+        if listened is not None and (not listened.last or listened.last[-1].text != text):
             self._pass_on(window, _Shared(None, text), now)
 
     def _pass_on(self, topic: str, shared: _Shared, now: float) -> None:
         if (listened := self._listened.get(topic)) is None:
             return
         if listened.is_latched:
-            listened.last = shared
+            listened.last.append(shared)
         for number, stream in listened.streams:
             if stream.offer(shared, now):
                 self.woken.add(number)
 
     def answered(self, number: int, response: Message | None, error: str = "") -> None:
         """Pass the reply to a call on, or why there is none."""
+        waiting = self._calls.get(number)
         if response is None:
             self._respond(number, error, is_good=False)
-        else:
+        elif waiting is None or waiting.then is None:
             self._respond(number, to_json(response), is_good=True)
+        else:
+            try:
+                values = waiting.then(response)
+            except (BadFrameError, WrongMessageError) as wrong:
+                self._respond(number, str(wrong), is_good=False)
+                return
+            if values is not None:
+                self._respond(number, values, is_good=True)
+
+    def take_requests(self) -> list[BusRequest]:
+        """Return what an answer made necessary."""
+        return self._done()
+
+    def requested(self, service: str, number: int, request: Message) -> None:
+        """Pass a request to the client that serves it."""
+        served = self._served[service]
+        served.open.add(number)
+        frame = {"op": "call_service", "id": f"request:{number}", "service": service, "args": to_json(request)}
+        self._send(self._clients[served.client], frame)
+
+    def fed_back(self, number: int, feedback: Message) -> None:
+        """Pass feedback on a goal on."""
+        if (goal := self._goals.get(number)) is None:
+            return
+        values = to_json(feedback)
+        if goal.is_old:
+            status = old_actions.status_of(goal.id, old_actions.ACTIVE, self._old_stamp)
+            self._pass_old(goal.name, "feedback", status=status, feedback=old_actions.feedback_of(values))
+        else:
+            self._tell(goal, "action_feedback", values=values)
+
+    def ended(self, number: int, end: Ended[Any]) -> None:
+        """Pass the end of a goal on."""
+        if (goal := self._goals.pop(number, None)) is None:
+            return
+        if (client := self._clients.get(goal.client)) is not None:
+            client.open_calls -= 1
+        values = None if end.result is None else to_json(end.result)
+        if goal.is_old:
+            state = old_actions.STATES[end.outcome]
+            status = old_actions.status_of(goal.id, state, self._old_stamp, end.message)
+            self._note_old(goal, state, end.message)
+            self._pass_old(goal.name, "result", status=status, result=values or {})
+        else:
+            said = end.message if values is None else values
+            self._tell(
+                goal, "action_result", values=said, status=_STATUSES.get(end.outcome, 0), result=values is not None
+            )
+
+    def _tell(self, goal: _Goal, op: str, **fields: object) -> None:
+        if (client := self._clients.get(goal.client)) is not None:
+            identified = {} if goal.id is None else {"id": goal.id}
+            self._send(client, {"op": op, **identified, "action": goal.name, **fields})
 
     def robot_answered(self, number: int, answer: object, refusal: str = "") -> None:
         """Pass on what the robot answered to a request, or why it refused."""
@@ -493,7 +607,8 @@ class Bridge:
             raise BadFrameError(f"the compression '{_short(compression)}' is not yet served")
         wish = _Wish(_count(data, "throttle_rate", math.inf) / 1000, min(_count(data, "queue_length"), LONGEST_QUEUE))
         is_window = topic.startswith(WINDOWS)
-        message = None if is_window else self._message_on(topic, data)
+        is_old = self._old_parts(topic) is not None
+        message = None if is_window or is_old else self._message_on(topic, data)
         if is_window and topic != DRIVE_WINDOW and not _QUERY.fullmatch(topic.removeprefix(WINDOWS)):
             raise BadFrameError(f"after '{WINDOWS}' come a subject, a query, and its fields with their values")
         if client.subscriptions >= MOST_SUBSCRIPTIONS:
@@ -502,7 +617,11 @@ class Bridge:
             listened = self._listened[topic] = _Listened(message, is_window or self._graph.is_latched(topic))
             if message is not None:
                 self._requests.append(Subscribe(topic, message))
+                listened.last = deque(maxlen=max(1, len(self._graph.publishers(topic))))
             self._show_holder()
+            if is_old and topic.endswith("/status"):
+                listened.is_latched = True
+                self._show_old_statuses(topic.rpartition("/")[0])
         stream, is_new = client.streams.get(name), False
         if stream is None:
             stream, is_new = client.streams.setdefault(name, _Stream(name, topic)), True
@@ -510,8 +629,9 @@ class Bridge:
         stream.wishes[_key(data)] = wish
         stream.follow_wishes(self._now)
         self._follow_windows(topic)
-        if is_new and listened.last is not None and stream.offer(listened.last, self._now):
-            self.woken.add(client.number)
+        for last in tuple(listened.last) if is_new else ():
+            if stream.offer(last, self._now):
+                self.woken.add(client.number)
 
     def _unsubscribe(self, client: _Client, data: Mapping[str, Any]) -> None:
         name, _ = _topic_of(data)
@@ -529,11 +649,15 @@ class Bridge:
 
     def _advertise(self, client: _Client, data: Mapping[str, Any]) -> None:
         topic = self._commanded(_topic_of(data)[1])
+        if self._old_parts(topic) is not None:
+            return  # it is taken here
         self._declare(client, topic, self._message_on(topic, data), is_latched=data.get("latch") is True)
 
     def _unadvertise_op(self, client: _Client, data: Mapping[str, Any]) -> None:
         name, topic = _topic_of(data)
         topic = self._commanded(topic)
+        if self._old_parts(topic) is not None:
+            return
         if client.advertised.pop(topic, None) is None:
             raise BadFrameError(f"'{name}' is not advertised")
         if self._drive is not None and topic == self._drive.topic:
@@ -543,6 +667,9 @@ class Bridge:
     def _publish(self, client: _Client, data: Mapping[str, Any]) -> None:
         name, topic = _topic_of(data)
         topic = self._commanded(topic)
+        if (parts := self._old_parts(topic)) is not None:
+            self._publish_old(client, *parts, data.get("msg"))
+            return
         if (type_ := client.advertised.get(topic)) is None:
             type_ = self._message_on(topic, data)
         message = from_json(type_, data.get("msg", {}), self._stamp)
@@ -593,14 +720,15 @@ class Bridge:
         client.open_calls += 1
         try:
             self._require(client, data)
-            rosapi = full.removeprefix("/rosapi/")
-            if rosapi != full and rosapi not in ROSAPI:
-                raise BadFrameError(f"'{full}' is not yet served")
+            api = full.removeprefix("/rosapi/")
             values = None
             if full in _OWN:
                 values = _OWN[full](self, client, _named(given, _DRIVE_ARGUMENTS), number)
-            elif rosapi != full:
-                values = self._rosapi(rosapi, _named(given, ROSAPI[rosapi]))
+            elif api in rosapi.ARGUMENTS and api != full:
+                values = self._rosapi(api, _named(given, rosapi.ARGUMENTS[api]))
+            elif api in _PARAMETERS and api != full:
+                ask, names = _PARAMETERS[api]
+                ask(self, _named(given, names), number)
             else:
                 self._call(number, full, given, data)
             if values is not None:
@@ -620,6 +748,219 @@ class Bridge:
         timeout = data.get("timeout")
         is_given = isinstance(timeout, int | float) and 0 < timeout < LONGEST_PATIENCE
         self._requests.append(ServiceCall(number, service, type_, request, float(timeout) if is_given else PATIENCE))  # type: ignore[arg-type]
+
+    # Services of clients
+
+    def _advertise_service(self, client: _Client, data: Mapping[str, Any]) -> None:
+        service, type_ = _service_of(data), data.get("type")
+        if not isinstance(type_, str) or not _TYPE.fullmatch(type_):
+            raise BadFrameError("'type' is the name of a type of services")
+        if service in self._graph.services() or service in self._served or service in _OWN:
+            raise BadFrameError(f"'{service}' is served already")
+        if sum(served.client == client.number for served in self._served.values()) >= MOST_SUBSCRIPTIONS:
+            raise BadFrameError(f"a client serves at most {MOST_SUBSCRIPTIONS} services")
+        try:
+            known = registry.service(type_)
+        except KeyError as error:
+            raise BadFrameError(f"the type '{type_}' is not known here") from error
+        self._served[service] = _Served(client.number, known)
+        self._requests.append(Serve(service, known))
+
+    def _unadvertise_service(self, client: _Client, data: Mapping[str, Any]) -> None:
+        service = _service_of(data)
+        if (served := self._served.get(service)) is None or served.client != client.number:
+            raise BadFrameError(f"'{service}' is not served by this client")
+        self._end_serving(service)
+
+    def _service_response(self, client: _Client, data: Mapping[str, Any]) -> None:
+        """Pass on what a client answers to a request."""
+        service = _service_of(data)
+        served = self._served.get(service)
+        text = str(data.get("id")).removeprefix("request:")
+        number = int(text) if text.isdecimal() else -1
+        if served is None or served.client != client.number or number not in served.open:
+            raise BadFrameError(f"there is no open request to '{service}' of this id")
+        if data.get("result") is False:
+            self._requests.append(Answer(number, None, _short(data.get("values")) or "it was refused"))
+        else:
+            response = from_json(served.type.Response, data.get("values") or {}, self._stamp)
+            self._requests.append(Answer(number, response))
+        served.open.discard(number)
+
+    def _end_serving(self, service: str) -> None:
+        served = self._served.pop(service)
+        self._requests += (Answer(number, None, "the client that served it has left") for number in served.open)
+        self._requests.append(Unserve(service))
+
+    # Parameters, by the names that rosapi has for them: `/battery:runtime`, or `/battery/runtime` as in ROS 1
+
+    def _get_param(self, given: Mapping[str, Any], number: int) -> None:
+        node, name = self._parameter(given)
+
+        def then(response: GetParameters.Response) -> dict[str, Any]:
+            found = parameters.from_message(response.values[0]) if response.values else None
+            if found is None:
+                otherwise = given.get("default_value", "")
+                text = otherwise if isinstance(otherwise, str) else json.dumps(otherwise)
+                return {"value": text, "successful": False, "reason": f"there is no parameter '{name}'"}
+            return {"value": json.dumps(_finite(found)), "successful": True, "reason": ""}
+
+        self._ask_node(number, f"{node}/get_parameters", {"names": [name]}, then)
+
+    def _has_param(self, given: Mapping[str, Any], number: int) -> None:
+        node, name = self._parameter(given)
+
+        def then(response: GetParameters.Response) -> dict[str, Any]:
+            return {"exists": any(value.type for value in response.values)}
+
+        self._ask_node(number, f"{node}/get_parameters", {"names": [name]}, then)
+
+    def _set_param(self, given: Mapping[str, Any], number: int) -> None:
+        """Set a parameter, whose type decides how its value is read: JavaScript writes 2.0 as 2."""
+        node, name = self._parameter(given)
+        try:
+            value = json.loads(text) if isinstance(text := given.get("value"), str) else text
+        except ValueError:
+            value = text  # a text without its quotes
+
+        def told(response: SetParameters.Response) -> dict[str, Any]:
+            (result,) = response.results
+            if not result.successful:
+                raise WrongMessageError(result.reason or "it was refused")
+            return {"successful": True, "reason": ""}
+
+        def then(response: GetParameters.Response) -> None:
+            now = parameters.from_message(response.values[0]) if response.values else None
+            wanted = float(value) if isinstance(now, float) and type(value) is int else value
+            if (message := parameters.to_message(wanted)) is None:
+                raise WrongMessageError("no parameter can have this value")
+            change = {"name": name, "value": to_json(message)}
+            self._ask_node(number, f"{node}/set_parameters", {"parameters": [change]}, told)
+
+        self._ask_node(number, f"{node}/get_parameters", {"names": [name]}, then)
+
+    def _get_param_names(self, given: Mapping[str, Any], number: int) -> None:
+        """List the parameters of all nodes, one after the other."""
+        left = [name for name in self._graph.services() if name.endswith("/list_parameters")]
+        found: list[str] = []
+
+        def ask() -> dict[str, Any] | None:
+            if not left:
+                return {"names": found}
+            service = left.pop(0)
+
+            def then(response: ListParameters.Response) -> dict[str, Any] | None:
+                node = service.removesuffix("/list_parameters")
+                found.extend(f"{node}:{name}" for name in response.result.names)
+                return ask()
+
+            self._ask_node(number, service, {}, then)
+            return None
+
+        if (empty := ask()) is not None:
+            self._respond(number, empty, is_good=True)
+
+    def _parameter(self, given: Mapping[str, Any]) -> tuple[str, str]:
+        if not isinstance(name := given.get("name"), str):
+            raise WrongMessageError("'name' is a text")
+        node, sign, parameter = name.rpartition(":") if ":" in name else name.rpartition("/")
+        node = _full(node)
+        if not sign or f"{node}/get_parameters" not in self._graph.services():
+            raise WrongMessageError(f"there is no node with a parameter '{_short(name)}'")
+        return node, parameter
+
+    def _ask_node(
+        self, number: int, service: str, fields: Mapping[str, Any], then: Callable[[Any], dict[str, Any] | None]
+    ) -> None:
+        self._calls[number] = replace(self._calls[number], then=then)
+        self._call(number, service, fields, {})
+
+    # Actions
+
+    def _send_goal(self, client: _Client, data: Mapping[str, Any]) -> None:
+        name = data.get("action")
+        if not isinstance(name, str) or not _is_name(name):
+            raise BadFrameError("'action' is the name of an action")
+        try:
+            self._require(client, data)
+            wants_feedback = data.get("feedback") is True
+            goal = _Goal(client.number, data.get("id"), name, _full(name), is_old=False)
+            self._begin_goal(client, goal, data.get("args"), wants_feedback=wants_feedback)
+        except (BadFrameError, WrongMessageError) as error:
+            refused = _Goal(client.number, data.get("id"), name, "", is_old=False)
+            self._tell(refused, "action_result", values=str(error), status=0, result=False)
+
+    def _begin_goal(self, client: _Client, goal: _Goal, given: object, *, wants_feedback: bool) -> None:
+        if client.open_calls >= MOST_SUBSCRIPTIONS:
+            raise BadFrameError(f"at most {MOST_SUBSCRIPTIONS} calls of a client are open")
+        type_ = self._action_type(goal.action)
+        message = from_json(type_.Goal, arguments(type_.Goal, given or {}), self._stamp)
+        self._calls_so_far += 1
+        self._goals[self._calls_so_far] = goal
+        client.open_calls += 1
+        self._requests.append(SendGoal(self._calls_so_far, goal.action, type_, message, wants_feedback))
+
+    def _action_type(self, action: str) -> type[Action[Any, Any, Any]]:
+        if (known := self._graph.actions().get(action)) is None:
+            raise BadFrameError(f"there is no action '{action}'")
+        try:
+            return registry.action(known)
+        except KeyError as error:
+            raise BadFrameError(f"the type '{known}' of '{action}' is not known here") from error
+
+    def _cancel_goal(self, client: _Client, data: Mapping[str, Any]) -> None:
+        """Cancel a goal of the client, by its id."""
+        wanted = data.get("id")
+        numbers = [number for number, goal in self._goals.items() if (goal.client, goal.id) == (client.number, wanted)]
+        if not numbers:
+            raise BadFrameError("there is no goal of this id that has not ended")
+        self._requests += map(CancelGoal, numbers)
+
+    def _old_parts(self, topic: str) -> tuple[str, str, str] | None:
+        """Return what a topic is that an action has in ROS 1, unless there is a topic of that name."""
+        found = old_actions.parts_of(topic, self._graph.actions())
+        return None if found is None or topic in self._graph.topics() else found
+
+    def _publish_old(self, client: _Client, name: str, action: str, part: str, message: object) -> None:
+        """Take a goal, or cancel: that of an id, else all."""
+        if not isinstance(message, dict):
+            raise WrongMessageError("'msg' is a message")
+        if part == "goal":
+            identity, goal = old_actions.goal_of(message, self._action_type(action).Goal.FIELDS)
+            if not isinstance(identity, str):
+                raise WrongMessageError("the id of a goal is a text")
+            begun = _Goal(client.number, identity or f"goal {self._calls_so_far + 1}", name, action, is_old=True)
+            self._begin_goal(client, begun, goal, wants_feedback=True)
+            self._note_old(begun, old_actions.ACTIVE)
+        elif part == "cancel":
+            wanted = message.get("id") or None
+            self._requests += [
+                CancelGoal(number)
+                for number, goal in self._goals.items()
+                if goal.action == action and wanted in (None, goal.id)
+            ]
+
+    @property
+    def _old_stamp(self) -> dict[str, int]:
+        seconds, rest = divmod(self._stamp, 1_000_000_000)
+        return {"secs": seconds, "nsecs": rest}
+
+    def _note_old(self, goal: _Goal, state: int, text: str = "") -> None:
+        statuses = self._old_statuses.setdefault(goal.name, {})
+        statuses[goal.id] = (state, text)
+        while len(statuses) > old_actions.MOST_STATUSES:
+            del statuses[next(iter(statuses))]
+        self._show_old_statuses(goal.name)
+
+    def _show_old_statuses(self, name: str) -> None:
+        stamp, statuses = self._old_stamp, self._old_statuses.get(name, {})
+        listed = [old_actions.status_of(id_, state, stamp, text) for id_, (state, text) in statuses.items()]
+        self._pass_old(name, "status", status_list=listed)
+
+    def _pass_old(self, name: str, part: str, **fields: object) -> None:
+        message = {"header": {"seq": 0, "stamp": self._old_stamp, "frame_id": ""}, **fields}
+        text = json.dumps(_finite(message), separators=(",", ":"))
+        self._pass_on(f"{name}/{part}", _Shared(None, text), self._now)
 
     def _set_level(self, client: _Client, data: Mapping[str, Any]) -> None:
         if (level := data.get("level")) not in LEVELS:
@@ -663,28 +1004,12 @@ class Bridge:
 
     def _rosapi(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
         """Return the answer of `/rosapi/NAME`."""
-        graph, topic = self._graph, "topic" in ROSAPI[name] and _full(_text(given, "topic"))
-        match name:
-            case "topics":
-                return {"topics": list(graph.topics()), "types": list(graph.topics().values())}
-            case "services":
-                return {"services": sorted({*graph.services(), *_OWN, *(f"/rosapi/{name}" for name in ROSAPI)})}
-            case "nodes":
-                return {"nodes": list(graph.nodes())}
-            case "topic_type":
-                return {"type": graph.topics().get(topic or "", "")}
-            case "service_type":
-                return {"type": graph.services().get(_full(_text(given, "service")), "")}
-            case "topics_for_type":
-                return {"topics": _of_type(graph.topics(), _text(given, "type"), "msg")}
-            case "services_for_type":
-                return {"services": _of_type(graph.services(), _text(given, "type"), "srv")}
-            case "publishers":
-                return {"publishers": list(graph.publishers(topic or ""))}
-            case "subscribers":
-                return {"subscribers": list(graph.subscribers(topic or ""))}
-        seconds, rest = divmod(self._stamp, 1_000_000_000)
-        return {"time": {"sec": seconds, "nanosec": rest, "secs": seconds, "nsecs": rest}}  # as ROS 2 and ROS 1 say it
+        found = rosapi.answer(name, given, self._graph, self._stamp)
+        if name == "services":
+            found["services"] = sorted(
+                {*found["services"], *_OWN, *(f"/rosapi/{own}" for own in (*rosapi.ARGUMENTS, *_PARAMETERS))}
+            )
+        return found
 
     # What they share
 
@@ -735,10 +1060,10 @@ class Bridge:
             self._follow_windows(stream.topic)
             return
         del self._listened[stream.topic]
-        if stream.topic.startswith(WINDOWS):
-            self._requests.append(Unwatch(stream.topic))
-        else:
+        if listened.message is not None:
             self._requests.append(Unsubscribe(stream.topic))
+        elif stream.topic.startswith(WINDOWS):
+            self._requests.append(Unwatch(stream.topic))
 
     def _follow_windows(self, topic: str) -> None:
         """Look through a window as often as the most curious of its clients wants."""
@@ -794,6 +1119,11 @@ class Bridge:
 
 _OPERATIONS: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any]], None]] = {
     "advertise": Bridge._advertise,
+    "advertise_service": Bridge._advertise_service,
+    "unadvertise_service": Bridge._unadvertise_service,
+    "service_response": Bridge._service_response,
+    "cancel_action_goal": Bridge._cancel_goal,
+    "send_action_goal": Bridge._send_goal,
     "auth": Bridge._auth,
     "unadvertise": Bridge._unadvertise_op,
     "publish": Bridge._publish,
@@ -803,7 +1133,7 @@ _OPERATIONS: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any]], None]] 
     "set_level": Bridge._set_level,
     "status": Bridge._take_status,
 }
-_ANSWERED = frozenset({"call_service"})  # operations whose refusal is an answer of their own
+_ANSWERED = frozenset({"call_service", "send_action_goal"})  # operations whose refusal is an answer of their own
 
 
 _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str, Any] | None]] = {
@@ -813,14 +1143,14 @@ _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str,
     "/console/stop": Bridge._stop_service,
 }
 """Services of the gateway: what answers, or None if the answer comes later."""
-_DRIVE_ARGUMENTS = ("take", "name")
-ROSAPI: Mapping[str, tuple[str, ...]] = {
-    **dict.fromkeys(("get_time", "nodes", "services", "topics"), ()),
-    **dict.fromkeys(("publishers", "subscribers", "topic_type"), ("topic",)),
-    **dict.fromkeys(("services_for_type", "topics_for_type"), ("type",)),
-    "service_type": ("service",),
+_PARAMETERS: Mapping[str, tuple[Callable[[Bridge, Mapping[str, Any], int], None], tuple[str, ...]]] = {
+    "get_param": (Bridge._get_param, ("name", "default_value")),
+    "get_param_names": (Bridge._get_param_names, ()),
+    "has_param": (Bridge._has_param, ("name",)),
+    "set_param": (Bridge._set_param, ("name", "value")),
 }
-"""Services of rosapi that are served, each with its arguments."""
+"""Services of rosapi that ask nodes, each with its arguments."""
+_DRIVE_ARGUMENTS = ("take", "name")
 
 
 def _parsed(frame: str | bytes) -> dict[str, Any]:
@@ -843,6 +1173,13 @@ def _topic_of(data: Mapping[str, Any]) -> tuple[str, str]:
     if not isinstance(name, str) or not _is_name(name):
         raise BadFrameError("'topic' is the name of a topic")
     return name, _full(name)
+
+
+def _service_of(data: Mapping[str, Any]) -> str:
+    name = data.get("service")
+    if not isinstance(name, str) or not _is_name(name):
+        raise BadFrameError("'service' is the name of a service")
+    return _full(name)
 
 
 def _is_name(name: str) -> bool:
@@ -868,12 +1205,6 @@ def _count(data: Mapping[str, Any], key: str, most: float = 2**31) -> int:
     return int(value)
 
 
-def _text(given: Mapping[str, Any], key: str) -> str:
-    if not isinstance(value := given.get(key), str):
-        raise WrongMessageError(f"'{key}' is a text")
-    return value
-
-
 def _named(given: object, names: Sequence[str]) -> dict[str, Any]:
     """Return arguments by name."""
     if isinstance(given, list):
@@ -881,11 +1212,6 @@ def _named(given: object, names: Sequence[str]) -> dict[str, Any]:
     if not isinstance(given, dict | None):
         raise WrongMessageError("'args' is a map or a list")
     return given or {}
-
-
-def _of_type(names: Mapping[str, str], type_: str, kind: str) -> list[str]:
-    wanted = registry.full_name(type_, kind)
-    return [name for name, known in names.items() if known == wanted]
 
 
 def _short(value: object) -> str:

@@ -19,6 +19,7 @@ from rbxcompose.base.config import AngularSpeed, Config, Speed
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Refused
 from rbxcompose.bus.graph import Graph, GraphName
+from rbxcompose.bus.services import ServedRequest
 from rbxcompose.bus.tokens import SPACE
 from rbxcompose.bus.transport import Closable
 from rbxcompose.commands.console import NotDoneError
@@ -31,22 +32,28 @@ from rbxcompose.domains.console.protocol import (
     RELEASE,
     STOP,
     Advertise,
+    Answer,
     AskRobot,
     Bridge,
     BusRequest,
+    CancelGoal,
     Publish,
+    SendGoal,
+    Serve,
     ServiceCall,
     Subscribe,
     Unadvertise,
+    Unserve,
     Unsubscribe,
     Unwatch,
     Watch,
 )
+from rbxcompose.msgs.types import Service
 from rbxcompose.runtime.control import NoAnswerError, ask_as_data
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, all_folders
 from rbxcompose.runtime.process_group.group import stop_key
 from rbxcompose.sdk import Capability, Component, NeedsExtra, Qos, Setting, TaskStatus, component
-from rbxcompose.sdk.bound import Reply
+from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal
 from rbxcompose.sdk.capabilities import ServesPage
 from rbxcompose.sdk.ports import BULK
 
@@ -61,6 +68,7 @@ PACKAGES = ("starlette", "uvicorn", "websockets")
 SOCKETS = ("/", "/rosbridge")  # where WebSockets are taken
 _PAUSE = 0.1  # [s] between two looks for the robot's own state
 _LOOKS = 100
+_PATIENCE = 5.0  # [s] for the server of an action to be found
 _AGAIN = 2.0  # [s] between two tries to get the port
 _PING = 5.0  # [s] until a client that does not read counts as gone
 _FAREWELL = 1  # [s] for clients to let go
@@ -308,6 +316,14 @@ class LiveGraph:
         """Return the types of the services that somebody serves."""
         return _types([service for service in self._graph.services if service.givers])
 
+    def actions(self) -> dict[str, str]:
+        """Return the types of the actions that somebody serves."""
+        return _types([action for action in self._graph.actions if action.givers])
+
+    def servers(self, service: str) -> Sequence[str]:
+        """Return the names of the nodes that serve a service."""
+        return sorted({end.node for found in self._graph.services if found.name == service for end in found.givers})
+
     def nodes(self) -> Sequence[str]:
         """Return the names of the nodes."""
         return [node for node in self._graph.nodes if not node.startswith("/_")]
@@ -327,6 +343,16 @@ class LiveGraph:
 
     def _ends(self, topic: str, side: str) -> list[str]:
         return sorted({end.node for found in self._graph.topics if found.name == topic for end in getattr(found, side)})
+
+
+class _Unsent:
+    """A goal whose server is not known yet."""
+
+    is_cancelled = False
+
+    def cancel(self) -> None:
+        """Do not send it."""
+        self.is_cancelled = True
 
 
 def _places(addresses: Iterable[str]) -> Iterator[str]:
@@ -356,6 +382,9 @@ class GatewaySession:
         self._bridge = Bridge(self._graph, config.drive, guarded, self._role_of)
         self._bus = guest.bus()
         self._ends: dict[tuple[type[BusRequest], str], Any] = {}  # publishers, subscriptions and clients, by name
+        self._asked_of_clients: dict[int, ServedRequest[Any, Any]] = {}  # that have not answered
+        self._requests_so_far = 0
+        self._goals: dict[int, SentGoal] = {}  # that have not ended
         self._wakes: dict[int, asyncio.Event] = {}  # by client
         self._unknown: set[int] = set()  # clients that did not say in time who they are
         self._loop = asyncio.get_running_loop()
@@ -609,6 +638,17 @@ class GatewaySession:
                 self._ends[Advertise, topic](message)
             case ServiceCall():
                 self._call(request)
+            case Serve(service, type_):
+                self._serve(service, type_)
+            case Unserve(service):
+                self._withdraw(self._ends.pop((Serve, service)))
+            case Answer(number, response, error):
+                asked = self._asked_of_clients.pop(number)
+                asked.fail(error) if response is None else asked.reply(response)
+            case SendGoal():
+                self._send_goal(request)
+            case CancelGoal(number):
+                self._goals[number].cancel()
             case AskRobot():
                 self._begin(self._ask_robot(request))
             case Watch():
@@ -639,11 +679,46 @@ class GatewaySession:
 
         def answered(reply: Reply[Any]) -> None:
             self._bridge.answered(request.number, reply.response, reply.error)
+            for further in self._bridge.take_requests():
+                self._carry_out(further)
 
         def attempt() -> None:
             left = deadline - self._now
             if caller.is_available or left <= 0:
                 caller(request.request, answered, timeout=max(_PAUSE, left))
+            else:
+                self._guest.scheduler.at(self._now + _PAUSE / 10, NAME, attempt)
+
+        attempt()
+
+    def _serve(self, service: str, type_: type[Service[Any, Any]]) -> None:
+        def requested(asked: ServedRequest[Any, Any]) -> None:
+            self._requests_so_far += 1
+            self._asked_of_clients[self._requests_so_far] = asked
+            self._bridge.requested(service, self._requests_so_far, asked.message)
+
+        self._ends[Serve, service] = self._bus.serve_later(NAME, service, type_, requested)
+
+    def _send_goal(self, request: SendGoal) -> None:
+        """Send a goal as soon as the server of its action is known to a client of it."""
+        number, caller = request.number, self._ends.get((SendGoal, request.action))
+        if caller is None:
+            caller = self._ends[SendGoal, request.action] = self._bus.action_client(NAME, request.action, request.type)
+        deadline = self._now + _PATIENCE
+        unsent = self._goals[number] = _Unsent()
+
+        def ended(end: Ended[Any]) -> None:
+            del self._goals[number]
+            self._bridge.ended(number, end)
+
+        def attempt() -> None:
+            if unsent.is_cancelled:
+                ended(Ended(Outcome.CANCELED, message="canceled before it was sent"))
+            elif caller.is_available:
+                feedback = partial(self._bridge.fed_back, number) if request.wants_feedback else None
+                self._goals[number] = caller(request.goal, ended, feedback)
+            elif self._now > deadline:
+                ended(Ended(Outcome.LOST, message=f"the server of '{request.action}' does not answer"))
             else:
                 self._guest.scheduler.at(self._now + _PAUSE / 10, NAME, attempt)
 

@@ -1,0 +1,212 @@
+"""The services of rosapi about what is on the bus, and about types; ROS 1 and ROS 2 have other names for some."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, Protocol
+
+from rbxcompose.domains.console.json_messages import WrongMessageError
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.definitions import FieldShape, FieldType, parse_type
+from rbxcompose.msgs.types import Message
+
+_LINE = "=" * 80
+_EXAMPLES = {"string": "", "wstring": "", "boolean": False}
+_HOST = "localhost"
+_VERSION = {"version": 2, "distro": "jazzy"}  # the release whose types and wire format the bus has
+
+
+class GraphView(Protocol):
+    """What is on the bus now; all names are absolute."""
+
+    def topics(self) -> Mapping[str, str]:
+        """Return the types of the topics."""
+        ...
+
+    def services(self) -> Mapping[str, str]:
+        """Return the types of the services."""
+        ...
+
+    def actions(self) -> Mapping[str, str]:
+        """Return the types of the actions that somebody serves."""
+        ...
+
+    def nodes(self) -> Sequence[str]:
+        """Return the names of the nodes."""
+        ...
+
+    def publishers(self, topic: str) -> Sequence[str]:
+        """Return the names of the nodes that publish on a topic."""
+        ...
+
+    def subscribers(self, topic: str) -> Sequence[str]:
+        """Return the names of the nodes that subscribe to a topic."""
+        ...
+
+    def servers(self, service: str) -> Sequence[str]:
+        """Return the names of the nodes that serve a service."""
+        ...
+
+    def is_latched(self, topic: str) -> bool:
+        """Return whether the last message of a topic is kept for late subscribers."""
+        ...
+
+
+ARGUMENTS: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(("action_servers", "get_ros_version", "get_time", "nodes", "services"), ()),
+    **dict.fromkeys(("topics", "topics_and_raw_types"), ()),
+    **dict.fromkeys(("publishers", "subscribers", "topic_type"), ("topic",)),
+    **dict.fromkeys(("services_for_type", "topics_for_type"), ("type",)),
+    **dict.fromkeys(("service_type", "service_node", "service_host"), ("service",)),
+    **dict.fromkeys(("message_details", "service_request_details", "service_response_details"), ("type",)),
+    **dict.fromkeys(("action_goal_details", "action_result_details", "action_feedback_details"), ("type",)),
+    "action_type": ("action",),
+    "service_providers": ("service",),
+    "node_details": ("node",),
+}
+"""The services of this module, each with its arguments."""
+_PARTS = {
+    "service_request_details": ("srv", "Request"),
+    "service_response_details": ("srv", "Response"),
+    "action_goal_details": ("action", "Goal"),
+    "action_result_details": ("action", "Result"),
+    "action_feedback_details": ("action", "Feedback"),
+}
+
+
+def answer(name: str, given: Mapping[str, Any], graph: GraphView, stamp: int) -> dict[str, Any]:
+    """Return the answer of `/rosapi/NAME`.
+
+    Args:
+        name: one of `ARGUMENTS`.
+        given: its arguments.
+        graph: what is on the bus.
+        stamp: the time [ns].
+
+    Raises:
+        WrongMessageError: if an argument is wrong, or a type is not known.
+    """
+    values = [_text(given, argument) for argument in ARGUMENTS[name]]
+    if name == "get_time":
+        seconds, rest = divmod(stamp, 1_000_000_000)
+        return {"time": {"sec": seconds, "nanosec": rest, "secs": seconds, "nsecs": rest}}  # of ROS 2, and of ROS 1
+    if name == "message_details":
+        return {"typedefs": list(_typedefs(_known(registry.message, values[0])))}
+    if name in _PARTS:
+        kind, part = _PARTS[name]
+        interface = _known(registry.service if kind == "srv" else registry.action, values[0])
+        return {"typedefs": list(_typedefs(getattr(interface, part)))}
+    return _ANSWERS[name](graph, *values)
+
+
+def _topics_and_raw_types(graph: GraphView) -> dict[str, Any]:
+    types = list(graph.topics().values())
+    return {
+        "topics": list(graph.topics()),
+        "types": types,
+        "typedefs_full_text": [_definition(type_) for type_ in types],
+    }
+
+
+def _node_details(graph: GraphView, node: str) -> dict[str, Any]:
+    wanted = _full(node)
+    return {
+        "publishing": [topic for topic in graph.topics() if wanted in graph.publishers(topic)],
+        "subscribing": [topic for topic in graph.topics() if wanted in graph.subscribers(topic)],
+        "services": [service for service in graph.services() if wanted in graph.servers(service)],
+    }
+
+
+_ANSWERS: Mapping[str, Callable[..., dict[str, Any]]] = {
+    "topics": lambda graph: {"topics": list(graph.topics()), "types": list(graph.topics().values())},
+    "topics_and_raw_types": _topics_and_raw_types,
+    "services": lambda graph: {"services": sorted(graph.services())},
+    "action_servers": lambda graph: {"action_servers": sorted(graph.actions())},
+    "action_type": lambda graph, action: {"type": graph.actions().get(_full(action), "")},
+    "nodes": lambda graph: {"nodes": list(graph.nodes())},
+    "node_details": _node_details,
+    "topic_type": lambda graph, topic: {"type": graph.topics().get(_full(topic), "")},
+    "service_type": lambda graph, service: {"type": graph.services().get(_full(service), "")},
+    "service_node": lambda graph, service: {"node": next(iter(graph.servers(_full(service))), "")},
+    "service_host": lambda graph, service: {"host": _HOST if _full(service) in graph.services() else ""},
+    "service_providers": lambda graph, type_: {"providers": _of_type(graph.services(), type_, "srv")},
+    "topics_for_type": lambda graph, type_: {"topics": _of_type(graph.topics(), type_, "msg")},
+    "services_for_type": lambda graph, type_: {"services": _of_type(graph.services(), type_, "srv")},
+    "publishers": lambda graph, topic: {"publishers": list(graph.publishers(_full(topic)))},
+    "subscribers": lambda graph, topic: {"subscribers": list(graph.subscribers(_full(topic)))},
+    "get_ros_version": lambda graph: dict(_VERSION),
+}
+
+
+def _typedefs(message: type[Message]) -> Iterator[dict[str, Any]]:
+    """Yield what a message and those within it are made of, each once."""
+    waiting, seen = [message], {message.TYPE}
+    while waiting:
+        current = waiting.pop(0)
+        types = {name: parse_type(text) for name, text in current.FIELDS.items()}
+        yield {
+            "type": _bare(current.TYPE),
+            "fieldnames": list(types),
+            "fieldtypes": [_bare(type_.base) for type_ in types.values()],
+            "fieldarraylen": [_length(type_) for type_ in types.values()],
+            "examples": [_example(type_.base, type_.shape) for type_ in types.values()],
+            "constnames": [],
+            "constvalues": [],
+        }
+        for type_ in types.values():
+            if type_.is_message and type_.base not in seen:
+                seen.add(type_.base)
+                waiting.append(registry.message(type_.base))
+
+
+def _length(type_: FieldType) -> int:
+    if type_.shape is FieldShape.SINGLE:
+        return -1
+    return type_.length if type_.shape is FieldShape.ARRAY else 0
+
+
+def _definition(type_: str) -> str:
+    """Return the text of a message and those within it, as ROS 1 concatenates them; empty if it is not known here."""
+    try:
+        message = registry.message(type_)
+    except KeyError:
+        return ""
+    texts: list[str] = []
+    for typedef in _typedefs(message):
+        of = registry.message(registry.full_name(typedef["type"], "msg"))
+        lines = [f"{text.replace('/msg/', '/')} {name}" for name, text in of.FIELDS.items()]
+        texts.append("\n".join((*((_LINE, f"MSG: {typedef['type']}") if texts else ()), *lines)))
+    return "\n".join(texts)
+
+
+def _example(base: str, shape: FieldShape) -> str:
+    if shape is not FieldShape.SINGLE:
+        return "[]"
+    return "{}" if "/" in base else str(_EXAMPLES.get(base, 0))
+
+
+def _known(find: Callable[[str], Any], name: str) -> Any:
+    try:
+        return find(name)
+    except KeyError as error:
+        raise WrongMessageError(f"the type '{name[:60]}' is not known here") from error
+
+
+def _bare(type_: str) -> str:
+    """Return `geometry_msgs/Twist` for `geometry_msgs/msg/Twist`, as clients expect it."""
+    return type_.replace("/msg/", "/").replace("/srv/", "/").replace("/action/", "/")
+
+
+def _of_type(names: Mapping[str, str], type_: str, kind: str) -> list[str]:
+    wanted = registry.full_name(type_, kind)
+    return [name for name, known in names.items() if known == wanted]
+
+
+def _full(name: str) -> str:
+    return f"/{name.lstrip('/')}"
+
+
+def _text(given: Mapping[str, Any], key: str) -> str:
+    if not isinstance(value := given.get(key), str):
+        raise WrongMessageError(f"'{key}' is a text")
+    return value

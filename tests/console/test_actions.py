@@ -1,0 +1,251 @@
+"""Actions, services of clients, parameters and types by rosbridge, without a socket."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from rbxcompose.domains.console.protocol import Answer, CancelGoal, SendGoal, Serve, ServiceCall, Unserve
+from rbxcompose.msgs.nav2_msgs import NavigateToPose
+from rbxcompose.msgs.rcl_interfaces import (
+    GetParameters,
+    ListParameters,
+    ListParametersResult,
+    ParameterValue,
+    SetParameters,
+    SetParametersResult,
+)
+from rbxcompose.msgs.std_srvs import SetBool
+from rbxcompose.sdk.bound import Ended, Outcome
+from tests.console.clients import Client, Room
+
+NAVIGATE = "nav2_msgs/action/NavigateToPose"
+
+
+def sent(room: Room) -> SendGoal:
+    """Return the goal that was sent last."""
+    return [request for request in room.asked() if isinstance(request, SendGoal)][-1]
+
+
+def goes(client: Client, **more: Any) -> list[dict[str, Any]]:
+    pose = {"pose": {"header": {"frame_id": "map"}, "pose": {"position": {"x": 1}}}}
+    return client.does("send_action_goal", action="go_to", action_type=NAVIGATE, args=pose, id="g", **more)
+
+
+def test_a_goal_is_sent_with_feedback_if_wanted_and_its_end_comes_back() -> None:
+    room = Room()
+    client = room.client()
+    assert goes(client, feedback=True) == []
+    goal = sent(room)
+    assert (goal.action, goal.goal.pose.pose.position.x, goal.wants_feedback) == ("/go_to", 1.0, True)  # type: ignore[attr-defined]
+    room.bridge.fed_back(goal.number, NavigateToPose.Feedback(distance_remaining=0.5))
+    (fed_back,) = client.gets()
+    assert (fed_back["op"], fed_back["id"], fed_back["action"]) == ("action_feedback", "g", "go_to")
+    assert fed_back["values"]["distance_remaining"] == 0.5
+    room.bridge.ended(goal.number, Ended(Outcome.SUCCEEDED, NavigateToPose.Result()))
+    (ended,) = client.gets()
+    assert (ended["op"], ended["status"], ended["result"]) == ("action_result", 4, True)
+    room.bridge.fed_back(goal.number, NavigateToPose.Feedback())
+    assert client.gets() == []
+
+
+@pytest.mark.parametrize(
+    ("outcome", "status"), [(Outcome.CANCELED, 5), (Outcome.ABORTED, 6), (Outcome.REJECTED, 0), (Outcome.LOST, 0)]
+)
+def test_each_way_to_end_is_told(outcome: Outcome, status: int) -> None:
+    room = Room()
+    client = room.client()
+    goes(client)
+    room.bridge.ended(sent(room).number, Ended(outcome, None, "why"))
+    (ended,) = client.gets()
+    assert (ended["status"], ended["result"], ended["values"]) == (status, False, "why")
+
+
+def test_a_goal_is_cancelled_by_its_id_by_its_client_only() -> None:
+    room = Room()
+    client, other = room.client(), room.client()
+    goes(client)
+    goal = sent(room)
+    (status,) = other.does("cancel_action_goal", action="go_to", id="g")
+    assert "no goal of this id" in status["msg"]
+    assert client.does("cancel_action_goal", action="go_to", id="g") == []
+    assert room.asked() == [CancelGoal(goal.number)]
+
+
+def test_a_goal_goes_on_when_its_client_leaves() -> None:
+    room = Room()
+    client = room.client()
+    goes(client)
+    goal = sent(room)
+    client.leaves()
+    assert room.asked() == []
+    room.bridge.ended(goal.number, Ended(Outcome.SUCCEEDED, NavigateToPose.Result()))
+
+
+@pytest.mark.parametrize(
+    ("frame", "why"),
+    [
+        ({"action": "/none"}, "there is no action '/none'"),
+        ({"action": "go_to", "args": {"posse": {}}}, "has no field 'posse'"),
+        ({"action": "go_to", "args": 7}, "is a map of its fields"),
+    ],
+)
+def test_a_goal_that_cannot_be_sent_is_answered(frame: dict[str, Any], why: str) -> None:
+    (answer,) = Room().client().does("send_action_goal", id="g", **frame)
+    assert (answer["op"], answer["id"], answer["result"]) == ("action_result", "g", False)
+    assert why in answer["values"]
+
+
+# As ROS 1 has them
+
+
+def test_a_page_for_ros_1_drives_by_move_base() -> None:
+    room = Room()
+    client, viewer = room.client(), room.client()
+    for part, type_ in (("status", "actionlib_msgs/GoalStatusArray"), ("feedback", ""), ("result", "")):
+        assert client.does("subscribe", topic=f"/move_base/{part}", type=type_) == [] or part == "status"
+    client.gets()
+    assert client.does("advertise", topic="/move_base/goal", type="move_base_msgs/MoveBaseActionGoal") == []
+    pose = {"header": {"frame_id": "/map"}, "pose": {"position": {"x": 2.0}, "orientation": {"w": 1}}}
+    goal = {"goal_id": {"stamp": {"secs": 0, "nsecs": 0}, "id": "one"}, "goal": {"target_pose": pose}}
+    (listed,) = client.does("publish", topic="/move_base/goal", msg=goal)
+    assert listed["msg"]["status_list"][0]["status"] == 1
+    request = sent(room)
+    assert (request.action, request.goal.pose.pose.position.x) == ("/go_to", 2.0)  # type: ignore[attr-defined]
+    room.bridge.fed_back(request.number, NavigateToPose.Feedback())
+    (fed_back,) = client.gets()
+    assert "base_position" in fed_back["msg"]["feedback"]
+    assert viewer.does("publish", topic="/move_base/cancel", msg={"id": "one"}) == []
+    assert room.asked() == [CancelGoal(request.number)]
+    room.bridge.ended(request.number, Ended(Outcome.CANCELED, NavigateToPose.Result()))
+    frames = {frame["topic"]: frame["msg"] for frame in client.gets()}
+    assert frames["/move_base/result"]["status"] == {
+        "goal_id": {"stamp": {"secs": 5, "nsecs": 7}, "id": "one"},
+        "status": 2,
+        "text": "",
+    }
+    assert frames["/move_base/status"]["status_list"][0]["status"] == 2
+
+
+def test_an_empty_cancel_ends_all_goals_of_the_action() -> None:
+    room = Room()
+    client = room.client()
+    numbers = []
+    for _ in range(2):
+        client.does("publish", topic="/go_to/goal", msg={"goal": {}})
+        numbers.append(sent(room).number)
+    client.does("publish", topic="/go_to/cancel", msg={})
+    assert room.asked() == [CancelGoal(number) for number in numbers]
+
+
+def test_topics_of_that_name_that_exist_are_left_alone() -> None:
+    room = Room()
+    room.graph.known["/go_to/status"] = "std_msgs/msg/String"
+    client = room.client()
+    client.does("subscribe", topic="/go_to/status")
+    assert [type(request).__name__ for request in room.asked()] == ["Subscribe"]
+
+
+# Services of clients
+
+
+def test_a_client_serves_and_fails_what_it_leaves_open() -> None:
+    room = Room()
+    client = room.client()
+    assert client.does("advertise_service", service="/bell", type="std_srvs/SetBool") == []
+    assert room.asked() == [Serve("/bell", SetBool)]
+    for number in (1, 2, 3):
+        room.bridge.requested("/bell", number, SetBool.Request(data=True))
+    first, second, third = client.gets()
+    assert (first["op"], first["args"]) == ("call_service", {"data": True})
+    client.does("service_response", service="bell", id=first["id"], values={"message": "ding"}, result=True)
+    client.does("service_response", service="bell", id=second["id"], values="broken", result=False)
+    assert room.asked() == [Answer(1, SetBool.Response(message="ding")), Answer(2, None, "broken")]
+    (status,) = client.does("service_response", service="bell", id=first["id"], values={})
+    assert "no open request" in status["msg"]
+    client.leaves()
+    assert room.asked() == [Answer(3, None, "the client that served it has left"), Unserve("/bell")]
+    assert third["id"] == "request:3"
+
+
+def test_a_service_that_exists_is_not_served_again() -> None:
+    (status,) = Room().client().does("advertise_service", service="/lamp", type="std_srvs/SetBool")
+    assert status["msg"] == "'/lamp' is served already"
+
+
+# Parameters and types
+
+
+def with_parameters() -> Room:
+    room = Room()
+    services = {
+        "get_parameters": "GetParameters",
+        "set_parameters": "SetParameters",
+        "list_parameters": "ListParameters",
+    }
+    room.graph.served |= {f"/battery/{name}": f"rcl_interfaces/srv/{type_}" for name, type_ in services.items()}
+    return room
+
+
+def call(room: Room, service: str) -> ServiceCall:
+    (request,) = (request for request in room.asked() if isinstance(request, ServiceCall))
+    assert request.service == service
+    return request
+
+
+@pytest.mark.parametrize("name", ["/battery:runtime", "battery/runtime"])
+def test_a_parameter_is_read_by_each_spelling(name: str) -> None:
+    room = with_parameters()
+    client = room.client()
+    client.does("call_service", service="/rosapi/get_param", args={"name": name, "default_value": "7"})
+    asked = call(room, "/battery/get_parameters")
+    value = ParameterValue(type=3, double_value=60.0)
+    room.bridge.answered(asked.number, GetParameters.Response(values=(value,)))
+    (answer,) = client.gets()
+    assert json.loads(answer["values"]["value"]) == 60.0
+
+
+def test_a_number_is_set_in_the_type_that_the_parameter_has() -> None:
+    room = with_parameters()
+    client = room.client()
+    client.does("call_service", service="/rosapi/set_param", args={"name": "/battery:runtime", "value": "45"})
+    before = GetParameters.Response(values=(ParameterValue(type=3, double_value=60.0),))
+    room.bridge.answered(call(room, "/battery/get_parameters").number, before)
+    room.requests += room.bridge.take_requests()
+    asked = call(room, "/battery/set_parameters")
+    (change,) = asked.request.parameters  # type: ignore[attr-defined]
+    assert (change.name, change.value.type, change.value.double_value) == ("runtime", 3, 45.0)
+    refused = SetParameters.Response(results=(SetParametersResult(successful=False, reason="too long"),))
+    room.bridge.answered(asked.number, refused)
+    (answer,) = client.gets()
+    assert (answer["result"], answer["values"]) == (False, "too long")
+
+
+def test_the_parameters_of_all_nodes_are_listed() -> None:
+    room = with_parameters()
+    room.graph.served["/base/list_parameters"] = "rcl_interfaces/srv/ListParameters"
+    client = room.client()
+    client.does("call_service", service="/rosapi/get_param_names")
+    for node in ("battery", "base"):
+        found = ListParameters.Response(result=ListParametersResult(names=("speed",)))
+        room.bridge.answered(call(room, f"/{node}/list_parameters").number, found)
+        room.requests += room.bridge.take_requests()
+    (answer,) = client.gets()
+    assert answer["values"] == {"names": ["/battery:speed", "/base:speed"]}
+
+
+def test_types_are_described_with_all_that_is_in_them() -> None:
+    client = Room().client()
+    types = client.calls("/rosapi/message_details", {"type": "geometry_msgs/Twist"})["typedefs"]
+    assert [type_["type"] for type_ in types] == ["geometry_msgs/Twist", "geometry_msgs/Vector3"]
+    assert (types[0]["fieldnames"], types[0]["fieldarraylen"]) == (["linear", "angular"], [-1, -1])
+    (request,) = client.calls("/rosapi/service_request_details", {"type": "std_srvs/SetBool"})["typedefs"]
+    assert request["fieldtypes"] == ["bool"]
+    goal = client.calls("/rosapi/action_goal_details", {"type": NAVIGATE})["typedefs"]
+    assert goal[0]["fieldnames"] == ["pose", "behavior_tree"]
+    texts = client.calls("/rosapi/topics_and_raw_types")["typedefs_full_text"]
+    assert "MSG: geometry_msgs/Vector3\nfloat64 x" in texts[2]
+    assert client.calls("/rosapi/action_servers") == {"action_servers": ["/go_to"]}
+    assert client.calls("/rosapi/node_details", {"node": "base"})["publishing"] == ["/odom"]
