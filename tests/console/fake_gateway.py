@@ -171,7 +171,7 @@ class FakeGateway:
                 self.subscribed[connection].discard(frame["topic"])
             case "send_action_goal" if frame["action"] in self.answers:
                 try:
-                    self.answers[frame["action"]](frame["args"])
+                    self.act("action_feedback", frame, self.answers[frame["action"]](frame["args"]))
                 except Refused as refusal:
                     self.act("action_result", frame, str(refusal), status=0, result=False)
             case "cancel_action_goal":
