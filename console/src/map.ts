@@ -38,11 +38,6 @@ export function quaternionOf(heading: number): Quaternion {
   return { x: 0, y: 0, z: Math.sin(heading / 2), w: Math.cos(heading / 2) };
 }
 
-/** Returns the same direction between -π and π. */
-export function normalised(angle: number): number {
-  return Math.atan2(Math.sin(angle), Math.cos(angle));
-}
-
 function multiplied(a: Quaternion, b: Quaternion): Quaternion {
   return {
     x: a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
@@ -85,10 +80,6 @@ export function inverted({ translation, rotation }: Transform): Transform {
 /** Returns where the origin of a frame is, seen from above. */
 export function poseOf({ translation: { x, y }, rotation }: Transform): Pose {
   return { x, y, heading: yawOf(rotation) };
-}
-
-export function transformOf({ x, y, heading }: Pose): Transform {
-  return { translation: { x, y, z: 0 }, rotation: quaternionOf(heading) };
 }
 
 /** Frames, each with its place in its parent. */

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -72,11 +73,8 @@ def rolling(gateway: FakeGateway) -> FakeGateway:
     gateway.answers["/rosapi/topics"] = lambda _: {"topics": list(TYPES), "types": list(TYPES.values())}
     gateway.answers["/rosapi/subscribers"] = lambda _: {"subscribers": []}
     gateway.latched["/tf_static"] = {"transforms": [transform("map", "odom", 1.0, 0.0, math.pi / 2)]}
-    gateway.latched["/odom"] = {
-        "header": {"frame_id": "odom"},
-        "child_frame_id": "base_footprint",
-        "pose": {"pose": pose(0.5, 0.0, 0.0)},
-    }
+    frames = {"header": {"frame_id": "odom"}, "child_frame_id": "base_footprint"}
+    gateway.repeated = {"/odom": {**frames, "pose": {"pose": pose(0.5, 0.0, 0.0)}}}
     return gateway
 
 
@@ -157,12 +155,8 @@ def test_the_robot_is_where_transforms_and_odometry_have_it(
     expect(page.get_by_text("Robot: x 1.00\u202fm, y 0.50\u202fm, heading 90°, in map")).to_be_visible()
     wait_for_colour(page, 1.0, 0.5, [26, 95, 208, 255])
     wait_for_colour(page, 0.0, 0.045, [255, 255, 0, 255])
-    moves = [transform("odom", "base_footprint", -0.25, 0.0, math.pi)]
-    rolling.say("/tf", {"transforms": moves})
+    rolling.say("/tf", {"transforms": [transform("odom", "base_footprint", -0.25, 0.0, math.pi)]})
     expect(page.get_by_text("Robot: x 1.00\u202fm, y \u22120.25\u202fm, heading \u221290°, in map")).to_be_visible()
-    rolling.say("/odom", rolling.latched["/odom"])
-    rolling.say("/tf", {"transforms": [transform("odom", "base_footprint", 0.0, 0.0, math.pi)]})
-    expect(page.get_by_text("Robot: x 1.00\u202fm, y 0.00\u202fm, heading \u221290°, in map")).to_be_visible()
 
 
 def test_a_drag_is_exactly_the_goal_at_each_zoom(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
@@ -351,10 +345,15 @@ def test_what_is_not_known_is_said(open_page: Callable[..., Page], gateway: Fake
 def test_an_old_position_is_said_to_be_old(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
     page = open_page(page_name="map")
     expect(page.get_by_text("Robot: x 1.00")).to_be_visible()
+    odometry, rolling.repeated = rolling.repeated, {}
+    expect(page.get_by_text(re.compile(r"Robot, as it was \d+\W+s ago: x 1\.00"))).to_be_visible()
     rolling.is_away = True
     rolling.drop()
     expect(page.get_by_text("Robot, as it was before")).to_be_visible()
     expect(page.get_by_role("button", name="Go to Dock")).to_be_disabled()
+    rolling.is_away, rolling.repeated = False, odometry
+    expect(page.get_by_text("Robot: x 1.00")).to_be_visible()
+    expect(page.get_by_role("button", name="Go to Dock")).to_be_enabled()
 
 
 def test_places_are_not_drawn_without_a_way_to_map(open_page: Callable[..., Page], rolling: FakeGateway) -> None:

@@ -9,6 +9,7 @@ import {
   distance,
   frameOf,
   Frames,
+  plain,
   poseMessage,
   poseOf,
   readGrid,
@@ -343,7 +344,7 @@ class MapView {
     const above = this.#frames.above(base);
     for (const stamped of Array.isArray(transforms) ? transforms.filter(isMessage) : []) {
       const transform = readTransform(stamped.transform);
-      const child = String(stamped.child_frame_id).replace(/^\//, "");
+      const child = plain(String(stamped.child_frame_id));
       if (!transform) continue;
       this.#frames.set(frameOf(stamped), child, transform);
       this.#published.add(child);
@@ -354,7 +355,7 @@ class MapView {
 
   /** Takes the pose of an odometry for a transform, unless somebody publishes that as well. */
   #onOdometry(topic: string, message: Message): void {
-    const child = String(message.child_frame_id ?? "").replace(/^\//, "");
+    const child = plain(String(message.child_frame_id ?? ""));
     const transform = isMessage(message.pose) ? readTransform(message.pose.pose) : null;
     if (!child || !transform) return;
     if (!this.#base || topic === this.#odometry) this.#base = child;
