@@ -484,6 +484,7 @@ class MapView {
     this.#cancel.hidden = !isDriving;
     const left = state.left === null ? "" : `${metres(state.left)} to go`;
     const missing = this.#navigator || !this.#isDescribed ? "" : "This robot has no skill that drives to a pose.";
+    this.#state.hidden = state.is === "none" && missing !== "";
     const mission = `Mission ${this.#driver} is running: a goal of yours replaces the one it drives to.`;
     setText(this.#note, isDriving ? left : missing || (this.#driver ? mission : ""));
     this.#draw();
