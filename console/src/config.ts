@@ -92,6 +92,7 @@ export async function fetchConfig(url = "/console/config"): Promise<Config> {
 export function parseConfig(json: unknown): Config {
   if (!isMessage(json)) throw new ConfigError("What answers at this address is not a robot's console.");
   const values = isMessage(json.values) ? json.values : {};
+  const places = isMessage(json.places) ? json.places : {};
   return {
     robot: text(json.robot) || "robot",
     about: text(json.about),
@@ -102,7 +103,7 @@ export function parseConfig(json: unknown): Config {
       Object.entries(isMessage(json.fleet) ? json.fleet : {}).map(([name, address]) => [name, text(address)]),
     ),
     values: Object.entries(values).flatMap(([name, value]) => parseValue(name, value)),
-    places: Object.entries(isMessage(json.places) ? json.places : {}).flatMap(([name, place]) => parsePlace(name, place)),
+    places: Object.entries(places).flatMap(([name, place]) => parsePlace(name, place)),
   };
 }
 

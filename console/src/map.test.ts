@@ -13,7 +13,6 @@ import {
   inverted,
   LARGEST_SCALE,
   niceLength,
-  normalised,
   panned,
   poseOf,
   quaternionOf,
@@ -25,10 +24,10 @@ import {
   toScreen,
   toWorld,
   Trail,
-  transformOf,
   yawOf,
   zoomed,
   type Point,
+  type Pose,
   type Transform,
   type View,
 } from "./map";
@@ -61,6 +60,10 @@ function near(one: Point, other: Point, digits = 6): void {
   expect(one.y).toBeCloseTo(other.y, digits);
 }
 
+function transformOf({ x, y, heading }: Pose): Transform {
+  return { translation: { x, y, z: 0 }, rotation: quaternionOf(heading) };
+}
+
 const same = (one: Transform, other: Transform) => {
   for (const point of [{ x: 0, y: 0, z: 0 }, { x: 1, y: 2, z: 3 }]) {
     near(applied(one, point), applied(other, point));
@@ -73,7 +76,6 @@ describe("rotations", () => {
     for (let turn = 0; turn < CASES; turn += 1) {
       const heading = Math.PI * next();
       expect(yawOf(quaternionOf(heading))).toBeCloseTo(heading, 9);
-      expect(normalised(heading + 2 * Math.PI * (turn % 7))).toBeCloseTo(heading, 9);
     }
   });
 
@@ -247,7 +249,8 @@ describe("a grid", () => {
     const grid = readGrid(message)!;
     expect(grid).toMatchObject({ frame: "map", width: 2, height: 3, origin: { translation: { x: -1, y: 2 } } });
     const pixels = [...gridPixels(grid, [200, 200, 200], [0, 0, 0])];
-    const rows = [0, 1, 2].map((row) => [0, 1].map((column) => pixels.slice(8 * row + 4 * column, 8 * row + 4 * column + 4)));
+    const cell = (at: number) => pixels.slice(4 * at, 4 * at + 4);
+    const rows = [0, 1, 2].map((row) => [cell(2 * row), cell(2 * row + 1)]);
     expect(rows).toEqual([
       [[0, 0, 0, 255], [200, 200, 200, 255]],
       [[100, 100, 100, 255], [0, 0, 0, 0]],
@@ -264,8 +267,8 @@ describe("a grid", () => {
 
 describe("what is seen", () => {
   it("is where the laser was reflected; what is out of range is left out", () => {
-    const scan = { angle_min: 0, angle_increment: Math.PI / 2, range_min: 0.1, range_max: 5, ranges: [1, 2, null, 9, 0.01, 3] };
-    const found = readScan(scan);
+    const beams = { angle_min: 0, angle_increment: Math.PI / 2, range_min: 0.1, range_max: 5 };
+    const found = readScan({ ...beams, ranges: [1, 2, null, 9, 0.01, 3] });
     expect(found).toHaveLength(3);
     near(found[0]!, { x: 1, y: 0 });
     near(found[1]!, { x: 0, y: 2 });

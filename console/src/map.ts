@@ -38,11 +38,6 @@ export function quaternionOf(heading: number): Quaternion {
   return { x: 0, y: 0, z: Math.sin(heading / 2), w: Math.cos(heading / 2) };
 }
 
-/** Returns the same direction between -π and π. */
-export function normalised(angle: number): number {
-  return Math.atan2(Math.sin(angle), Math.cos(angle));
-}
-
 function multiplied(a: Quaternion, b: Quaternion): Quaternion {
   return {
     x: a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
@@ -85,10 +80,6 @@ export function inverted({ translation, rotation }: Transform): Transform {
 /** Returns where the origin of a frame is, seen from above. */
 export function poseOf({ translation: { x, y }, rotation }: Transform): Pose {
   return { x, y, heading: yawOf(rotation) };
-}
-
-export function transformOf({ x, y, heading }: Pose): Transform {
-  return { translation: { x, y, z: 0 }, rotation: quaternionOf(heading) };
 }
 
 /** Frames, each with its place in its parent. */
@@ -211,8 +202,9 @@ export function readGrid(message: Message): Grid | null {
 
 export type Colour = readonly [red: number, green: number, blue: number];
 
-/** Returns the pixels of a grid, RGBA, from its farthest row to its first: y points up in a map and down in a picture. */
-export function gridPixels({ width, height, data }: Grid, free: Colour, occupied: Colour): Uint8ClampedArray<ArrayBuffer> {
+/** Returns the pixels of a grid, RGBA, its last row first: y points up in a map, and down in a picture. */
+export function gridPixels(grid: Grid, free: Colour, occupied: Colour): Uint8ClampedArray<ArrayBuffer> {
+  const { width, height, data } = grid;
   const pixels = new Uint8ClampedArray(4 * width * height);
   for (let row = 0; row < height; row += 1) {
     for (let column = 0; column < width; column += 1) {
@@ -268,13 +260,14 @@ export function fitted(points: readonly Point[], width: number, height: number):
   const all = points.length > 0 ? points : [{ x: 0, y: 0 }];
   const [left, right] = extent(all.map(({ x }) => x));
   const [bottom, top] = extent(all.map(({ y }) => y));
-  const room = (pixels: number, metres: number) => Math.max(1, pixels - 2 * MARGIN) / metres; // a point has infinite room
+  const room = (pixels: number, metres: number) => Math.max(1, pixels - 2 * MARGIN) / metres; // infinite for a point
   const scale = clamp(Math.min(room(width, right - left), room(height, top - bottom)), SMALLEST_SCALE, USUAL_SCALE);
   return { x: (left + right) / 2, y: (bottom + top) / 2, scale, width, height };
 }
 
 function extent(numbers: readonly number[]): [number, number] {
-  return numbers.reduce(([least, most], number) => [Math.min(least, number), Math.max(most, number)], [Infinity, -Infinity]);
+  const [least, most] = [Infinity, -Infinity];
+  return numbers.reduce(([low, high], number) => [Math.min(low, number), Math.max(high, number)], [least, most]);
 }
 
 function clamp(number: number, least: number, most: number): number {

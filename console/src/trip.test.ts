@@ -4,18 +4,26 @@ import { Trip } from "./trip";
 
 const POSE = { x: 1, y: 2, heading: 0 };
 
+interface FakeGoal {
+  end(outcome: Outcome): void;
+  fail(error: Error): void;
+  say(values: Message): void;
+  canceled: boolean;
+}
+
 function make() {
-  const goals: { end(outcome: Outcome): void; fail(error: Error): void; say(values: Message): void; canceled: boolean }[] = [];
+  const goals: FakeGoal[] = [];
   const trip = new Trip({
     act: (_action, _type, _goal, onFeedback = () => undefined) => {
-      const goal = { canceled: false, say: onFeedback } as (typeof goals)[number];
+      const goal = { canceled: false, say: onFeedback } as FakeGoal;
       goals.push(goal);
       const done = new Promise<Outcome>((resolve, reject) => Object.assign(goal, { end: resolve, fail: reject }));
       return { done, cancel: () => (goal.canceled = true) };
     },
   });
   const go = (name: string) => trip.begin("/go_to", "nav2_msgs/NavigateToPose", {}, { name, pose: POSE, frame: "map" });
-  return { trip, goals, go, settled: () => new Promise<void>((resolve) => queueMicrotask(() => queueMicrotask(resolve))) };
+  const settled = () => new Promise<void>((resolve) => queueMicrotask(() => queueMicrotask(resolve)));
+  return { trip, goals, go, settled };
 }
 
 it("tells how far it is, and that it has arrived", async () => {

@@ -64,7 +64,8 @@ function endOf({ status, values }: Outcome, name: string): readonly [TripState["
   if (status === SUCCEEDED) return ["arrived", `Arrived at ${name}`];
   if (status === CANCELED) return ["canceled", `Canceled on the way to ${name}`];
   const why = whyOf(values);
-  const words = status === ABORTED ? `Gave up on the way to ${name}` : `Ended with status ${status} on the way to ${name}`;
+  const what = status === ABORTED ? "Gave up" : `Ended with status ${status}`;
+  const words = `${what} on the way to ${name}`;
   return ["failed", why ? `${words}: ${why}` : words];
 }
 

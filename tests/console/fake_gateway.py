@@ -49,6 +49,8 @@ class FakeGateway:
         """What requests answer, by name: `mission.PauseMission`; and services and actions, by name: `/arm/home`."""
         self.latched: dict[str, dict[str, Any]] = {}
         """What a new subscriber of a topic gets at once."""
+        self.repeated: dict[str, dict[str, Any]] = {}
+        """What is published ten times a second, by topic; to be replaced as a whole."""
         self._others: str | None = None
         self.is_away = False  # takes no connections
         self.subscribed: dict[ServerConnection, set[str]] = {}
@@ -171,7 +173,7 @@ class FakeGateway:
                 self.subscribed[connection].discard(frame["topic"])
             case "send_action_goal" if frame["action"] in self.answers:
                 try:
-                    self.answers[frame["action"]](frame["args"])
+                    self.act("action_feedback", frame, self.answers[frame["action"]](frame["args"]))
                 except Refused as refusal:
                     self.act("action_result", frame, str(refusal), status=0, result=False)
             case "cancel_action_goal":
@@ -213,5 +215,5 @@ class FakeGateway:
             forward, turn = self.velocity
             data: dict[str, dict[str, Any]] = {topic: {"data": value} for topic, value in DATA.items()}
             data["odom"] = {"twist": {"twist": {"linear": {"x": 0.96 * forward}, "angular": {"z": 0.97 * turn}}}}
-            for topic, message in data.items():
+            for topic, message in (data | self.repeated).items():
                 self.say(topic, message)

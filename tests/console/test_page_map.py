@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -68,14 +69,12 @@ def rolling(gateway: FakeGateway) -> FakeGateway:
     """A robot at (1, 0.5) in `map`, by a transform to `odom`, in which it is at (0.5, 0) and looks along x."""
     gateway.config = {**CONFIG, "places": PLACES}
     gateway.windows["robot/DescribeRobot"] = [GO_TO, CHARGER]
+    gateway.answers["/go_to"] = lambda _: {"distance_remaining": 3.0}
     gateway.answers["/rosapi/topics"] = lambda _: {"topics": list(TYPES), "types": list(TYPES.values())}
     gateway.answers["/rosapi/subscribers"] = lambda _: {"subscribers": []}
     gateway.latched["/tf_static"] = {"transforms": [transform("map", "odom", 1.0, 0.0, math.pi / 2)]}
-    gateway.latched["/odom"] = {
-        "header": {"frame_id": "odom"},
-        "child_frame_id": "base_footprint",
-        "pose": {"pose": pose(0.5, 0.0, 0.0)},
-    }
+    frames = {"header": {"frame_id": "odom"}, "child_frame_id": "base_footprint"}
+    gateway.repeated = {"/odom": {**frames, "pose": {"pose": pose(0.5, 0.0, 0.0)}}}
     return gateway
 
 
@@ -139,6 +138,12 @@ def state(page: Page) -> Locator:
     return page.locator(".map-state")
 
 
+def expect_drive(page: Page, name: str) -> None:
+    """Wait until the robot has told how far it is from a goal, which it has."""
+    expect(state(page)).to_have_text(f"Driving to {name}")
+    expect(page.get_by_text("3.00\u202fm to go")).to_be_visible()
+
+
 def tool(page: Page, name: str) -> Locator:
     return page.get_by_role("group", name="What a drag does").get_by_role("button", name=name, exact=True)
 
@@ -150,24 +155,20 @@ def test_the_robot_is_where_transforms_and_odometry_have_it(
     expect(page.get_by_text("Robot: x 1.00\u202fm, y 0.50\u202fm, heading 90°, in map")).to_be_visible()
     wait_for_colour(page, 1.0, 0.5, [26, 95, 208, 255])
     wait_for_colour(page, 0.0, 0.045, [255, 255, 0, 255])
-    moves = [transform("odom", "base_footprint", -0.25, 0.0, math.pi)]
-    rolling.say("/tf", {"transforms": moves})
+    rolling.say("/tf", {"transforms": [transform("odom", "base_footprint", -0.25, 0.0, math.pi)]})
     expect(page.get_by_text("Robot: x 1.00\u202fm, y \u22120.25\u202fm, heading \u221290°, in map")).to_be_visible()
-    rolling.say("/odom", rolling.latched["/odom"])
-    rolling.say("/tf", {"transforms": [transform("odom", "base_footprint", 0.0, 0.0, math.pi)]})
-    expect(page.get_by_text("Robot: x 1.00\u202fm, y 0.00\u202fm, heading \u221290°, in map")).to_be_visible()
 
 
 def test_a_drag_is_exactly_the_goal_at_each_zoom(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
     page = open_page(page_name="map")
     tool(page, "Go").click()
     drag(page, at(page, 0.2, 0.1), at(page, 0.2, 0.6))
-    expect(state(page)).to_have_text("Driving to (0.20, 0.10)")
+    expect_drive(page, "(0.20, 0.10)")
     expect(tool(page, "Move view")).to_have_attribute("aria-pressed", "true")
     page.get_by_role("button", name="Zoom in").click()
     tool(page, "Go").click()
     drag(page, at(page, 0.9, 0.3, 1.3 * SCALE), at(page, 0.6, 0.0, 1.3 * SCALE))
-    expect(state(page)).to_have_text("Driving to (0.90, 0.30)")
+    expect_drive(page, "(0.90, 0.30)")
     first, second = rolling.goals()
     assert is_goal(first, 0.2, 0.1, math.pi / 2)
     assert is_goal(second, 0.9, 0.3, -3 * math.pi / 4)
@@ -182,7 +183,7 @@ def test_without_the_tool_a_drag_moves_the_view_and_not_the_robot(
     canvas(page).press("ArrowRight")
     tool(page, "Go").click()
     drag(page, at(page, 0.0, 0.2), at(page, 0.5, 0.2))
-    expect(state(page)).to_have_text("Driving to (0.60, 0.20)")
+    expect_drive(page, "(0.60, 0.20)")
     (goal,) = rolling.goals()
     assert is_goal(goal, 0.6, 0.2, 0.0)
 
@@ -192,7 +193,7 @@ def test_a_finger_sends_the_same_goal_and_escape_gives_up(open_page: Callable[..
     expect(page.get_by_text("Robot: x 1.00")).to_be_visible()
     tool(page, "Go").tap()
     move_fingers(page, [at(page, 0.2, 0.1)], [at(page, 0.7, 0.1)])
-    expect(state(page)).to_have_text("Driving to (0.20, 0.10)")
+    expect_drive(page, "(0.20, 0.10)")
     (goal,) = rolling.goals()
     assert is_goal(goal, 0.2, 0.1, 0.0)
     tool(page, "Go").tap()
@@ -213,7 +214,7 @@ def test_two_fingers_and_the_wheel_zoom_and_send_no_goal(open_page: Callable[...
     page.mouse.move(*at(page, *MIDDLE))
     page.mouse.wheel(0, -math.log(1.2) / math.log(1.0015))
     drag(page, at(page, 0.3, 0.1, 1.8 * SCALE), at(page, 0.3, 0.0, 1.8 * SCALE))
-    expect(state(page)).to_have_text("Driving to (0.30, 0.10)")
+    expect_drive(page, "(0.30, 0.10)")
     (goal,) = rolling.goals()
     assert is_goal(goal, 0.3, 0.1, -math.pi / 2)
 
@@ -254,7 +255,7 @@ def test_places_are_the_way_without_the_canvas(open_page: Callable[..., Page], r
     expect(places.get_by_role("listitem").first).to_contain_text("Dock: it charges here")
     expect(places.get_by_role("listitem").last).to_contain_text("x 1.00\u202fm, y 0.50\u202fm, heading 90°")
     page.get_by_role("button", name="Go to Window seat").press("Enter")
-    expect(state(page)).to_have_text("Driving to Window seat")
+    expect_drive(page, "Window seat")
     (goal,) = rolling.goals()
     assert is_goal(goal, 1.0, 0.5, math.pi / 2)
     rolling.act("action_feedback", goal, {"distance_remaining": 1.25})
@@ -267,7 +268,7 @@ def test_places_are_the_way_without_the_canvas(open_page: Callable[..., Page], r
     page.get_by_label("x [m]").fill("0.25")
     page.get_by_label("heading [°]").fill("45")
     page.get_by_role("button", name="Go", exact=True).last.click()
-    expect(state(page)).to_have_text("Driving to (0.25, 0.00)")
+    expect_drive(page, "(0.25, 0.00)")
     assert is_goal(rolling.goals()[1], 0.25, 0.0, math.pi / 4)
     rolling.act("action_result", rolling.goals()[1], {}, status=4, result=True)
     expect(state(page)).to_have_text("Arrived at (0.25, 0.00)")
@@ -277,14 +278,14 @@ def test_why_the_robot_does_not_go_is_said(open_page: Callable[..., Page], rolli
     def refuse(_: dict[str, Any]) -> None:
         raise Refused("the goal is too far away")
 
-    rolling.answers["/go_to"] = refuse
+    answer, rolling.answers["/go_to"] = rolling.answers["/go_to"], refuse
     page = open_page(page_name="map")
     go = page.get_by_role("button", name="Go to Dock")
     go.click()
     expect(state(page)).to_have_text("Refused to drive to Dock: the goal is too far away")
-    del rolling.answers["/go_to"]
+    rolling.answers["/go_to"] = answer
     go.click()
-    expect(state(page)).to_have_text("Driving to Dock")
+    expect_drive(page, "Dock")
     rolling.act("action_result", rolling.goals()[-1], {"error_msg": "stuck"}, status=6, result=True)
     expect(state(page)).to_have_text("Gave up on the way to Dock: stuck")
     rolling.show("robot/RobotStatus", {"stop": {"by": "Ada", "time": 1.0}})
@@ -314,12 +315,14 @@ def test_the_robot_is_told_where_it_is_if_something_listens(
     tool(page, "Initial pose").click()
     drag(page, at(page, 0.2, 0.1), at(page, 0.2, 0.6))
     expect(page.get_by_text("The robot was told that it is at (0.20, 0.10)")).to_be_visible()
+    page.get_by_role("button", name="Go to Dock").click()
+    expect_drive(page, "Dock")
     (told,) = [frame for _, frame in rolling.frames if frame["op"] == "publish"]
     assert (told["topic"], told["msg"]["header"]["frame_id"]) == ("/initialpose", "map")
     assert told["msg"]["pose"]["pose"]["position"] == pytest.approx(moved(0.2, 0.1), abs=1 / SCALE)
     assert told["msg"]["pose"]["pose"]["orientation"] == pytest.approx(turned(math.pi / 2), abs=0.01)
     assert len(told["msg"]["pose"]["covariance"]) == 36
-    assert rolling.goals() == []
+    assert len(rolling.goals()) == 1
 
 
 def test_a_distance_is_measured(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
@@ -342,10 +345,15 @@ def test_what_is_not_known_is_said(open_page: Callable[..., Page], gateway: Fake
 def test_an_old_position_is_said_to_be_old(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
     page = open_page(page_name="map")
     expect(page.get_by_text("Robot: x 1.00")).to_be_visible()
+    odometry, rolling.repeated = rolling.repeated, {}
+    expect(page.get_by_text(re.compile(r"Robot, as it was \d+\W+s ago: x 1\.00"))).to_be_visible()
     rolling.is_away = True
     rolling.drop()
     expect(page.get_by_text("Robot, as it was before")).to_be_visible()
     expect(page.get_by_role("button", name="Go to Dock")).to_be_disabled()
+    rolling.is_away, rolling.repeated = False, odometry
+    expect(page.get_by_text("Robot: x 1.00")).to_be_visible()
+    expect(page.get_by_role("button", name="Go to Dock")).to_be_enabled()
 
 
 def test_places_are_not_drawn_without_a_way_to_map(open_page: Callable[..., Page], rolling: FakeGateway) -> None:

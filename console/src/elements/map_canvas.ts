@@ -429,6 +429,8 @@ class Pen {
     if (isDock) {
       context.beginPath();
       context.arc(0, 0, 0.7 * PLACE, 0, 2 * Math.PI);
+      context.fillStyle = this.#colour("card");
+      context.fill();
       context.stroke();
     }
     context.beginPath();
@@ -469,19 +471,22 @@ class Pen {
 
   arrow(pose: Pose, name: string, dash: number[] = []): void {
     const context = this.#at(pose, pose.heading);
-    context.strokeStyle = this.#colour(name);
-    context.lineWidth = 3;
-    context.setLineDash(dash);
-    context.arc(0, 0, 0.4 * ARROW, 0, 2 * Math.PI);
-    context.stroke();
-    context.setLineDash([]);
-    context.beginPath();
-    context.moveTo(0, 0);
-    context.lineTo(ARROW, 0);
-    context.moveTo(0.7 * ARROW, -0.25 * ARROW);
-    context.lineTo(ARROW, 0);
-    context.lineTo(0.7 * ARROW, 0.25 * ARROW);
-    context.stroke();
+    const ring = new Path2D();
+    ring.arc(0, 0, 0.5 * ARROW, 0, 2 * Math.PI);
+    const shaft = new Path2D();
+    shaft.moveTo(0, 0);
+    shaft.lineTo(ARROW, 0);
+    shaft.moveTo(0.7 * ARROW, -0.25 * ARROW);
+    shaft.lineTo(ARROW, 0);
+    shaft.lineTo(0.7 * ARROW, 0.25 * ARROW);
+    for (const [colour, width] of [["card", 7], [name, 3]] as const) {
+      context.strokeStyle = this.#colour(colour);
+      context.lineWidth = width;
+      context.setLineDash(dash);
+      context.stroke(ring);
+      context.setLineDash([]);
+      context.stroke(shaft);
+    }
   }
 
   measure(from: Point, to: Point): void {

@@ -3,12 +3,13 @@ import type { Place } from "../config";
 import { watchComponents, type Component, type Port } from "../description";
 import { h, icon, setText, type Icon } from "../dom";
 import { MapCanvas, type Drag, type Tool } from "../elements/map_canvas";
-import { formatAge, formatName, formatNumber } from "../format";
+import { formatAge, formatName, formatNumber, formatValue } from "../format";
 import {
   applied,
   distance,
   frameOf,
   Frames,
+  plain,
   poseMessage,
   poseOf,
   readGrid,
@@ -33,12 +34,15 @@ const BASES = ["base_footprint", "base_link"]; // of robots that publish no odom
 const NAVIGATE = "nav2_msgs/action/NavigateToPose";
 const INITIAL = "/initialpose";
 const SPREAD: Record<number, number> = { 0: 0.25, 7: 0.25, 35: 0.07 }; // of a pose shown by hand [m², m², rad²]
+const NUMBER = { type: "number", step: "any", required: "", value: "0" };
+const UNKNOWN = "Where the robot is, is not known yet: nobody publishes its odometry or transforms.";
+const NOT_IN_MAP = "Places are poses in map, and no transform leads there: they are not drawn.";
 const DEGREES = 180 / Math.PI;
 
 const TOOLS: Record<Tool, readonly [words: string, hint: string]> = {
   move: ["Move view", ""],
-  go: ["Go", "Press where the robot is to go, and drag to where it is to look. Escape gives up."],
-  initial: ["Initial pose", "Press where the robot is, and drag to where it looks. Escape gives up."],
+  go: ["Go", "Press where the robot is to go, and drag to where it is to look."],
+  initial: ["Initial pose", "Press where the robot is, and drag to where it looks."],
   measure: ["Measure", "Drag from one point to another."],
 };
 const ICONS: Record<Exclude<TripState["is"], "none">, Icon> = {
@@ -137,14 +141,18 @@ class MapView {
     const { link, config } = robot;
     this.#trip = trips.get(link) ?? new Trip(link);
     trips.set(link, this.#trip);
-    for (const tool of Object.keys(TOOLS) as Tool[]) this.#tools.set(tool, button([TOOLS[tool][0]], () => this.#choose(tool)));
+    for (const [tool, [words]] of Object.entries(TOOLS) as [Tool, (typeof TOOLS)[Tool]][]) {
+      this.#tools.set(tool, button([words], () => this.#choose(tool)));
+    }
     this.#places = config.places.map((place) => {
       const go = button(["Go"], () => this.#go(place, formatName(place.name), "map"));
       go.setAttribute("aria-label", `Go to ${formatName(place.name)}`);
       return { place, note: h("small", { class: "label" }), go };
     });
     this.#numbers = this.#numbersForm();
-    this.element = h("div", { class: "map" }, this.#chart(), this.#side());
+    const goal = h("section", { class: "card map-goal", "aria-label": "Goal" }, h("h2", {}, "Goal"));
+    goal.append(this.#state, this.#note, this.#cancel);
+    this.element = h("div", { class: "map" }, goal, this.#chart(), this.#side());
     this.#canvas.onDrag = (drag) => this.#dragged(drag);
     this.element.onkeydown = ({ key }) => {
       if (key === "Escape") this.#choose("move");
@@ -178,9 +186,11 @@ class MapView {
       button(["\u2212"], () => this.#canvas.zoom(1 / 1.3), "Zoom out"),
       button(["Fit"], () => this.#canvas.fit(), "Fit everything into the view"),
     ];
-    const tools = h("div", { class: "map-tools", role: "group", "aria-label": "What a drag does" }, ...this.#tools.values());
+    const group = { class: "map-tools", role: "group", "aria-label": "What a drag does" };
+    const tools = h("div", group, ...this.#tools.values());
     const keys =
-      "Drag or arrow keys move the view; wheel, pinch, + and \u2212 zoom; 0 fits everything. x points right, y up; the dotted line is where the robot was in the last minute.";
+      "Drag or arrow keys move the view; wheel, pinch, + and \u2212 zoom; 0 fits everything; Escape gives a drag up. " +
+      "x points right, y up. The dotted line is where the robot was in the last minute.";
     return h(
       "section",
       { class: "card map-chart", "aria-label": "View" },
@@ -204,7 +214,6 @@ class MapView {
     return h(
       "div",
       { class: "map-side" },
-      h("section", { class: "card map-goal", "aria-label": "Goal" }, h("h2", {}, "Goal"), this.#state, this.#note, this.#cancel),
       h("section", { class: "card", "aria-label": "Places" }, h("h2", {}, "Places"), places, byNumbers),
       this.#layersCard,
     );
@@ -212,7 +221,7 @@ class MapView {
 
   #numbersForm(): HTMLFormElement {
     const field = (name: string, words: string) =>
-      h("label", { class: "field" }, words, h("input", { name, type: "number", step: "any", required: "", value: "0" }));
+      h("label", { class: "field" }, words, h("input", { name, ...NUMBER }));
     const set = h("button", { value: "initial" }, "Set initial pose");
     const form = h(
       "form",
@@ -242,7 +251,7 @@ class MapView {
       return found.map((port) => ({ port, isDeclared: goals.includes(port.name) }));
     });
     this.#navigator = (servers.find(({ isDeclared }) => isDeclared) ?? servers[0])?.port ?? null;
-    const docks = components.flatMap(({ capabilities }) => capabilities.Charges ?? []).map(({ place }) => place ?? null);
+    const docks = components.flatMap(({ capabilities }) => (capabilities.Charges ?? []).map(({ place }) => place));
     this.#docks = new Set(docks.filter(isMessage).map(({ name }) => String(name)));
     const drives = components.flatMap(({ ports, capabilities }) =>
       ports.filter(({ name }) => name === capabilities.Drives?.[0]?.odometry),
@@ -275,7 +284,8 @@ class MapView {
       if (isMessage(found) && Array.isArray(found.topics) && Array.isArray(found.types)) {
         for (const [turn, topic] of found.topics.entries()) this.#follow(String(topic), String(found.types[turn]));
       }
-      this.#hasLocaliser = isMessage(listeners) && Array.isArray(listeners.subscribers) && listeners.subscribers.length > 0;
+      const nodes = isMessage(listeners) && Array.isArray(listeners.subscribers) ? listeners.subscribers : [];
+      this.#hasLocaliser = nodes.some((node) => !String(node).startsWith("/_")); // those are tools that look on
       if (this.#hasLocaliser) link.advertise(INITIAL, "geometry_msgs/PoseWithCovarianceStamped");
       this.#failure = "";
     } catch (error) {
@@ -294,8 +304,8 @@ class MapView {
     if (kind === "TFMessage") {
       this.#followed.set(topic, link.subscribe(topic, (message) => this.#onTransforms(message), { type }));
     } else if (kind === "Odometry") {
-      const options = { type, throttle: ODOMETRY };
-      this.#followed.set(topic, link.subscribe(topic, (message) => this.#onOdometry(topic, message), options));
+      const listener = (message: Message) => this.#onOdometry(topic, message);
+      this.#followed.set(topic, link.subscribe(topic, listener, { type, throttle: ODOMETRY }));
     } else if (LAYERS[kind]) {
       this.#addLayer(topic, type, LAYERS[kind]);
     }
@@ -334,7 +344,7 @@ class MapView {
     const above = this.#frames.above(base);
     for (const stamped of Array.isArray(transforms) ? transforms.filter(isMessage) : []) {
       const transform = readTransform(stamped.transform);
-      const child = String(stamped.child_frame_id).replace(/^\//, "");
+      const child = plain(String(stamped.child_frame_id));
       if (!transform) continue;
       this.#frames.set(frameOf(stamped), child, transform);
       this.#published.add(child);
@@ -345,7 +355,7 @@ class MapView {
 
   /** Takes the pose of an odometry for a transform, unless somebody publishes that as well. */
   #onOdometry(topic: string, message: Message): void {
-    const child = String(message.child_frame_id ?? "").replace(/^\//, "");
+    const child = plain(String(message.child_frame_id ?? ""));
     const transform = isMessage(message.pose) ? readTransform(message.pose.pose) : null;
     if (!child || !transform) return;
     if (!this.#base || topic === this.#odometry) this.#base = child;
@@ -420,7 +430,8 @@ class MapView {
   #tick(): void {
     const old = this.#isOld();
     for (const { place, note } of this.#places) {
-      const away = this.#pose && !old && this.#placesAreOnMap() ? `, ${formatNumber(distance(this.#pose, place), "m")}\u202fm away` : "";
+      const from = !old && this.#placesAreOnMap() ? this.#pose : null;
+      const away = from ? `, ${metres(distance(from, place))} away` : "";
       setText(note, `${this.#docks.has(place.name) ? "Dock: it charges here. " : ""}${numbersOf(place)}${away}`);
     }
     if (this.#pose) {
@@ -437,8 +448,8 @@ class MapView {
       this.#measured,
       TOOLS[this.#tool][1],
       this.#failure,
-      this.#pose ? "" : "Where the robot is, is not known yet: nobody publishes its odometry or transforms.",
-      this.#placesAreOnMap() || !this.#places.length ? "" : "Places are poses in map, and no transform leads there: they are not drawn.",
+      this.#pose ? "" : UNKNOWN,
+      this.#placesAreOnMap() || !this.#places.length ? "" : NOT_IN_MAP,
     ];
     setText(this.#hint, texts.find(Boolean) ?? "");
   }
@@ -471,10 +482,11 @@ class MapView {
       this.#state.replaceChildren(...(state.is === "none" ? [] : [icon(ICONS[state.is])]), h("span", {}, state.text));
     }
     this.#cancel.hidden = !isDriving;
-    const left = state.left === null ? "" : `${formatNumber(state.left, "m")}\u202fm to go`;
+    const left = state.left === null ? "" : `${metres(state.left)} to go`;
     const missing = this.#navigator || !this.#isDescribed ? "" : "This robot has no skill that drives to a pose.";
-    const driver = this.#driver ? `Mission ${this.#driver} is running: a goal of yours replaces the one it drives to.` : "";
-    setText(this.#note, isDriving ? left : missing || driver);
+    this.#state.hidden = state.is === "none" && missing !== "";
+    const mission = `Mission ${this.#driver} is running: a goal of yours replaces the one it drives to.`;
+    setText(this.#note, isDriving ? left : missing || (this.#driver ? mission : ""));
     this.#draw();
   }
 
@@ -490,7 +502,7 @@ class MapView {
 
   #dragged(drag: Drag): void {
     if (drag.tool === "measure") {
-      this.#measured = `${formatNumber(distance(drag.pose, drag.end), "m")}\u202fm`;
+      this.#measured = metres(distance(drag.pose, drag.end));
       this.#showHint();
       return;
     }
@@ -525,7 +537,11 @@ function nameOf({ x, y }: Pose): string {
   return `(${formatNumber(x, "m")}, ${formatNumber(y, "m")})`;
 }
 
+function metres(length: number): string {
+  return formatValue(length, "m");
+}
+
 function numbersOf({ x, y, heading }: Pose): string {
   const degrees = formatNumber(Math.round(heading * DEGREES) || 0, "%");
-  return `x ${formatNumber(x, "m")}\u202fm, y ${formatNumber(y, "m")}\u202fm, heading ${degrees}°`;
+  return `x ${metres(x)}, y ${metres(y)}, heading ${degrees}°`;
 }
