@@ -33,6 +33,8 @@ export interface Config {
   about: string;
   firstPage: string;
   drive: DriveConfig | null;
+  /** The topic of the pictures that drivers see, empty if there is none. */
+  camera: string;
   values: Value[];
   places: Place[];
   /** Where the consoles of the robots of its system are: `ADDRESS:PORT`, without an address on the same machine. */
@@ -97,6 +99,7 @@ export function parseConfig(json: unknown): Config {
     robot: text(json.robot) || "robot",
     about: text(json.about),
     firstPage: text(json.first_page),
+    camera: text(json.camera),
     role: text(json.role) || "configure",
     drive: isMessage(json.drive) ? parseDrive(json.drive) : null,
     fleet: Object.fromEntries(

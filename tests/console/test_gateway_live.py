@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import email
 import json
 import os
 import shutil
@@ -16,12 +17,14 @@ import urllib.error
 import urllib.request
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import suppress
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 import websockets
+from PIL import Image as Picture
 from playwright.sync_api import expect
 from websockets.asyncio.client import ClientConnection, connect
 
@@ -52,6 +55,8 @@ def robot() -> Iterator[Robot]:
         console.build()
     base = Path(tempfile.mkdtemp(prefix="rbx"))
     text = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8").partition("\nmissions:")[0]
+    camera = "camera: {type: test_picture, topic: camera/image_raw, width: 64, height: 48}"
+    text = text.replace("\ncomponents:\n", f"\ncomponents:\n  {camera}\n")
     made = Robot(base, f"{text}\nconsole: {{port: {PORT}, drive: {{max_speed: 0.25 m/s}}}}\n")
     up = made.do("up", "-d", str(made.file), "--set", "bus.port=7891")
     assert up.returncode == 0, up.stderr
@@ -225,6 +230,27 @@ def test_pages_of_others_are_refused(robot: Robot, headers: dict[str, str]) -> N
     if "Host" not in headers:
         with pytest.raises(websockets.InvalidStatus):
             asyncio.run(attempt())
+
+
+def test_pictures_are_streamed_as_by_web_video_server(robot: Robot) -> None:
+    address = f"http://{HOST}/snapshot?topic=/camera/image_raw&width=32&type=png"
+    with urllib.request.urlopen(address, timeout=PATIENCE) as answer:
+        assert answer.headers["content-type"] == "image/png"
+        assert Picture.open(BytesIO(answer.read())).size == (32, 24)
+    with urllib.request.urlopen(f"http://{HOST}/stream?topic=/camera/image_raw", timeout=PATIENCE) as stream:
+        kind, _, boundary = stream.headers["content-type"].partition(";boundary=")
+        assert kind == "multipart/x-mixed-replace"
+        for _ in range(3):
+            assert stream.readline() == f"--{boundary}\r\n".encode()
+            head = email.message_from_bytes(b"".join(iter(stream.readline, b"\r\n")))
+            assert Picture.open(BytesIO(stream.read(int(head["content-length"])))).size == (64, 48)
+            assert stream.readline() == b"\r\n"
+    assert "stream_viewer?topic=/camera/image_raw" in get("/streams")[1]
+    assert get("/stream?topic=/odom")[:2] == (
+        404,
+        "'/odom' has no pictures: its messages are 'nav_msgs/msg/Odometry'\n",
+    )
+    assert get("/snapshot?topic=/camera/image_raw&width=x")[0] == 404
 
 
 def test_roslibpy_does_all_that_it_can(robot: Robot) -> None:

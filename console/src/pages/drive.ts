@@ -3,6 +3,7 @@ import { pluck, type DriveConfig } from "../config";
 import { h, icon, setText } from "../dom";
 import { drive, parked, PERIOD, STILL, wanted, type Direction, type DriveEvent, type Motion } from "../driving";
 import { BatteryGauge } from "../elements/battery_gauge";
+import { CameraView } from "../elements/camera_view";
 import { DrivePad } from "../elements/drive_pad";
 import { formatNumber, formatValue } from "../format";
 import type { Page, Robot } from "../page";
@@ -72,6 +73,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
   const lease = h("section", { class: "card lease", "aria-label": "Driver" });
   const speeds = speedCard(limits, state.speeds, (next) => dispatch({ is: "speeds", speeds: next }));
   const velocity = velocityCard(limits);
+  const camera = robot.config.camera ? new CameraView(robot.config.camera) : null;
   const batteries = batteryCard(robot);
 
   const dispatch = (event: DriveEvent) => {
@@ -125,6 +127,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
     pad.show({ x: -motion.turn / (state.speeds.turn || 1), y: motion.forward / (state.speeds.forward || 1) }, live);
     pad.setAttribute("aria-disabled", String(!state.connected || state.stopped));
     velocity.commanded(state.commanded);
+    camera?.point(state.commanded.forward / limits.forward, state.commanded.turn / limits.turn);
     setText(hint, hintOf());
     hint.classList.toggle("urgent", hint.textContent !== instructions());
     paintLease();
@@ -247,7 +250,8 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
   cleanups.push(() => clearInterval(timer));
 
   const stick = h("section", { class: "card stick", "aria-label": "Pad" }, pad, hint);
-  host.append(h("div", { class: "drive" }, lease, stick, velocity.element, speeds, batteries.element));
+  if (camera) cleanups.push(() => camera.close());
+  host.append(h("div", { class: "drive" }, lease, ...(camera ? [camera.element] : []), stick, velocity.element, speeds, batteries.element));
   paint();
   return () => {
     interrupted();

@@ -7,7 +7,17 @@ import math
 import os
 import socket
 import threading
-from collections.abc import Awaitable, Callable, Coroutine, Iterable, Iterator, Mapping, MutableMapping, Sequence
+from collections.abc import (
+    AsyncIterator,
+    Awaitable,
+    Callable,
+    Coroutine,
+    Iterable,
+    Iterator,
+    Mapping,
+    MutableMapping,
+    Sequence,
+)
 from contextlib import suppress
 from functools import cached_property, partial
 from pathlib import Path
@@ -16,6 +26,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rbxcompose.base.clock import SteppedClock
 from rbxcompose.base.config import AngularSpeed, Config, Speed
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Refused
 from rbxcompose.bus.graph import Graph, GraphName
@@ -48,7 +59,9 @@ from rbxcompose.domains.console.protocol import (
     Unwatch,
     Watch,
 )
-from rbxcompose.msgs.types import Service
+from rbxcompose.domains.console.streams import BOUNDARY, Streams, part
+from rbxcompose.domains.console.video import IMAGES, Wanted, WrongPictureError, list_page, viewer_page, wanted
+from rbxcompose.msgs.types import Message, Service
 from rbxcompose.runtime.control import NoAnswerError, ask_as_data
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, all_folders
 from rbxcompose.runtime.process_group.group import stop_key
@@ -64,7 +77,7 @@ if TYPE_CHECKING:
 
 STATIC = Path(__file__).parents[1] / "static"  # the built page
 MOST_CLIENTS = 64
-PACKAGES = ("starlette", "uvicorn", "websockets")
+PACKAGES = ("PIL", "segno", "starlette", "uvicorn", "websockets")
 SOCKETS = ("/", "/rosbridge")  # where WebSockets are taken
 _PAUSE = 0.1  # [s] between two looks for the robot's own state
 _LOOKS = 100
@@ -111,6 +124,8 @@ class GatewayConfig(Config):
     """The type of that topic."""
     drive_aliases: tuple[str, ...] = ()
     """Other topics on the way to the base."""
+    camera: str = ""
+    """The topic of the pictures that drivers see, by its full name; empty if there is none."""
     max_speed: Speed = math.inf
     """The fastest that is let through."""
     max_turn_rate: AngularSpeed = math.inf
@@ -345,6 +360,13 @@ class LiveGraph:
         return sorted({end.node for found in self._graph.topics if found.name == topic for end in getattr(found, side)})
 
 
+@dataclass(frozen=True, slots=True)
+class _Withdrawn:
+    """A subscription that ends by its bus."""
+
+    close: Callable[[], None]
+
+
 class _Unsent:
     """A goal whose server is not known yet."""
 
@@ -381,6 +403,7 @@ class GatewaySession:
         guarded = {pattern: Role[role.upper()] for pattern, role in config.guard.items()}
         self._bridge = Bridge(self._graph, config.drive, guarded, self._role_of)
         self._bus = guest.bus()
+        self._streams = Streams(lambda topic: self._graph.topics().get(topic, ""), self._subscribe_to_images)
         self._ends: dict[tuple[type[BusRequest], str], Any] = {}  # publishers, subscriptions and clients, by name
         self._asked_of_clients: dict[int, ServedRequest[Any, Any]] = {}  # that have not answered
         self._requests_so_far = 0
@@ -479,7 +502,62 @@ class GatewaySession:
         page: BaseRoute = Mount("/", StaticFiles(directory=STATIC, html=True)) if is_built else Route("/", not_built)
         sockets = [WebSocketRoute(path, self._talk) for path in SOCKETS]
         own = [Route("/console/config", config), Route("/console/login", log_in, methods=["POST"])]
-        return Starlette(routes=[*sockets, *own, page])
+        return Starlette(routes=[*sockets, *own, *self._video(), page])
+
+    def _video(self) -> list[Any]:
+        """Return the pages of pictures, at the addresses of web_video_server."""
+        from starlette.responses import HTMLResponse, PlainTextResponse, StreamingResponse
+        from starlette.responses import Response as Answer
+        from starlette.routing import Route
+
+        def shown(show: Callable[[Request, Wanted], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
+            async def answer(request: Request) -> Response:
+                if self._role(request) < Role.VIEW:
+                    return PlainTextResponse("this needs a link with a token\n", 401)
+                try:
+                    return await show(request, wanted(request.query_params))
+                except WrongPictureError as error:
+                    return PlainTextResponse(f"{error}\n", 404)
+
+            return answer
+
+        async def stream(_: Request, want: Wanted) -> Response:
+            frames = self._streams.frames(want)
+            first = await anext(frames)  # so that what is wrong has an answer of its own
+
+            async def parts() -> AsyncIterator[bytes]:
+                yield part(first, want.mime)
+                with suppress(WrongPictureError):
+                    async for frame in frames:
+                        yield part(frame, want.mime)
+
+            kind = f"multipart/x-mixed-replace;boundary={BOUNDARY}"
+            return StreamingResponse(parts(), media_type=kind, headers={"cache-control": "no-store"})
+
+        async def snapshot(_: Request, want: Wanted) -> Response:
+            frame = await self._streams.snapshot(want)
+            return Answer(frame, media_type=want.mime, headers={"cache-control": "no-store"})
+
+        async def viewer(request: Request, _: Wanted) -> Response:
+            return HTMLResponse(viewer_page(request.url.query))
+
+        async def listed(request: Request) -> Response:
+            if self._role(request) < Role.VIEW:
+                return PlainTextResponse("this needs a link with a token\n", 401)
+            return HTMLResponse(list_page(self._image_topics()))
+
+        routes = {"/stream": stream, "/snapshot": snapshot, "/stream_viewer": viewer}
+        return [Route("/streams", listed), *(Route(path, shown(show)) for path, show in routes.items())]
+
+    def _image_topics(self) -> list[str]:
+        return [topic for topic, type_ in self._graph.topics().items() if type_ in IMAGES]
+
+    def _subscribe_to_images(self, topic: str, message: type[Message], then: Callable[[Any], None]) -> _Withdrawn:
+        end = self._bus.subscribe(
+            NAME, topic, message, Qos.BULK, then, max_rate=math.inf, limits=BULK, may_be_silent=True
+        )
+        self._pump()
+        return _Withdrawn(partial(self._withdraw, end))
 
     @property
     def _cookie(self) -> str:
@@ -504,7 +582,7 @@ class GatewaySession:
             shown = {"topic": drive.topic, "type": drive.type, **finite}
         about = {"robot": self._folder.path.name, "about": config.about, "first_page": config.first_page}
         lists = {"values": config.values, "places": config.places, "fleet": config.fleet}
-        return {**about, "drive": shown, **lists, "stop": "/console/stop"}
+        return {**about, "drive": shown, "camera": config.camera, **lists, "stop": "/console/stop"}
 
     def _guarded(self, application: Any) -> Callable[..., Awaitable[None]]:
         """Return the application behind a door that pages of others do not pass."""

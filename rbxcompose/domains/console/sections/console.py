@@ -17,9 +17,11 @@ from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Contents, Reading, WantedComponent, Wiring
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.sdk.capabilities import Drives, Forwards, Setting
+from rbxcompose.sdk.ports import Out
 
 GATEWAY = "gateway"
 _TELEOP = "teleop"  # the input of a mux that is for people
+_PICTURES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _VELOCITIES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 
 
@@ -28,6 +30,8 @@ class DrivePage(Config):
 
     topic: TopicName | None = None
     """Where velocities go. Default: the input `teleop` of the mux before the base, else what the base follows."""
+    camera: TopicName | None = None
+    """The component, or the topic, whose pictures drivers see. Default: the first that publishes pictures."""
     max_speed: Speed | None = Field(None, gt=0)
     """The fastest that the page may drive. Default: the limit of the base."""
     max_turn_rate: AngularSpeed | None = Field(None, gt=0)
@@ -66,6 +70,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         "guard": read.guard,
         "first_page": read.first_page,
         **_drive(read.drive, components, namespace),
+        "camera": _camera(read.drive.camera, components, namespace),
         "values": _values(contents, components, namespace),
         "places": _places(contents),
     }
@@ -106,6 +111,15 @@ def _drive(page: DrivePage, components: Mapping[str, RobotComponent], namespace:
                 aliases = sorted(_on_the_way(components, end) - {topic})
                 return {"drive_topic": topic, "drive_type": end.type_name, "drive_aliases": aliases, **most}
     return {}
+
+
+def _camera(written: str | None, components: Mapping[str, RobotComponent], namespace: str) -> str:
+    """Return the topic of the pictures that drivers see: that of a component, else as written; by default the first."""
+    for name, component in components.items():
+        for end in component.ends:
+            if isinstance(end.port, Out) and end.type_name in _PICTURES and written in (None, name):
+                return end.topic
+    return resolve(written, namespace) if written else ""
 
 
 def _free(components: Mapping[str, RobotComponent], driven: PortEnd) -> str:

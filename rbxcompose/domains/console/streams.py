@@ -1,0 +1,135 @@
+"""Streams of pictures: the newest frame of a topic, encoded once for all who want the same."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from typing import Any, Protocol
+
+from rbxcompose.domains.console.video import IMAGES, Wanted, WrongPictureError, encoded
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.types import Message
+
+MOST_STREAMS = 32  # pictures that differ
+FIRST = 10.0  # [s] for the first picture of a topic
+BOUNDARY = "boundarydonotcross"  # as web_video_server has it, which some viewers expect
+
+
+class Closable(Protocol):
+    """A subscription."""
+
+    def close(self) -> None:
+        """End it."""
+        ...
+
+
+class _Stream:
+    """One picture of a topic, as some viewers want it."""
+
+    def __init__(self, want: Wanted) -> None:
+        self.want = want
+        self.viewers = 0
+        self.frame: bytes = b""
+        self.error = ""
+        self.changed = asyncio.Event()  # replaced by another one after each frame
+        self._newest: Message | None = None
+        self._is_busy = False
+
+    def arrived(self, message: Message) -> None:
+        """Encode a message, or after the one that is being encoded; one that is overtaken is never encoded."""
+        self._newest = message
+        if not self._is_busy:
+            self._is_busy = True
+            self._task = asyncio.get_running_loop().create_task(self._encode())
+
+    async def _encode(self) -> None:
+        while self._newest is not None:
+            message, self._newest = self._newest, None
+            try:
+                self.frame, self.error = await asyncio.to_thread(encoded, message, self.want), ""  # type: ignore[arg-type]
+            except WrongPictureError as error:
+                self.frame, self.error = b"", str(error)
+            self.changed.set()
+            self.changed = asyncio.Event()
+        self._is_busy = False
+
+
+class Streams:
+    """All streams of a robot. Topics are subscribed to while somebody looks."""
+
+    def __init__(
+        self, type_of: Callable[[str], str], subscribe: Callable[[str, type[Message], Callable[[Any], None]], Closable]
+    ) -> None:
+        """Use `type_of` for the type of a topic, empty if there is none, and `subscribe` to get its messages."""
+        self._type_of, self._subscribe = type_of, subscribe
+        self._streams: dict[Wanted, _Stream] = {}
+        self._topics: dict[str, Closable] = {}
+
+    async def frames(self, want: Wanted) -> AsyncIterator[bytes]:
+        """Yield pictures, the newest ones only, until the viewer leaves.
+
+        Raises:
+            WrongPictureError: if the topic has no pictures, or there are too many streams.
+        """
+        stream = self._joined(want)
+        try:
+            while True:
+                changed = stream.changed
+                if stream.frame or stream.error:
+                    if stream.error:
+                        raise WrongPictureError(stream.error)
+                    yield stream.frame
+                    await changed.wait()
+                else:
+                    await changed.wait()
+        finally:
+            self._leave(stream)
+
+    async def snapshot(self, want: Wanted) -> bytes:
+        """Return one picture.
+
+        Raises:
+            WrongPictureError: if there is none.
+        """
+        frames = self.frames(want)
+        try:
+            return await asyncio.wait_for(anext(frames), FIRST)
+        except TimeoutError as error:
+            raise WrongPictureError(f"no picture came on '{want.topic}' in {FIRST:.0f} s") from error
+        finally:
+            await frames.aclose()  # type: ignore[attr-defined]
+
+    def _joined(self, want: Wanted) -> _Stream:
+        type_ = self._type_of(want.topic)
+        if type_ not in IMAGES:
+            what = f"its messages are '{type_}'" if type_ else "there is no such topic"
+            raise WrongPictureError(f"'{want.topic}' has no pictures: {what}")
+        if (stream := self._streams.get(want)) is None:
+            if len(self._streams) >= MOST_STREAMS:
+                raise WrongPictureError(f"there are {MOST_STREAMS} different streams already")
+            stream = self._streams[want] = _Stream(want)
+        stream.viewers += 1
+        if want.topic not in self._topics:
+            message = registry.message(type_)
+            self._topics[want.topic] = self._subscribe(want.topic, message, lambda one: self._arrived(want.topic, one))
+        return stream
+
+    def _arrived(self, topic: str, message: Message) -> None:
+        for stream in self._streams.values():
+            if stream.want.topic == topic:
+                stream.arrived(message)
+
+    def _leave(self, stream: _Stream) -> None:
+        stream.viewers -= 1
+        if stream.viewers:
+            return
+        del self._streams[stream.want]
+        topic = stream.want.topic
+        if not any(other.want.topic == topic for other in self._streams.values()):
+            self._topics.pop(topic).close()
+
+
+def part(frame: bytes, mime: str) -> bytes:
+    """Return a picture as a part of a stream."""
+    head = f"--{BOUNDARY}\r\nContent-Type: {mime}\r\nContent-Length: {len(frame)}\r\n\r\n"
+    return head.encode() + frame + b"\r\n"

@@ -1,0 +1,165 @@
+"""Pictures of topics for browsers, with the parameters of web_video_server: from messages to JPEG and PNG."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from html import escape
+from io import BytesIO
+from typing import Any, Literal
+from urllib.parse import quote
+
+import numpy as np
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.msgs.sensor_msgs import CompressedImage, Image
+
+IMAGES = (Image.TYPE, CompressedImage.TYPE)
+LARGEST = 4096  # pixels of a side
+_FORMS = {"mjpeg": "jpeg", "jpeg": "jpeg", "png": "png", "ros_compressed": "jpeg"}
+_QUALITY = {"jpeg": 95, "png": 3}
+_BEST = {"jpeg": 100, "png": 9}
+_CHANNELS = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4, "mono8": 1, "8UC1": 1, "8UC3": 3}
+_DEPTHS: Mapping[str, str] = {"mono16": "u2", "16UC1": "u2", "32FC1": "f4"}
+
+Pixels = np.ndarray[Any, np.dtype[np.uint8]]
+
+
+class WrongPictureError(ValueError):
+    """Raised for parameters of a stream, or a message, of which no picture can be made."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """A picture as viewers want it; those that want the same share it. A size of 0 is that of the camera."""
+
+    topic: str
+    form: Literal["jpeg", "png"]
+    width: int
+    height: int
+    quality: int
+    """Of JPEG from 1 to 100; of PNG how hard it is compressed, from 0 to 9."""
+    is_inverted: bool
+    """Whether it is turned by half a turn."""
+
+    @property
+    def mime(self) -> str:
+        """Return its media type."""
+        return f"image/{self.form}"
+
+
+def wanted(query: Mapping[str, str]) -> Wanted:
+    """Return what the parameters of an address ask for.
+
+    Raises:
+        WrongPictureError: if they make no sense.
+    """
+    topic = query.get("topic", "").strip()
+    if not topic.strip("/"):
+        raise WrongPictureError("'topic' is the name of a topic with pictures")
+    written = query.get("type", "mjpeg")
+    if (form := _FORMS.get(written)) is None:
+        raise WrongPictureError(f"'type' is one of {', '.join(_FORMS)}, not '{written[:40]}'")
+    return Wanted(
+        f"/{topic.lstrip('/')}",
+        form,  # type: ignore[arg-type]
+        _whole(query, "width", 0, LARGEST),
+        _whole(query, "height", 0, LARGEST),
+        _whole(query, "quality", _QUALITY[form], _BEST[form]),
+        "invert" in query,
+    )
+
+
+def _whole(query: Mapping[str, str], name: str, otherwise: int, most: int) -> int:
+    text = query.get(name, "").strip()
+    if not text:
+        return otherwise
+    try:
+        value = round(float(text))  # pages compute sizes
+    except (ValueError, OverflowError) as error:
+        raise WrongPictureError(f"'{name}' is a number") from error
+    if not 0 <= value <= most:
+        raise WrongPictureError(f"'{name}' is between 0 and {most}")
+    return value
+
+
+def viewer_page(query: str) -> str:
+    """Return a page that shows a stream of these parameters, as they stand in an address."""
+    return f'<!doctype html><html lang="en"><title>Stream</title><img alt="Stream" src="stream?{escape(query)}">'
+
+
+def list_page(topics: Iterable[str]) -> str:
+    """Return a page with links to what can be seen."""
+    rows = [
+        f'<li>{escape(topic)}: <a href="stream_viewer?topic={quote(topic)}">stream</a>, '
+        f'<a href="snapshot?topic={quote(topic)}">snapshot</a></li>'
+        for topic in topics
+    ]
+    shown = f"<ul>{''.join(rows)}</ul>" if rows else "<p>Nothing publishes pictures now.</p>"
+    return f'<!doctype html><html lang="en"><title>Streams</title><h1>Streams</h1>{shown}'
+
+
+def encoded(message: Image | CompressedImage, want: Wanted) -> bytes:
+    """Return the picture of a message.
+
+    Raises:
+        WrongPictureError: if it is none.
+    """
+    from PIL import Image as Pictures  # of the extra `console`
+
+    if isinstance(message, CompressedImage):
+        data = bytes(message.data)
+        is_as_wanted = want.form in message.format.lower().replace("jpg", "jpeg") and not (want.width or want.height)
+        if is_as_wanted and not want.is_inverted:
+            return data
+        try:
+            picture = Pictures.open(BytesIO(data)).convert("RGB")
+        except (OSError, ValueError) as error:
+            raise WrongPictureError(f"what is compressed as '{message.format[:40]}' is no picture") from error
+    else:
+        picture = Pictures.fromarray(pixels(message))
+    if want.width or want.height:
+        width = want.width or round(picture.width * want.height / picture.height)
+        height = want.height or round(picture.height * want.width / picture.width)
+        picture = picture.resize((max(1, width), max(1, height)), Pictures.Resampling.BILINEAR)
+    if want.is_inverted:
+        picture = picture.transpose(Pictures.Transpose.ROTATE_180)
+    written = BytesIO()
+    if want.form == "jpeg":
+        picture.save(written, "JPEG", quality=max(1, want.quality))
+    else:
+        picture.save(written, "PNG", compress_level=want.quality)
+    return written.getvalue()
+
+
+def pixels(message: Image) -> Pixels:
+    """Return a picture as an array, rows x columns (x 3, RGB). Depths are scaled: the nearest is dark.
+
+    Raises:
+        WrongPictureError: if its size and its data do not fit, or its encoding is not known.
+    """
+    height, width, step = message.height, message.width, message.step
+    depth, channels = _DEPTHS.get(message.encoding), _CHANNELS.get(message.encoding)
+    if channels is None and depth is None:
+        known = ", ".join((*_CHANNELS, *_DEPTHS))
+        raise WrongPictureError(f"the encoding '{message.encoding[:40]}' is not known; there are {known}")
+    item = np.dtype(depth or "u1").itemsize * (channels or 1)
+    data = np.frombuffer(bytes(message.data), np.uint8)
+    if not (height > 0 and width > 0 and width * item <= step and step * height <= data.size):
+        raise WrongPictureError(f"{data.size} bytes are no picture of {width} x {height} with rows of {step} bytes")
+    rows = data[: step * height].reshape(height, step)[:, : width * item]
+    if depth is not None:
+        order = ">" if message.is_bigendian else "<"
+        return _scaled(np.ascontiguousarray(rows).view(f"{order}{depth}").astype(np.float64))
+    if channels is None or channels == 1:
+        return rows
+    found = rows.reshape(height, width, channels)[:, :, :3]
+    return np.ascontiguousarray(found[:, :, ::-1] if message.encoding.startswith("bgr") else found)
+
+
+def _scaled(depths: np.ndarray[Any, np.dtype[np.float64]]) -> Pixels:
+    is_known = np.isfinite(depths) & (depths > 0)
+    if not is_known.any():
+        return np.zeros(depths.shape, np.uint8)
+    least, most = depths[is_known].min(), depths[is_known].max()
+    shown = np.where(is_known, (depths - least) / max(most - least, 1e-9), 0.0)
+    return (shown * 255).astype(np.uint8)
