@@ -92,6 +92,7 @@ function route(host: HTMLElement, tabs: HTMLElement, robot: Robot): void {
     links.forEach((link, at) =>
       at === turn ? link.setAttribute("aria-current", "page") : link.removeAttribute("aria-current"),
     );
+    links[turn]!.scrollIntoView({ block: "nearest", inline: "nearest" });
     document.title = `${page.title} \u00b7 ${robot.config.robot}`;
     close = page.open(host, robot);
   };

@@ -51,10 +51,13 @@ _ROLES = {
 _SERVICES = {
     "/console/stop": Role.VIEW,  # whoever sees that something goes wrong
     "/console/ask": Role.VIEW,  # the request decides
+    "/console/save": Role.CONFIGURE,
     "/rosapi/set_param": Role.CONFIGURE,
     "/rosapi/delete_param": Role.CONFIGURE,
 }
 _NAMES = ("topic", "service", "action")
+_SHOWS_PARAMETERS = ("/list_parameters", "/describe_parameters", "/get_parameters", "/get_parameter_types")
+_SETS_PARAMETERS = ("/set_parameters", "/set_parameters_atomically")  # of each node
 
 
 def needed(frame: Mapping[str, Any], guarded: Mapping[str, Role]) -> Role:
@@ -68,7 +71,9 @@ def needed(frame: Mapping[str, Any], guarded: Mapping[str, Role]) -> Role:
     least = _ROLES.get(op, Role.OPERATE) if isinstance(op, str) else Role.VIEW
     name = next((f"/{value.lstrip('/')}" for key in _NAMES if isinstance(value := frame.get(key), str)), "")
     if op == "call_service":
-        least = _SERVICES.get(name, Role.VIEW if name.startswith("/rosapi/") else Role.OPERATE)
+        looks = name.startswith("/rosapi/") or name.endswith(_SHOWS_PARAMETERS)
+        otherwise = Role.CONFIGURE if name.endswith(_SETS_PARAMETERS) else Role.VIEW if looks else Role.OPERATE
+        least = _SERVICES.get(name, otherwise)
     if least <= Role.VIEW and op != "call_service":
         return least  # looking harms nobody
     return max(least, *(role for pattern, role in guarded.items() if fnmatchcase(name, pattern)), Role.NOBODY)

@@ -49,6 +49,7 @@ DRIVE_WINDOW = f"{WINDOWS}drive"  # who holds the drive lease
 _QUERY = re.compile(r"(?P<about>\w+)/(?P<name>\w+)(?P<values>(/\w+/\w+)*)", re.ASCII)
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"\w+(/(msg|srv|action))?/\w+", re.ASCII)
+_SETTING = re.compile(r"[A-Za-z_]\w*(\.\w+)*", re.ASCII)
 _LONGEST_ROS_NAME = 247
 _SHOWN = 60  # characters of what a client sent, in a status
 
@@ -157,6 +158,15 @@ class AskRobot:
 
 
 @dataclass(frozen=True, slots=True)
+class Save:
+    """Write parameters into the manifest, or with `is_trial` only find what would be; pass that to `robot_answered`."""
+
+    number: int
+    names: tuple[str, ...]
+    is_trial: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Watch:
     """Repeat a query of the robot every `period` [s], in place of an earlier period; pass answers to `Bridge.seen`."""
 
@@ -185,6 +195,7 @@ BusRequest = (
     | SendGoal
     | CancelGoal
     | AskRobot
+    | Save
     | Watch
     | Unwatch
 )
@@ -1002,6 +1013,12 @@ class Bridge:
             raise WrongMessageError("'type' is the name of a request, such as 'mission.ListMissions'")
         self._requests.append(AskRobot(number, given, client.role, client.who))
 
+    def _save_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
+        names = given.get("names", [])
+        if not isinstance(names, list) or not all(isinstance(one, str) and _SETTING.fullmatch(one) for one in names):
+            raise WrongMessageError("'names' are components, or their parameters: 'battery', 'battery.runtime'")
+        self._requests.append(Save(number, tuple(names), given.get("dry_run") is True))
+
     def _rosapi(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
         """Return the answer of `/rosapi/NAME`."""
         found = rosapi.answer(name, given, self._graph, self._stamp)
@@ -1140,6 +1157,7 @@ _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str,
     "/console/ask": Bridge._ask_service,
     "/console/drive": Bridge._drive_service,
     "/console/release": Bridge._release_service,
+    "/console/save": Bridge._save_service,
     "/console/stop": Bridge._stop_service,
 }
 """Services of the gateway: what answers, or None if the answer comes later."""

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import math
 import os
 import socket
+import subprocess
+import sys
 import threading
 from collections.abc import (
     AsyncIterator,
@@ -49,6 +52,7 @@ from rbxcompose.domains.console.protocol import (
     BusRequest,
     CancelGoal,
     Publish,
+    Save,
     SendGoal,
     Serve,
     ServiceCall,
@@ -88,6 +92,7 @@ _FAREWELL = 1  # [s] for clients to let go
 _GOODBYE = 3.0  # [s] to wait for the thread to end
 _STOPPED = 1.0  # [s] for all processes to answer to a stop over the bus
 _SHY = 5.0  # [s] for a client to say who it is
+_SAVING = 30.0  # [s] for a save
 _LONGEST_LOGIN = 4096  # [bytes]
 _COOKIE_AGE = 365 * 24 * 3600  # [s]
 _POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; object-src 'none'"
@@ -416,6 +421,7 @@ class GatewaySession:
         self._tasks: set[asyncio.Task[None]] = set()
         self._is_command: dict[str, bool] = dict.fromkeys((STOP["type"], RELEASE["type"]), True)
         self._is_command |= dict.fromkeys(("robot.RobotStatus", _DESCRIBE["type"]), False)
+        self._saving = asyncio.Lock()
         self._watches: dict[str, asyncio.Task[None]] = {}  # by window
         guest.scheduler.on_error = lambda owner, error: self._loop.call_exception_handler(
             {"message": str(error), "exception": error}
@@ -729,6 +735,8 @@ class GatewaySession:
                 self._goals[number].cancel()
             case AskRobot():
                 self._begin(self._ask_robot(request))
+            case Save():
+                self._begin(self._save(request))
             case Watch():
                 self._stop_watching(request.window)
                 self._watches[request.window] = self._begin(self._watch(request))
@@ -809,6 +817,22 @@ class GatewaySession:
             stopped = await asyncio.to_thread(self._guest.ask, stop_key(self._folder.path.name), _STOPPED)
             if names := ", ".join(sorted(name.decode() for name in stopped)):
                 answer, refusal = f"the supervisor does not answer: stopped over the bus: {names}", ""
+        self._bridge.robot_answered(request.number, answer, refusal)
+        self._pump()
+
+    async def _save(self, request: Save) -> None:
+        """Save as the command line does, in a process of its own: it needs the whole compiler."""
+        trial = ("--dry-run",) if request.is_trial else ()
+        robot = ("--robot", self._folder.path.name)
+        command = (sys.executable, "-m", "rbxcompose", "param", "save", "--json", *robot, *trial, *request.names)
+        async with self._saving:
+            run = partial(subprocess.run, command, capture_output=True, text=True, timeout=_SAVING, check=False)
+            try:
+                done = await asyncio.to_thread(run)
+                answer = json.loads(done.stdout) if done.returncode == 0 else None
+                refusal = "" if answer is not None else done.stderr.strip() or done.stdout.strip()
+            except (subprocess.TimeoutExpired, ValueError) as error:
+                answer, refusal = None, f"it was not saved: {type(error).__name__}"
         self._bridge.robot_answered(request.number, answer, refusal)
         self._pump()
 

@@ -1,0 +1,337 @@
+/** Parameters: what may change while the robot runs, by sliders, boxes and lists; kept in the manifest by Save. */
+import { emptyCard, h, icon, setText } from "../dom";
+import { formatName } from "../format";
+import type { Page, Robot } from "../page";
+import { parameterOf, parsed, Sender, settingOf, slideOf, tidy, valueOf, type Setting, type Value } from "../parameters";
+import { isMessage, type Json, type Message } from "../rosbridge";
+import "./parameters.css";
+
+const PAUSE = 200; // [ms] between two values of a slider
+const SAVING = 30_000; // [ms]
+
+/** What `param save` would write: SI. */
+interface Unsaved {
+  component: string;
+  name: string;
+  old: Json;
+  new: Json;
+}
+
+export const page: Page = {
+  name: "parameters",
+  title: "Parameters",
+  order: 50,
+  open(host, robot) {
+    const view = new ParametersView(robot);
+    host.append(view.element);
+    const close = robot.link.state.watch(({ is }) => {
+      if (is === "open") void view.load();
+    });
+    return () => {
+      close();
+      view.close();
+    };
+  },
+};
+
+class ParametersView {
+  readonly element = h("div", { class: "parameters" }, emptyCard("wait", "Asking for the parameters\u2026"));
+  readonly #robot: Robot;
+  readonly #filter = h("input", { type: "search", "aria-label": "Find a parameter", placeholder: "Find a parameter" });
+  readonly #undo = h("button", { type: "button" }, icon("undo"), "Undo");
+  readonly #save = h("button", { type: "button" }, icon("check"), "Save");
+  readonly #says = h("p", { class: "says", role: "status" });
+  readonly #cards = h("div", { class: "parameter-cards" });
+  readonly #rows = new Map<string, Row>();
+  readonly #done: { row: Row; before: Value }[] = [];
+  readonly #close: () => void;
+  #looking = false;
+  #again = false;
+
+  constructor(robot: Robot) {
+    this.#robot = robot;
+    this.#filter.oninput = () => this.#find();
+    this.#undo.onclick = () => this.#takeBack();
+    this.#save.onclick = () => void this.#keep();
+    this.#undo.disabled = this.#save.disabled = true;
+    this.#close = robot.link.subscribe("/parameter_events", (event) => this.#follow(event), {
+      type: "rcl_interfaces/msg/ParameterEvent",
+    });
+  }
+
+  close(): void {
+    this.#close();
+  }
+
+  /** Asks all nodes for their parameters. */
+  async load(): Promise<void> {
+    try {
+      const answer = await this.#robot.link.call("/rosapi/services");
+      const services = isMessage(answer) && Array.isArray(answer.services) ? answer.services.map(String) : [];
+      const nodes = services.flatMap((name) => /^(.+)\/describe_parameters$/.exec(name)?.[1] ?? []);
+      const found = (await Promise.all(nodes.map((node) => this.#ask(node)))).flat();
+      this.#show(found);
+      void this.#look();
+    } catch (error) {
+      this.element.replaceChildren(emptyCard("warning", (error as Error).message));
+    }
+  }
+
+  async #ask(node: string): Promise<{ setting: Setting; value: Value }[]> {
+    const listed = await this.#robot.link.call(`${node}/list_parameters`);
+    const names = isMessage(listed) && isMessage(listed.result) && Array.isArray(listed.result.names) ? listed.result.names : [];
+    if (names.length === 0) return [];
+    const [described, got] = await Promise.all([
+      this.#robot.link.call(`${node}/describe_parameters`, { names }),
+      this.#robot.link.call(`${node}/get_parameters`, { names }),
+    ]);
+    if (!isMessage(described) || !isMessage(got) || !Array.isArray(described.descriptors) || !Array.isArray(got.values)) return [];
+    const values = got.values;
+    return described.descriptors.flatMap((descriptor, at) => {
+      const setting = settingOf(node, descriptor);
+      const value = setting && !setting.isReadOnly ? valueOf(setting, values[at] ?? null) : null;
+      return setting && value !== null ? [{ setting, value }] : [];
+    });
+  }
+
+  #show(found: { setting: Setting; value: Value }[]): void {
+    if (found.length === 0) {
+      const help = h("p", {}, "What may change while the robot runs is marked in the reference of its components.");
+      this.element.replaceChildren(emptyCard("warning", "This robot has no parameters that may change while it runs.", help));
+      return;
+    }
+    this.#rows.clear();
+    const cards = new Map<string, HTMLElement>();
+    for (const { setting, value } of found) {
+      const row = new Row(setting, value, (before, after) => this.#set(row, before, after));
+      this.#rows.set(`${setting.node}:${setting.name}`, row);
+      let card = cards.get(setting.node);
+      if (!card) {
+        card = h("section", { class: "card", "aria-label": setting.node.slice(1) }, h("h2", {}, formatName(setting.node)));
+        cards.set(setting.node, card);
+      }
+      card.append(row.element);
+    }
+    this.#cards.replaceChildren(...cards.values());
+    const bar = h("div", { class: "parameter-bar" }, this.#filter, this.#undo, this.#save);
+    this.element.replaceChildren(bar, this.#says, this.#cards);
+    this.#find();
+  }
+
+  #find(): void {
+    const wanted = this.#filter.value.trim().toLowerCase();
+    for (const [key, row] of this.#rows) row.element.hidden = !`${key} ${row.setting.about}`.toLowerCase().includes(wanted);
+    for (const card of this.#cards.children) (card as HTMLElement).hidden = !card.querySelector(".parameter:not([hidden])");
+  }
+
+  #set(row: Row, before: Value, after: Value): void {
+    const last = this.#done.at(-1);
+    if (last?.row !== row || !row.isSending) this.#done.push({ row, before }); // a slider that moves is one change
+    this.#undo.disabled = false;
+    row.send(after, (value) => this.#tell(row.setting, value));
+  }
+
+  async #tell(setting: Setting, value: Value): Promise<void> {
+    const answer = await this.#robot.link.call(`${setting.node}/set_parameters`, { parameters: [parameterOf(setting, value)] });
+    const result = isMessage(answer) && Array.isArray(answer.results) ? answer.results[0] : null;
+    if (isMessage(result ?? null) && (result as Message).successful === false) throw new Error(String((result as Message).reason));
+    void this.#look();
+  }
+
+  #takeBack(): void {
+    const last = this.#done.pop();
+    this.#undo.disabled = this.#done.length === 0;
+    last?.row.send(last.before, (value) => this.#tell(last.row.setting, value));
+  }
+
+  /** Takes what others have changed, and what the robot made of what was sent. */
+  #follow(event: Message): void {
+    const changed = [event.changed_parameters, event.new_parameters].flatMap((all) => (Array.isArray(all) ? all : []));
+    for (const parameter of changed) {
+      if (!isMessage(parameter)) continue;
+      const row = this.#rows.get(`${String(event.node)}:${String(parameter.name)}`);
+      const value = row ? valueOf(row.setting, parameter.value ?? null) : null;
+      if (row && value !== null) row.arrived(value);
+    }
+    if (changed.length > 0) void this.#look();
+  }
+
+  /** Learns what is not as in the manifest: one question at a time, and another if something changed meanwhile. */
+  async #look(): Promise<void> {
+    if (this.#looking) {
+      this.#again = true;
+      return;
+    }
+    this.#looking = true;
+    do {
+      this.#again = false;
+      try {
+        this.#mark(await this.#saving(true));
+      } catch (error) {
+        this.#mark([]);
+        this.#save.disabled = true;
+        this.#save.title = (error as Error).message;
+      }
+    } while (this.#again);
+    this.#looking = false;
+  }
+
+  async #saving(isTry: boolean): Promise<Unsaved[]> {
+    const answer = await this.#robot.link.call("/console/save", { names: [], dry_run: isTry }, SAVING);
+    if (!isMessage(answer) || answer.success !== true) throw new Error(isMessage(answer) ? String(answer.message) : "no answer");
+    const { answer: told } = answer;
+    if (isMessage(told ?? null) && !isTry) this.#places = (told as Message).places;
+    return isMessage(told ?? null) && Array.isArray((told as Message).saved) ? ((told as Message).saved as unknown as Unsaved[]) : [];
+  }
+
+  #places: Json | undefined;
+
+  #mark(unsaved: Unsaved[]): void {
+    const old = new Map(unsaved.map((one) => [`/${one.component}:${one.name}`, one.old]));
+    for (const [key, row] of this.#rows) row.mark(old.get(key));
+    this.#save.disabled = unsaved.length === 0;
+    this.#save.title = unsaved.length === 0 ? "Everything is as in the manifest" : "Write what has changed into the manifest";
+    this.#save.replaceChildren(icon("check"), unsaved.length === 0 ? "Saved" : `Save ${unsaved.length}`);
+  }
+
+  async #keep(): Promise<void> {
+    this.#save.disabled = true;
+    setText(this.#says, "Saving\u2026");
+    try {
+      await Promise.all([...this.#rows.values()].map((row) => row.settled));
+      const saved = await this.#saving(false);
+      const places = Array.isArray(this.#places) ? this.#places.map(String) : [];
+      setText(this.#says, saved.map(({ component, name }, at) => `${component} ${name}: ${places[at] ?? "saved"}`).join(", "));
+      this.#says.dataset.kind = "good";
+    } catch (error) {
+      setText(this.#says, (error as Error).message);
+      this.#says.dataset.kind = "bad";
+    }
+    void this.#look();
+  }
+}
+
+/** A parameter with its control. */
+class Row {
+  readonly element: HTMLElement;
+  readonly setting: Setting;
+  readonly #control: Control;
+  readonly #note = h("p", { class: "says", role: "status" });
+  readonly #mark = h("span", { class: "parameter-mark" });
+  readonly #default = h("button", { type: "button", hidden: "" }, "As in the manifest");
+  #sender: Sender | null = null;
+  #value: Value;
+
+  constructor(setting: Setting, value: Value, changed: (before: Value, after: Value) => void) {
+    this.setting = setting;
+    this.#value = value;
+    this.#control = controlOf(setting, value, (next) => {
+      if ("why" in next) this.#say(next.why, "bad");
+      else if (next.value !== this.#value) changed(this.#value, next.value);
+    });
+    const label = h("label", { for: this.#control.id }, formatName(setting.name.replaceAll(".", " ")));
+    const title = h("div", {}, label, this.#mark);
+    const about = h("p", { class: "label" }, setting.about);
+    this.element = h("div", { class: "parameter" }, title, this.#control.element, about, this.#default, this.#note);
+    this.#default.onclick = () => {
+      if (this.#inManifest !== null) changed(this.#value, this.#inManifest);
+    };
+  }
+
+  #inManifest: Value | null = null;
+
+  get settled(): Promise<void> {
+    return this.#sender?.settled ?? Promise.resolve();
+  }
+
+  get isSending(): boolean {
+    return this.#sender?.isBusy ?? false;
+  }
+
+  send(value: Value, tell: (value: Value) => Promise<void>): void {
+    this.#sender ??= new Sender(async (next) => {
+      const before = this.#value;
+      try {
+        this.#value = next;
+        await tell(next);
+        this.#say("", "");
+      } catch (error) {
+        this.#value = before;
+        this.#control.show(before);
+        this.#say((error as Error).message, "bad");
+      }
+    }, PAUSE);
+    this.#control.show(value);
+    this.#sender.put(value);
+  }
+
+  /** Shows a value that the robot has now, unless a newer one of this page is on its way. */
+  arrived(value: Value): void {
+    if (this.isSending) return;
+    this.#value = value;
+    this.#control.show(value);
+  }
+
+  /** Marks it as not being as in the manifest, which has `old` [SI]. */
+  mark(old: Json | undefined): void {
+    const value = typeof old === "number" ? tidy(old / this.setting.scale) : old;
+    this.#inManifest = typeof value === "boolean" || typeof value === "string" || typeof value === "number" ? value : null;
+    const differs = this.#inManifest !== null;
+    setText(this.#mark, differs ? ` not saved; the manifest has ${String(this.#inManifest)} ${this.setting.unit}`.trimEnd() : "");
+    this.#default.hidden = !differs;
+    this.element.classList.toggle("changed", differs);
+  }
+
+  #say(text: string, kind: string): void {
+    this.#note.dataset.kind = kind;
+    setText(this.#note, text);
+  }
+}
+
+interface Control {
+  id: string;
+  element: HTMLElement;
+  show(value: Value): void;
+}
+
+function controlOf(setting: Setting, value: Value, changed: (next: { value: Value } | { why: string }) => void): Control {
+  const id = `parameter${setting.node}-${setting.name}`.replaceAll(/[^\w-]/g, "-");
+  if (typeof value === "boolean") {
+    const box = h("input", { id, type: "checkbox" });
+    box.onchange = () => changed({ value: box.checked });
+    const show = (next: Value) => (box.checked = next === true);
+    show(value);
+    return { id, element: h("div", { class: "parameter-control" }, box), show };
+  }
+  if (setting.choices.length > 0) {
+    const list = h("select", { id }, ...setting.choices.map((choice) => h("option", { value: choice }, formatName(choice))));
+    list.onchange = () => changed({ value: list.value });
+    const show = (next: Value) => (list.value = String(next));
+    show(value);
+    return { id, element: h("div", { class: "parameter-control" }, list), show };
+  }
+  const input = h("input", { id, type: "text", autocomplete: "off", inputmode: typeof value === "number" ? "decimal" : "text" });
+  input.onchange = () => changed(parsed(setting, input.value));
+  const parts: Node[] = [h("span", { class: "number" }, input, h("span", { class: "unit" }, setting.unit))];
+  const slide = typeof value === "number" ? slideOf(setting, value) : null;
+  let slider: HTMLInputElement | null = null;
+  if (slide) {
+    const ends = { min: String(slide.least), max: String(slide.most), step: String(slide.step) };
+    slider = h("input", { type: "range", "aria-label": `${formatName(setting.name)}, slider`, ...ends });
+    const moved = slider;
+    slider.oninput = () => {
+      input.value = moved.value;
+      changed({ value: Number(moved.value) });
+    };
+    const limits = `${setting.least ?? ""} to ${setting.most ?? ""}`.trim();
+    if (setting.least !== null && setting.most !== null) slider.title = `${limits} ${setting.unit}`;
+    parts.unshift(slider);
+  }
+  const show = (next: Value) => {
+    if (document.activeElement !== input) input.value = typeof next === "number" ? String(Number(next.toPrecision(6))) : String(next);
+    if (slider && document.activeElement !== slider) slider.value = String(next);
+    if (slider) slider.style.setProperty("--share", String((Number(next) - slide!.least) / (slide!.most - slide!.least)));
+  };
+  show(value);
+  return { id, element: h("div", { class: "parameter-control" }, ...parts), show };
+}

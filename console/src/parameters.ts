@@ -1,0 +1,158 @@
+/** Parameters as their page shows them, from what a node says by the services of ROS 2. */
+import { isMessage, type Json, type Message } from "./rosbridge";
+
+export type Value = boolean | number | string;
+
+/** A parameter of a node; numbers are in the unit that is shown: `scale` times a number is what is sent. */
+export interface Setting {
+  node: string;
+  name: string;
+  about: string;
+  type: number;
+  unit: string;
+  scale: number;
+  least: number | null;
+  most: number | null;
+  step: number;
+  choices: string[];
+  constraints: string;
+  isReadOnly: boolean;
+}
+
+const [BOOL, INTEGER, DOUBLE, STRING] = [1, 2, 3, 4]; // rcl_interfaces/msg/ParameterType
+const FIELDS: Record<number, string> = {
+  [BOOL!]: "bool_value",
+  [INTEGER!]: "integer_value",
+  [DOUBLE!]: "double_value",
+  [STRING!]: "string_value",
+};
+const HUGE = 2 ** 53;
+
+/** Returns a setting of its descriptor, or null if its type has no control. */
+export function settingOf(node: string, descriptor: Json): Setting | null {
+  if (!isMessage(descriptor) || typeof descriptor.type !== "number" || !(descriptor.type in FIELDS)) return null;
+  const [, about, written] = /^(.*?)\s*(?:\[([^\]]*)\])?$/s.exec(String(descriptor.description))!;
+  const { unit, scale } = shownUnit(written ?? "");
+  const constraints = String(descriptor.additional_constraints ?? "");
+  const ranges = [descriptor.floating_point_range, descriptor.integer_range].flatMap((all) => (Array.isArray(all) ? all : []));
+  const range = isMessage(ranges[0] ?? null) ? (ranges[0] as Message) : {};
+  const bound = (value: Json | undefined): number | null =>
+    typeof value === "number" && Math.abs(value) < HUGE ? (Math.abs(value) < 1e-300 ? 0 : value / scale) : null;
+  return {
+    node,
+    name: String(descriptor.name),
+    about: about!.replaceAll("`", ""),
+    type: descriptor.type,
+    unit,
+    scale,
+    least: bound(range.from_value),
+    most: bound(range.to_value),
+    step: typeof range.step === "number" ? range.step / scale : 0,
+    choices: /(?:^|, )one of (.+)$/.exec(constraints)?.[1]?.split(", ") ?? [],
+    constraints,
+    isReadOnly: descriptor.read_only === true,
+  };
+}
+
+/** Returns how numbers of a unit are shown: angles in degrees, shares in percent. */
+function shownUnit(unit: string): { unit: string; scale: number } {
+  if (unit === "0 to 1") return { unit: "%", scale: 0.01 };
+  if (/^rad\b/.test(unit)) return { unit: unit.replace("rad", "\u00b0").replace("^2", "\u00b2"), scale: Math.PI / 180 };
+  return { unit: unit.replace("^2", "\u00b2"), scale: 1 };
+}
+
+/** Returns the value of `rcl_interfaces/msg/ParameterValue` as it is shown, or null if it is not set. */
+export function valueOf(setting: Setting, message: Json): Value | null {
+  const field = FIELDS[setting.type];
+  if (!isMessage(message) || !field || message.type !== setting.type) return null;
+  const value = message[field];
+  if (typeof value === "number") return tidy(value / setting.scale);
+  return typeof value === "boolean" || typeof value === "string" ? value : null;
+}
+
+/** Returns a shown value as `rcl_interfaces/msg/Parameter`. */
+export function parameterOf(setting: Setting, value: Value): Message {
+  const sent = typeof value === "number" ? value * setting.scale : value;
+  return { name: setting.name, value: { type: setting.type, [FIELDS[setting.type]!]: setting.type === INTEGER ? Math.round(Number(sent)) : sent } };
+}
+
+/** Returns a typed text as a value, or why it is none. */
+export function parsed(setting: Setting, text: string): { value: Value } | { why: string } {
+  if (setting.type === STRING) return { value: text };
+  const value = Number(text.trim().replace(",", "."));
+  if (text.trim() === "" || !Number.isFinite(value)) return { why: "This is no number." };
+  if (setting.type === INTEGER && !Number.isInteger(value)) return { why: "This must be a whole number." };
+  if (setting.least !== null && value < setting.least) return { why: `At least ${tidy(setting.least)} ${setting.unit}`.trim() + "." };
+  if (setting.most !== null && value > setting.most) return { why: `At most ${tidy(setting.most)} ${setting.unit}`.trim() + "." };
+  return { value };
+}
+
+export interface Slide {
+  least: number;
+  most: number;
+  step: number;
+}
+
+/** Returns the ends of a slider, or null for what is no number; without a limit it reaches to twice a round value. */
+export function slideOf(setting: Setting, value: number): Slide | null {
+  if (setting.type !== INTEGER && setting.type !== DOUBLE) return null;
+  if (setting.least === null && setting.most === null) return null;
+  const least = setting.least ?? Math.min(0, -round(2 * Math.abs(value)));
+  const most = setting.most ?? Math.max(round(2 * value), least + 1);
+  const fine = setting.type === INTEGER ? 1 : 10 ** Math.floor(Math.log10((most - least) / 100));
+  return { least, most, step: setting.step || fine };
+}
+
+/** Returns the next of 1, 2, 5, 10, ... that is not smaller. */
+function round(value: number): number {
+  const power = 10 ** Math.floor(Math.log10(Math.max(value, 1e-6)));
+  return [1, 2, 5, 10].map((digit) => digit * power).find((one) => one >= value * (1 - 1e-9)) ?? value;
+}
+
+/** Returns a number without the rounding errors of scaling. */
+export function tidy(value: number): number {
+  return Number(value.toPrecision(12));
+}
+
+/**
+ * Sends values one after the other: while one is on its way, only the newest waits, and there is a pause between two.
+ * A slider makes hundreds of values in a second; the robot gets a few of them, and always the last.
+ */
+export class Sender {
+  readonly #send: (value: Value) => Promise<void>;
+  readonly #pause: number;
+  #waiting: { value: Value } | null = null;
+  #isBusy = false;
+  #running: Promise<void> = Promise.resolve();
+
+  constructor(send: (value: Value) => Promise<void>, pause: number) {
+    this.#send = send;
+    this.#pause = pause;
+  }
+
+  /** Whether what was put last has not arrived. */
+  get isBusy(): boolean {
+    return this.#isBusy;
+  }
+
+  /** Resolves when everything that was put has arrived or was refused. */
+  get settled(): Promise<void> {
+    return this.#running;
+  }
+
+  put(value: Value): void {
+    this.#waiting = { value };
+    if (!this.#isBusy) this.#running = this.#run();
+  }
+
+  async #run(): Promise<void> {
+    this.#isBusy = true;
+    while (this.#waiting) {
+      const { value } = this.#waiting;
+      this.#waiting = null;
+      await this.#send(value);
+      await new Promise((then) => setTimeout(then, this.#pause));
+    }
+    this.#isBusy = false;
+  }
+}
