@@ -51,6 +51,8 @@ class FakeGateway:
         """What a new subscriber of a topic gets at once."""
         self.repeated: dict[str, dict[str, Any]] = {}
         """What is published ten times a second, by topic; to be replaced as a whole."""
+        self.files: dict[str, bytes] = {}
+        """Further addresses, with what is there."""
         self._others: str | None = None
         self.is_away = False  # takes no connections
         self.subscribed: dict[ServerConnection, set[str]] = {}
@@ -134,6 +136,8 @@ class FakeGateway:
             return self._response(HTTPStatus.SERVICE_UNAVAILABLE, "text/plain", b"away") if self.is_away else None
         if path == "/console/config":
             return self._response(HTTPStatus.OK, "application/json", json.dumps(self.config).encode())
+        if path in self.files:
+            return self._response(HTTPStatus.OK, "application/xml", self.files[path])
         file = (self.static / (path.lstrip("/") or "index.html")).resolve()
         if not file.is_file() or not file.is_relative_to(self.static):
             return self._response(HTTPStatus.NOT_FOUND, "text/plain", b"not found")

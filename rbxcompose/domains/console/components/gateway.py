@@ -41,6 +41,7 @@ from rbxcompose.commands.guest import NAME, Guest
 from rbxcompose.commands.lookup import place_of
 from rbxcompose.domains.console.access import LOCAL_NAMES, Door, Role, network_names, own_secret, role_of, secret_path
 from rbxcompose.domains.console.lease import DriveLimits
+from rbxcompose.domains.console.models import served
 from rbxcompose.domains.console.protocol import (
     LARGEST,
     RELEASE,
@@ -65,6 +66,7 @@ from rbxcompose.domains.console.protocol import (
 )
 from rbxcompose.domains.console.streams import BOUNDARY, Streams, part
 from rbxcompose.domains.console.video import IMAGES, Wanted, WrongPictureError, list_page, viewer_page, wanted
+from rbxcompose.msgs.std_msgs import String
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.runtime.control import NoAnswerError, ask_as_data
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, all_folders
@@ -422,6 +424,7 @@ class GatewaySession:
         self._is_command: dict[str, bool] = dict.fromkeys((STOP["type"], RELEASE["type"]), True)
         self._is_command |= dict.fromkeys(("robot.RobotStatus", _DESCRIBE["type"]), False)
         self._saving = asyncio.Lock()
+        self._served = served("")
         self._watches: dict[str, asyncio.Task[None]] = {}  # by window
         guest.scheduler.on_error = lambda owner, error: self._loop.call_exception_handler(
             {"message": str(error), "exception": error}
@@ -508,7 +511,53 @@ class GatewaySession:
         page: BaseRoute = Mount("/", StaticFiles(directory=STATIC, html=True)) if is_built else Route("/", not_built)
         sockets = [WebSocketRoute(path, self._talk) for path in SOCKETS]
         own = [Route("/console/config", config), Route("/console/login", log_in, methods=["POST"])]
-        return Starlette(routes=[*sockets, *own, *self._video(), page])
+        return Starlette(routes=[*sockets, *own, *self._video(), *self._model(), page])
+
+    def _model(self) -> list[Any]:
+        """Return the addresses of the body and its meshes."""
+        from starlette.responses import FileResponse, PlainTextResponse
+        from starlette.responses import Response as Answer
+        from starlette.routing import Route
+
+        async def urdf(request: Request) -> Response:
+            if self._role(request) < Role.VIEW:
+                return PlainTextResponse("this needs a link with a token\n", 401)
+            if (text := await self._description()) is None:
+                return PlainTextResponse("this robot has no body\n", 404)
+            self._served = served(text)
+            return Answer(self._served.urdf, media_type="application/xml", headers={"cache-control": "no-store"})
+
+        async def mesh(request: Request) -> Response:
+            found = self._served.file(request.path_params["number"])
+            if self._role(request) < Role.VIEW or found is None:
+                return PlainTextResponse("there is no such mesh\n", 404)
+            path, kind = found
+            return FileResponse(path, media_type=kind)
+
+        return [Route("/console/model.urdf", urdf), Route("/console/meshes/{number:int}/{name}", mesh)]
+
+    async def _description(self) -> str | None:
+        """Return the URDF that the robot publishes; None if it publishes none."""
+        known = [topic for topic, type_ in self._graph.topics().items() if type_ == String.TYPE]
+        topic = next((topic for topic in known if topic.endswith("/robot_description")), None)
+        if topic is None:
+            return None
+        came: asyncio.Future[str] = self._loop.create_future()
+
+        def arrived(message: String) -> None:
+            if not came.done():
+                came.set_result(message.data)
+
+        end = self._bus.subscribe(
+            NAME, topic, String, Qos.LATCHED, arrived, max_rate=math.inf, limits=BULK, may_be_silent=True
+        )
+        self._pump()
+        try:
+            return await asyncio.wait_for(came, _PATIENCE)
+        except TimeoutError:
+            return None
+        finally:
+            self._withdraw(end)
 
     def _video(self) -> list[Any]:
         """Return the pages of pictures, at the addresses of web_video_server."""

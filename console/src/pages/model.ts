@@ -1,0 +1,439 @@
+/** Model: the robot in 3D, its joints by sliders, its links, and goals for arms by dragging their tips. */
+import { watchComponents, type Component } from "../description";
+import { emptyCard, h, icon, setText } from "../dom";
+import type { RobotScene, Pose, View } from "../elements/robot_scene";
+import { formatName } from "../format";
+import { armsOf, centred, moversOf, onWay, planOf, positionsOf, randomized, sliderOf, thingsOf, wayOf, type Arm, type JointSlider, type Mover, type Waypoint } from "../model";
+import type { Page, Robot } from "../page";
+import { Sender, tidy } from "../parameters";
+import { isMessage, type Goal, type Json, type Message } from "../rosbridge";
+import { quaternionOf } from "../forms";
+import "./model.css";
+
+const LOOK = 50; // [ms] between two positions of joints
+const PAUSE = 150; // [ms] between two goals of a slider
+const SOLVED = 1; // moveit_msgs/MoveItErrorCodes
+const FINISHED = 4; // action_msgs/GoalStatus
+
+export const page: Page = {
+  name: "model",
+  title: "Model",
+  order: 25,
+  open(host, robot) {
+    const box = h("div", {}, emptyCard("wait", "Loading the body\u2026"));
+    host.append(box);
+    let view: ModelView | null = null;
+    let isClosed = false;
+    void load(robot).then(
+      (made) => {
+        if (isClosed) {
+          made.close();
+          return;
+        }
+        view = made;
+        box.replaceChildren(made.element);
+      },
+      (error: Error) => box.replaceChildren(emptyCard("warning", error.message)),
+    );
+    return () => {
+      isClosed = true;
+      view?.close();
+    };
+  },
+};
+
+async function load(robot: Robot): Promise<ModelView> {
+  const response = await fetch("console/model.urdf");
+  if (response.status === 404) throw new Error("This robot has no body. It is described by `body:` in its manifest.");
+  if (!response.ok) throw new Error(`The body cannot be loaded (${response.status}).`);
+  const urdf = await response.text();
+  const { RobotScene } = await import("../elements/robot_scene");
+  return new ModelView(robot, new RobotScene(), urdf);
+}
+
+class ModelView {
+  readonly element = h("div", { class: "model" });
+  readonly #robot: Robot;
+  readonly #scene: RobotScene;
+  readonly #sliders: JointSlider[];
+  readonly #rows = new Map<string, JointRow>();
+  readonly #moves = h("input", { id: "moves", type: "checkbox" });
+  readonly #says = h("p", { class: "says", role: "status" });
+  readonly #missing = h("p", { class: "label", role: "status" });
+  readonly #arms = h("div", { class: "model-arms" });
+  readonly #closers: (() => void)[] = [];
+  #movers: Mover[] = [];
+  #described = "";
+  #wanted: Record<string, number> = {};
+  #dragged: ArmGoal | null = null;
+
+  constructor(robot: Robot, scene: RobotScene, urdf: string) {
+    this.#robot = robot;
+    this.#scene = scene;
+    this.#sliders = scene.load(urdf, () => this.#showMissing()).map(sliderOf);
+    const stage = h("section", { class: "card stage", "aria-label": "The robot in 3D" }, scene.element, this.#views(), this.#missing);
+    this.element.append(stage, h("div", { class: "model-side" }, this.#arms, this.#joints(), this.#links()));
+    this.#closers.push(
+      watchComponents(robot.link, (components) => this.#learn(components)),
+      robot.link.subscribe("/joint_states", (state) => this.#moved(state), { type: "sensor_msgs/msg/JointState", throttle: LOOK }),
+      robot.link.subscribe("/scene", (message) => scene.setThings(thingsOf(message)), { type: "rbxcompose_msgs/msg/SceneObjects" }),
+    );
+    this.#showMissing();
+  }
+
+  close(): void {
+    this.#dragged?.close();
+    this.#closers.forEach((close) => close());
+    this.#scene.close();
+  }
+
+  #showMissing(): void {
+    const { missing, drawn } = this.#scene;
+    this.#scene.element.dataset.drawn = String(drawn);
+    setText(this.#missing, missing.length > 0 ? `Not shown, since they cannot be read: ${missing.map((path) => decodeURIComponent(path.split("/").pop()!)).join(", ")}` : "");
+  }
+
+  #views(): HTMLElement {
+    const button = (text: string, press: () => void, label = text) => {
+      const made = h("button", { type: "button", "aria-label": label }, text);
+      made.onclick = press;
+      return made;
+    };
+    const views = (["Corner", "Front", "Side", "Top"] as View[]).map((view) => button(view, () => this.#scene.look(view)));
+    const zooms = [button("+", () => this.#scene.zoom(1.25), "Closer"), button("\u2212", () => this.#scene.zoom(0.8), "Further away")];
+    return h("div", { class: "row views" }, ...views, ...zooms);
+  }
+
+  #learn(components: Component[]): void {
+    const described = JSON.stringify(components);
+    if (described === this.#described || components.length === 0) return;
+    this.#described = described;
+    this.#movers = moversOf(components);
+    this.#moves.disabled = this.#movers.length === 0;
+    const arms = armsOf(components).map((arm) => this.#armCard(arm));
+    this.#arms.replaceChildren(...arms);
+  }
+
+  #moved(state: Message): void {
+    const positions = positionsOf(state);
+    this.#scene.setJoints(positions);
+    for (const [name, row] of this.#rows) row.measured(positions[name]);
+    this.#scene.element.dataset.joints = JSON.stringify(positions);
+  }
+
+  // Joints
+
+  #joints(): HTMLElement {
+    if (this.#sliders.length === 0) return h("section", { class: "card" }, h("h2", {}, "Joints"), h("p", { class: "label" }, "No joint of this body can be moved."));
+    const rows = this.#sliders.map((slider) => {
+      const row = new JointRow(slider, (value) => this.#want({ [slider.name]: value }), (value) => this.#send(slider.name, value));
+      this.#rows.set(slider.name, row);
+      return row.element;
+    });
+    const button = (text: string, positions: () => Record<string, number>) => {
+      const made = h("button", { type: "button" }, text);
+      made.onclick = () => this.#want(positions());
+      return made;
+    };
+    const hide = h("button", { type: "button" }, "Hide the ghost");
+    hide.onclick = () => this.#forget();
+    this.#moves.onchange = () => this.#forget();
+    const moves = h("div", { class: "field check" }, this.#moves, h("label", { for: "moves" }, "Move the joints of the robot"));
+    const buttons = h("div", { class: "row" }, button("Centre", () => centred(this.#sliders)), button("Randomize", () => randomized(this.#sliders)), hide);
+    return h("section", { class: "card", "aria-label": "Joints" }, h("h2", {}, "Joints"), moves, buttons, this.#says, ...rows);
+  }
+
+  /** Shows wanted positions [rad, m]: by the ghost, or if joints are moved, by the robot itself. */
+  #want(positions: Record<string, number>): void {
+    for (const [name, value] of Object.entries(positions)) this.#rows.get(name)?.want(value);
+    if (this.#moves.checked) {
+      for (const [name, value] of Object.entries(positions)) this.#rows.get(name)?.sender.put(value);
+      return;
+    }
+    this.#wanted = { ...this.#wanted, ...positions };
+    this.#ghost(this.#wanted);
+  }
+
+  #ghost(positions: Record<string, number> | null): void {
+    this.#scene.setGhost(positions);
+    this.#scene.element.dataset.ghost = positions ? JSON.stringify(positions) : "";
+  }
+
+  #forget(): void {
+    this.#wanted = {};
+    this.#ghost(null);
+    for (const row of this.#rows.values()) row.follow();
+    setText(this.#says, "");
+  }
+
+  async #send(name: string, value: number): Promise<void> {
+    const mover = this.#movers.find(({ names }) => names.has(name));
+    if (!mover) {
+      setText(this.#says, `Nothing of the robot moves ${formatName(name).toLowerCase()} by a goal.`);
+      return;
+    }
+    const goal = { joints: [mover.names.get(name)!], positions: [value] };
+    this.#robot.link.act(mover.action, mover.type, goal).done.then(
+      ({ status, values }) => setText(this.#says, status === FINISHED || status === 5 ? "" : reason(values)),
+      (error: Error) => setText(this.#says, error.message),
+    );
+  }
+
+  // Links
+
+  #links(): HTMLElement {
+    const all = h("input", { id: "all-axes", type: "checkbox" });
+    const boxes: HTMLInputElement[] = [];
+    const seen = new Set(this.#scene.links);
+    const rows = this.#scene.frames.map((name) => {
+      const axes = h("input", { type: "checkbox", "aria-label": `Axes of ${name}` });
+      axes.onchange = () => this.#scene.setAxes(name, axes.checked);
+      boxes.push(axes);
+      const alpha = h("input", { type: "range", min: "0", max: "100", step: "5", value: "100", "aria-label": `Opacity of ${name}` });
+      alpha.style.setProperty("--share", "1");
+      alpha.oninput = () => {
+        alpha.style.setProperty("--share", String(Number(alpha.value) / 100));
+        this.#scene.setAlpha(name, Number(alpha.value) / 100);
+      };
+      return h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, axes), h("td", {}, ...(seen.has(name) ? [alpha] : [])));
+    });
+    all.onchange = () => {
+      for (const box of boxes) {
+        box.checked = all.checked;
+        box.dispatchEvent(new Event("change"));
+      }
+    };
+    const head = h("thead", {}, h("tr", {}, ...["Link", "Axes", "Opacity"].map((title) => h("th", { scope: "col" }, title))));
+    const check = h("div", { class: "field check" }, all, h("label", { for: "all-axes" }, "All axes: x red, y green, z blue"));
+    const table = h("div", { class: "wide" }, h("table", {}, head, h("tbody", {}, ...rows)));
+    return h("details", { class: "card links" }, h("summary", {}, `Links (${rows.length})`), check, table);
+  }
+
+  // Arms
+
+  #armCard(arm: Arm): HTMLElement {
+    const card = h("section", { class: "card", "aria-label": formatName(arm.name) }, h("h2", {}, formatName(arm.name)));
+    const goal = new ArmGoal(this.#robot, this.#scene, arm, (positions) => this.#ghost(positions));
+    const start = h("button", { type: "button" }, "Drag its tip");
+    start.onclick = () => {
+      if (this.#dragged === goal) {
+        goal.close();
+        this.#dragged = null;
+      } else {
+        this.#dragged?.close();
+        this.#dragged = goal;
+        this.#forget();
+        void goal.open();
+      }
+      setText(start, this.#dragged === goal ? "Let go of its tip" : "Drag its tip");
+    };
+    card.append(start, goal.element);
+    return card;
+  }
+}
+
+/** A goal for an arm: dragged, planned and shown as a ghost, then executed. */
+class ArmGoal {
+  readonly element = h("div", { class: "arm-goal", hidden: "" });
+  readonly #robot: Robot;
+  readonly #scene: RobotScene;
+  readonly #arm: Arm;
+  readonly #ghost: (positions: Record<string, number> | null) => void;
+  readonly #says = h("p", { class: "says", role: "status" });
+  readonly #execute = h("button", { type: "button" }, icon("play"), "Execute");
+  readonly #cancel = h("button", { type: "button" }, icon("cross"), "Cancel");
+  readonly #poses: HTMLInputElement[];
+  #plan: Json = null;
+  #way: Waypoint[] = [];
+  #frame = 0;
+  #running: Goal | null = null;
+  #turn = 0;
+
+  constructor(robot: Robot, scene: RobotScene, arm: Arm, ghost: (positions: Record<string, number> | null) => void) {
+    [this.#robot, this.#scene, this.#arm, this.#ghost] = [robot, scene, arm, ghost];
+    const modes = (["translate", "rotate"] as const).map((mode) => {
+      const button = h("button", { type: "button" }, mode === "translate" ? "Move" : "Turn");
+      button.onclick = () => scene.setHandleMode(mode);
+      return button;
+    });
+    this.#execute.onclick = () => void this.#go();
+    this.#cancel.onclick = () => this.#running?.cancel();
+    this.#execute.disabled = this.#cancel.disabled = true;
+    const fields = ["x", "y", "z", "roll", "pitch", "yaw"].map((name, at) => {
+      const input = h("input", { id: `tip-${arm.name}-${name}`, inputmode: "decimal", autocomplete: "off" });
+      const unit = at < 3 ? "cm" : "\u00b0";
+      return { input, element: h("div", { class: "field" }, h("label", { for: input.id }, `${formatName(name)} `, h("span", { class: "label" }, unit)), input) };
+    });
+    this.#poses = fields.map(({ input }) => input);
+    const plan = h("button", {}, "Plan");
+    const form = h("form", { class: "tip-form" }, ...fields.map(({ element }) => element), plan);
+    form.onsubmit = (event) => {
+      event.preventDefault();
+      const values = this.#poses.map((input, at) => Number(input.value.replace(",", ".")) * (at < 3 ? 0.01 : Math.PI / 180));
+      if (values.some((value) => !Number.isFinite(value))) return this.#say("Each of the six must be a number.", "bad");
+      const [x, y, z, roll, pitch, yaw] = values as [number, number, number, number, number, number];
+      const pose = { x, y, z, roll, pitch, yaw };
+      scene.setHandle(pose);
+      void this.#planTo(pose);
+    };
+    const words = h("p", { class: "label" }, "Drag the arrows at the tip, or write where it is to be. The plan is shown as a ghost.");
+    this.element.append(h("div", { class: "row" }, ...modes, this.#execute, this.#cancel), words, this.#says, form);
+  }
+
+  async open(): Promise<void> {
+    this.element.hidden = false;
+    this.#scene.onDrag = (pose) => {
+      this.#write(pose);
+      void this.#planTo(pose);
+    };
+    try {
+      const where = await this.#robot.link.call(this.#arm.locate);
+      if (!isMessage(where) || where.success !== true) throw new Error(isMessage(where) ? String(where.message) : "The tip cannot be located.");
+      const pose = where as unknown as Pose;
+      this.#write(pose);
+      this.#scene.setHandle(pose);
+    } catch (error) {
+      this.#say((error as Error).message, "bad");
+    }
+  }
+
+  close(): void {
+    this.element.hidden = true;
+    this.#turn += 1;
+    this.#stopShowing();
+    this.#scene.setHandle(null);
+    this.#scene.onDrag = () => undefined;
+    this.#say("", "");
+  }
+
+  #write(pose: Pose): void {
+    const values = [pose.x * 100, pose.y * 100, pose.z * 100, ...[pose.roll, pose.pitch, pose.yaw].map((angle) => (angle * 180) / Math.PI)];
+    this.#poses.forEach((input, at) => (input.value = String(tidy(Number(values[at]!.toFixed(1))))));
+  }
+
+  /** Plans a way to a pose of the tip: joints that reach it, then a way to them that hits nothing. */
+  async #planTo(pose: Pose): Promise<void> {
+    const turn = (this.#turn += 1);
+    this.#stopShowing();
+    this.#say("Planning\u2026", "");
+    try {
+      const { x, y, z, roll, pitch, yaw } = pose;
+      const pose_stamped = { pose: { position: { x, y, z }, orientation: quaternionOf(roll, pitch, yaw) } };
+      const ik = { ik_request: { group_name: this.#arm.name, avoid_collisions: true, pose_stamped, timeout: { sec: 1, nanosec: 0 } } };
+      const solved = await this.#robot.link.call(this.#arm.inverse, ik, 10_000);
+      if (turn !== this.#turn) return;
+      const positions = isMessage(solved) && isMessage(solved.solution ?? null) ? positionsOf((solved.solution as Message).joint_state) : {};
+      if (codeOf(solved) !== SOLVED) return this.#say(`The tip cannot be there: ${reason(solved) || "it is out of reach, or something is in the way"}`, "bad");
+      this.#ghost(positions);
+      const { status, values } = await this.#robot.link.act(this.#arm.plan, "moveit_msgs/action/MoveGroup", planOf(positions)).done;
+      if (turn !== this.#turn) return;
+      this.#plan = isMessage(values) ? (values.planned_trajectory ?? null) : null;
+      this.#way = wayOf(this.#plan ?? undefined);
+      if (status !== FINISHED || this.#way.length === 0) return this.#say(`No way was found: ${reason(values)}`, "bad");
+      this.#execute.disabled = false;
+      this.#say(`A way of ${this.#way.at(-1)!.time.toFixed(1)}\u202fs. Execute moves the arm.`, "good");
+      this.#show();
+    } catch (error) {
+      if (turn === this.#turn) this.#say((error as Error).message, "bad");
+    }
+  }
+
+  /** Lets the ghost go the way, again and again; without motion for who wants none. */
+  #show(): void {
+    const end = this.#way.at(-1)!.time;
+    if (matchMedia("(prefers-reduced-motion: reduce)").matches) return this.#ghost(onWay(this.#way, end));
+    const began = performance.now();
+    const step = () => {
+      this.#ghost(onWay(this.#way, ((performance.now() - began) / 1000) % (end + 1)));
+      this.#frame = requestAnimationFrame(step);
+    };
+    step();
+  }
+
+  #stopShowing(): void {
+    cancelAnimationFrame(this.#frame);
+    this.#execute.disabled = true;
+    this.#ghost(null);
+  }
+
+  async #go(): Promise<void> {
+    const trajectory = this.#plan;
+    this.#stopShowing();
+    this.#cancel.disabled = false;
+    this.#say("Moving\u2026", "");
+    try {
+      this.#running = this.#robot.link.act(this.#arm.execute, "moveit_msgs/action/ExecuteTrajectory", { trajectory });
+      const { status, values } = await this.#running.done;
+      this.#say(status === FINISHED ? "It is there." : `It stopped: ${reason(values) || "canceled"}`, status === FINISHED ? "good" : "bad");
+    } catch (error) {
+      this.#say((error as Error).message, "bad");
+    } finally {
+      this.#running = null;
+      this.#cancel.disabled = true;
+    }
+  }
+
+  #say(text: string, kind: string): void {
+    this.#says.dataset.kind = kind;
+    setText(this.#says, text);
+  }
+}
+
+function codeOf(answer: Json): number {
+  const code = isMessage(answer) ? answer.error_code : null;
+  return isMessage(code ?? null) ? Number((code as Message).val) : 0;
+}
+
+/** Returns why something failed, of a text or of what has one. */
+function reason(answer: Json): string {
+  if (typeof answer === "string") return answer;
+  if (!isMessage(answer)) return "";
+  const code = answer.error_code ?? null;
+  return String((isMessage(code) ? code.message : undefined) ?? answer.message ?? "");
+}
+
+/** A joint with its slider: it follows the robot until it is moved. */
+class JointRow {
+  readonly element: HTMLElement;
+  readonly sender: Sender;
+  readonly #slider: JointSlider;
+  readonly #input: HTMLInputElement;
+  readonly #output = h("output", {}, "\u2013");
+  #isOwn = false;
+
+  constructor(slider: JointSlider, wanted: (value: number) => void, send: (value: number) => Promise<void>) {
+    this.#slider = slider;
+    const { name, least, most, step, unit } = slider;
+    this.sender = new Sender((value) => send(Number(value)), PAUSE);
+    this.#input = h("input", { id: `joint-${name}`, type: "range", min: String(least), max: String(most), step: String(step) });
+    this.#input.oninput = () => wanted(Number(this.#input.value) * slider.scale);
+    const limits = h("span", { class: "label" }, ` ${least} to ${most}\u202f${unit}`);
+    const label = h("label", { for: this.#input.id }, formatName(name.replace(/_joint$/, "")), limits);
+    this.element = h("div", { class: "slider" }, label, this.#output, this.#input);
+    this.#show(0);
+  }
+
+  /** Shows a wanted position [rad, m]. */
+  want(value: number): void {
+    this.#isOwn = true;
+    this.#show(value);
+  }
+
+  follow(): void {
+    this.#isOwn = false;
+  }
+
+  measured(value: number | undefined): void {
+    if (value === undefined || this.#isOwn) return;
+    this.#show(value);
+  }
+
+  #show(value: number): void {
+    const { scale, unit, least, most } = this.#slider;
+    const shown = value / scale;
+    this.#input.value = String(shown);
+    this.#input.style.setProperty("--share", String(Math.min(1, Math.max(0, (shown - least) / (most - least)))));
+    setText(this.#output, `${shown.toFixed(1)}\u202f${unit}`);
+    this.#input.setAttribute("aria-valuetext", `${shown.toFixed(1)} ${unit}`);
+  }
+}
