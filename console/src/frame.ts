@@ -76,7 +76,7 @@ export function showFrame(config: Config, link: Rosbridge): void {
 
 function route(host: HTMLElement, tabs: HTMLElement, robot: Robot): void {
   const pages = allPages.filter((page) => page.isFor?.(robot) ?? true);
-  const links = pages.map((page) => h("a", { href: `#${page.name}` }, page.title));
+  const links = pages.map((page) => h("a", { href: `./#${page.name}` }, page.title));
   tabs.append(...links);
   let close = () => undefined as void;
   const open = () => {

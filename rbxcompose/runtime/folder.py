@@ -113,6 +113,8 @@ class OffsetFilter:
 
 STATE, LOCK, SOCKET = "state.json", "lock", "control.sock"
 _BUS = "bus"
+FINDINGS = "findings.json"
+"""What `check` found when the robot came up, as `check --format json` writes it."""
 _VERSION = 1
 _PASSING = (STATE, SOCKET, LOCK)  # files removed when the robot is down; the log stays
 _LARGEST = 16_000_000  # [B] of a state
@@ -375,6 +377,10 @@ class RobotFolder:
         """Replace the state file atomically, whatever happens meanwhile."""
         replace_file(self.path / STATE, state.to_text().encode(), mode=0o600)
 
+    def write_findings(self, text: str) -> None:
+        """Keep what `check` found."""
+        replace_file(self.path / FINDINGS, text.encode(), mode=0o600)
+
     def sweep(self) -> None:
         """Remove what a killed run has left: temporary files, outputs, its socket. Needs the lock."""
         for path in self._leftovers():
@@ -393,3 +399,4 @@ class RobotFolder:
         yield from self.path.glob("*.out")
         yield from self.sockets.glob("*")
         yield self.path / SOCKET
+        yield self.path / FINDINGS

@@ -26,21 +26,31 @@ from rbxcompose.tools.robot_changes import LiveReload
 _LOOK = 0.05  # [s] between checks of the log
 
 
-def run_plan(plan: Plan, options: RunOptions, rules: LiveRules | None = None, reload: LiveReload | None = None) -> int:
+def run_plan(
+    plan: Plan,
+    options: RunOptions,
+    rules: LiveRules | None = None,
+    reload: LiveReload | None = None,
+    findings: str = "[]",
+) -> int:
     """Run a robot to its end, or if detached until it is up, and return the exit code.
 
-    Its live settings keep `rules`. Meanwhile, `reload` follows its files.
+    Its live settings keep `rules`. Meanwhile, `reload` follows its files. `findings` of `check` [JSON] are kept for its
+    page.
     """
     plan = plan.in_one_process() if options.is_stepped else plan
     started = launch.start_supervisor(plan, options, rules)
-    return _Watch(plan, options, started, reload).run()
+    return _Watch(plan, options, started, reload, findings).run()
 
 
 class _Watch:
     """Watches one run from its first report to its last."""
 
-    def __init__(self, plan: Plan, options: RunOptions, started: launch.Started, reload: LiveReload | None) -> None:
+    def __init__(
+        self, plan: Plan, options: RunOptions, started: launch.Started, reload: LiveReload | None, findings: str
+    ) -> None:
         self._plan, self._options, self._started, self._reload = plan, options, started, reload
+        self._findings = findings
         self._is_up = False
         self._story = StoryWriter([instance.name for instance in plan.instances], colour=has_colour(sys.stdout))
         self._log: Follower | None = None  # None until the log of this run has begun
@@ -84,7 +94,9 @@ class _Watch:
         name = self._plan.robot
         match report:
             case launch.Begun():
-                self._log = Follower(RobotFolder.of(name).path / NAME)
+                folder = RobotFolder.of(name)
+                folder.write_findings(self._findings)
+                self._log = Follower(folder.path / NAME)
                 return None
             case launch.Up(components, processes, seconds):
                 self._is_up = True

@@ -20,7 +20,7 @@ export const card: Card = {
       row("Turn", "twist.twist.angular.z", "rad/s", drives?.max_turn_rate),
     ];
     body.append(h("dl", { class: "values value-group" }, ...rows.map(({ element }) => element)));
-    if (robot.config.drive) body.append(h("a", { class: "button", href: "#drive" }, icon("wheel"), "Drive it"));
+    if (robot.config.drive) body.append(h("a", { class: "button", href: "./#drive" }, icon("wheel"), "Drive it"));
     if (!odometry) return () => undefined;
     return robot.link.subscribe(
       odometry.topic,

@@ -51,6 +51,7 @@ _ROLES = {
 _SERVICES = {
     "/console/stop": Role.VIEW,  # whoever sees that something goes wrong
     "/console/ask": Role.VIEW,  # the request decides
+    "/console/log": Role.VIEW,
     "/console/save": Role.CONFIGURE,
     "/rosapi/set_param": Role.CONFIGURE,
     "/rosapi/delete_param": Role.CONFIGURE,

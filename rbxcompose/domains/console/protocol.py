@@ -167,6 +167,14 @@ class Save:
 
 
 @dataclass(frozen=True, slots=True)
+class ReadLog:
+    """Read the robot's log behind a place, and pass it to `Bridge.robot_answered`."""
+
+    number: int
+    after: int
+
+
+@dataclass(frozen=True, slots=True)
 class Watch:
     """Repeat a query of the robot every `period` [s], in place of an earlier period; pass answers to `Bridge.seen`."""
 
@@ -196,6 +204,7 @@ BusRequest = (
     | CancelGoal
     | AskRobot
     | Save
+    | ReadLog
     | Watch
     | Unwatch
 )
@@ -1013,6 +1022,12 @@ class Bridge:
             raise WrongMessageError("'type' is the name of a request, such as 'mission.ListMissions'")
         self._requests.append(AskRobot(number, given, client.role, client.who))
 
+    def _log_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
+        after = given.get("after", 0)
+        if not isinstance(after, int) or isinstance(after, bool):
+            raise WrongMessageError("'after' is a whole number: that of the last answer")
+        self._requests.append(ReadLog(number, after))
+
     def _save_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
         names = given.get("names", [])
         if not isinstance(names, list) or not all(isinstance(one, str) and _SETTING.fullmatch(one) for one in names):
@@ -1156,6 +1171,7 @@ _ANSWERED = frozenset({"call_service", "send_action_goal"})  # operations whose 
 _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str, Any] | None]] = {
     "/console/ask": Bridge._ask_service,
     "/console/drive": Bridge._drive_service,
+    "/console/log": Bridge._log_service,
     "/console/release": Bridge._release_service,
     "/console/save": Bridge._save_service,
     "/console/stop": Bridge._stop_service,

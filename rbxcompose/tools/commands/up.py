@@ -11,6 +11,7 @@ from pathlib import Path
 from rbxcompose.base.units import TIME, UnitError, to_si
 from rbxcompose.commands import targets
 from rbxcompose.commands.console import FINDINGS, misused, refuse, write_report
+from rbxcompose.commands.formats.json_ import render_json
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.recording.codes import UNWRITABLE
@@ -72,7 +73,8 @@ def run(arguments: argparse.Namespace) -> int:
     reload = None
     if arguments.watch:
         reload = LiveReload(lambda: targets.compiled(path, arguments), compilation, options.layers)
-    return run_plan(compilation.plan, options, LiveRules(compilation.robot), reload)
+    findings = render_json(compilation.report, compilation.sources)
+    return run_plan(compilation.plan, options, LiveRules(compilation.robot), reload, findings)
 
 
 def _options(arguments: argparse.Namespace) -> RunOptions:

@@ -41,6 +41,7 @@ from rbxcompose.commands.guest import NAME, Guest
 from rbxcompose.commands.lookup import place_of
 from rbxcompose.domains.console.access import LOCAL_NAMES, Door, Role, network_names, own_secret, role_of, secret_path
 from rbxcompose.domains.console.lease import DriveLimits
+from rbxcompose.domains.console.log_tail import findings, tail
 from rbxcompose.domains.console.models import served
 from rbxcompose.domains.console.protocol import (
     LARGEST,
@@ -53,6 +54,7 @@ from rbxcompose.domains.console.protocol import (
     BusRequest,
     CancelGoal,
     Publish,
+    ReadLog,
     Save,
     SendGoal,
     Serve,
@@ -69,7 +71,8 @@ from rbxcompose.domains.console.video import IMAGES, Wanted, WrongPictureError, 
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.runtime.control import NoAnswerError, ask_as_data
-from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, all_folders
+from rbxcompose.runtime.folder import FINDINGS, BrokenStateError, RobotFolder, all_folders
+from rbxcompose.runtime.log import NAME as LOG
 from rbxcompose.runtime.process_group.group import stop_key
 from rbxcompose.sdk import Capability, Component, NeedsExtra, Qos, Setting, TaskStatus, component
 from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal
@@ -784,6 +787,8 @@ class GatewaySession:
                 self._goals[number].cancel()
             case AskRobot():
                 self._begin(self._ask_robot(request))
+            case ReadLog():
+                self._begin(self._read_log(request))
             case Save():
                 self._begin(self._save(request))
             case Watch():
@@ -867,6 +872,13 @@ class GatewaySession:
             if names := ", ".join(sorted(name.decode() for name in stopped)):
                 answer, refusal = f"the supervisor does not answer: stopped over the bus: {names}", ""
         self._bridge.robot_answered(request.number, answer, refusal)
+        self._pump()
+
+    async def _read_log(self, request: ReadLog) -> None:
+        answer = await asyncio.to_thread(tail, self._folder.path / LOG, request.after)
+        if request.after == 0:
+            answer["findings"] = findings(self._folder.path / FINDINGS)
+        self._bridge.robot_answered(request.number, answer)
         self._pump()
 
     async def _save(self, request: Save) -> None:

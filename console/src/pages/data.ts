@@ -1,0 +1,337 @@
+/** Data: topics with their types and rates, what they carry, plots of numbers, and publishing. */
+import type uPlot from "uplot";
+import { columns, numberAt, Rate, Series, writable, type Path } from "../data";
+import { emptyCard, h, icon, setText } from "../dom";
+import type { Page, Robot } from "../page";
+import { isMessage, type Json, type Message } from "../rosbridge";
+import "uplot/dist/uPlot.min.css";
+import "./data.css";
+
+const LIST = 3_000; // [ms] between two looks for topics
+const DRAW = 200; // [ms]
+const MOST_ITEMS = 50; // of a list
+const PLOTS = 6; // lines at once
+const COLOURS = ["#1a7fd0", "#d0651a", "#2a9a4a", "#a83ab0", "#b0162a", "#6a6f00"];
+
+export const page: Page = {
+  name: "data",
+  title: "Data",
+  order: 80,
+  open(host, robot) {
+    const view = new TopicsView(robot);
+    host.append(view.element);
+    return () => view.close();
+  },
+};
+
+class TopicsView {
+  readonly element = h("div", { class: "data" });
+  readonly #robot: Robot;
+  readonly #filter = h("input", { type: "search", "aria-label": "Find a topic", placeholder: "Find a topic" });
+  readonly #list = h("ul", { class: "topics" });
+  readonly #empty = emptyCard("wait", "Asking for the topics\u2026");
+  readonly #topic = h("div", { class: "data-topic" }, emptyCard("dot", "Choose a topic to see what it carries."));
+  readonly #plot: Plot;
+  readonly #timers: ReturnType<typeof setInterval>[];
+  readonly #unwatch: () => void;
+  #topics = new Map<string, string>();
+  #chosen: TopicView | null = null;
+
+  constructor(robot: Robot) {
+    this.#robot = robot;
+    this.#plot = new Plot(robot);
+    this.#filter.oninput = () => this.#show();
+    const side = h("section", { class: "card", "aria-label": "Topics" }, this.#filter, this.#empty, this.#list);
+    this.element.append(side, h("div", { class: "data-side" }, this.#plot.element, this.#topic));
+    this.#timers = [setInterval(() => void this.#ask(), LIST), setInterval(() => this.#tick(), DRAW)];
+    this.#unwatch = robot.link.state.watch(() => void this.#ask());
+  }
+
+  close(): void {
+    this.#timers.forEach((timer) => clearInterval(timer));
+    this.#unwatch();
+    this.#chosen?.close();
+    this.#plot.close();
+  }
+
+  #tick(): void {
+    this.#chosen?.refresh();
+    this.#plot.draw();
+  }
+
+  async #ask(): Promise<void> {
+    if (this.#robot.link.state.value.is !== "open") return;
+    try {
+      const answer = await this.#robot.link.call("/rosapi/topics");
+      const [topics, types] = isMessage(answer) ? [answer.topics, answer.types] : [];
+      if (!Array.isArray(topics) || !Array.isArray(types)) return;
+      const found = new Map(topics.map((topic, at) => [String(topic), String(types[at])]));
+      const isSame = found.size === this.#topics.size && [...found].every(([topic, type]) => this.#topics.get(topic) === type);
+      this.#topics = found;
+      this.#empty.hidden = found.size > 0;
+      if (found.size === 0) setText(this.#empty.querySelector("p")!, "Nothing publishes or listens.");
+      if (!isSame) this.#show();
+    } catch (error) {
+      setText(this.#empty.querySelector("p")!, (error as Error).message);
+    }
+  }
+
+  #show(): void {
+    const wanted = this.#filter.value.trim().toLowerCase();
+    const rows = [...this.#topics].sort().filter(([topic, type]) => `${topic} ${type}`.toLowerCase().includes(wanted));
+    this.#list.replaceChildren(
+      ...rows.map(([topic, type]) => {
+        const button = h("button", { type: "button", class: "line" }, h("span", {}, topic), h("small", {}, type));
+        button.setAttribute("aria-pressed", String(this.#chosen?.topic === topic));
+        button.onclick = () => this.#choose(topic, type);
+        return h("li", {}, button);
+      }),
+    );
+  }
+
+  #choose(topic: string, type: string): void {
+    this.#chosen?.close();
+    this.#chosen = new TopicView(this.#robot, topic, type, (path) => this.#plot.toggle(topic, type, path));
+    this.#topic.replaceChildren(this.#chosen.element);
+    this.#show();
+    if (matchMedia("(max-width: 47rem)").matches) this.#topic.scrollIntoView({ block: "start" });
+  }
+}
+
+/** One topic: its rate, its newest message, and a form that publishes on it. */
+class TopicView {
+  readonly element: HTMLElement;
+  readonly topic: string;
+  readonly #type: string;
+  readonly #robot: Robot;
+  readonly #plot: (path: Path) => void;
+  readonly #rate = new Rate();
+  readonly #shownRate = h("span", { class: "label", role: "status" });
+  readonly #tree = h("div", { class: "echo" }, h("p", { class: "label" }, "No message has come yet."));
+  readonly #text = h("textarea", { id: "publish", rows: "6", spellcheck: "false" });
+  readonly #says = h("p", { class: "says", role: "status" });
+  readonly #open = new Set<string>();
+  readonly #close: () => void;
+  #message: Message | null = null;
+  #isShown = true;
+  #isWritten = false;
+  #paused = false;
+  #timer: ReturnType<typeof setInterval> | undefined;
+
+  constructor(robot: Robot, topic: string, type: string, plot: (path: Path) => void) {
+    [this.#robot, this.topic, this.#type, this.#plot] = [robot, topic, type, plot];
+    const pause = h("button", { type: "button" }, icon("pause"), "Pause");
+    pause.onclick = () => {
+      this.#paused = !this.#paused;
+      pause.replaceChildren(icon(this.#paused ? "play" : "pause"), this.#paused ? "Go on" : "Pause");
+    };
+    this.#text.value = "{}";
+    this.#text.oninput = () => (this.#isWritten = true);
+    const head = h("div", { class: "data-head" }, h("div", {}, h("h2", {}, topic), h("p", { class: "label" }, type), this.#shownRate), pause);
+    const echo = h("section", { class: "card", "aria-label": `Messages of ${topic}` }, head, this.#tree);
+    this.element = h("div", { class: "data-topic" }, echo, this.#publisher());
+    this.#close = robot.link.subscribe(topic, (message) => this.#arrived(message), { type });
+  }
+
+  close(): void {
+    this.#close();
+    clearInterval(this.#timer);
+  }
+
+  refresh(): void {
+    const rate = this.#rate.at(performance.now());
+    setText(this.#shownRate, rate === null ? "" : `${rate < 100 ? Number(rate.toPrecision(3)) : Math.round(rate)} messages a second`);
+    const selection = document.getSelection();
+    const isCopying = selection !== null && !selection.isCollapsed && this.#tree.contains(selection.anchorNode);
+    if (this.#isShown || this.#paused || !this.#message || isCopying) return;
+    this.#isShown = true;
+    const focused = document.activeElement instanceof HTMLElement && this.#tree.contains(document.activeElement) ? document.activeElement.dataset.path : undefined;
+    this.#tree.replaceChildren(this.#branch(this.#message, []));
+    if (focused !== undefined) this.#tree.querySelector<HTMLElement>(`[data-path="${CSS.escape(focused)}"]`)?.focus();
+    if (!this.#isWritten) this.#text.value = writable(this.#message);
+  }
+
+  #arrived(message: Message): void {
+    this.#rate.count(performance.now());
+    if (this.#paused) return;
+    this.#message = message;
+    this.#isShown = false;
+  }
+
+  #branch(value: Json, path: Path): HTMLElement {
+    const entries: [string, Json][] = Array.isArray(value) ? value.slice(0, MOST_ITEMS).map((item, at) => [String(at), item]) : Object.entries(value as Message);
+    const rows = entries.map(([key, inner]) => this.#leaf(key, inner, [...path, key]));
+    if (Array.isArray(value) && value.length > MOST_ITEMS) rows.push(h("li", { class: "label" }, `and ${value.length - MOST_ITEMS} more`));
+    return h("ul", {}, ...rows);
+  }
+
+  #leaf(key: string, value: Json, path: Path): HTMLElement {
+    if (typeof value === "object" && value !== null) {
+      const size = Array.isArray(value) ? value.length : Object.keys(value).length;
+      if (size === 0) return h("li", {}, h("span", { class: "label" }, `${key}: `), "empty");
+      const name = path.join("/");
+      const isOpen = this.#open.has(name) || (path.length < 3 && !Array.isArray(value) && !this.#open.has(`-${name}`));
+      const summary = h("summary", { "data-path": name }, `${key}${Array.isArray(value) ? ` (${size})` : ""}`);
+      const box = h("details", {}, summary);
+      box.open = isOpen;
+      if (isOpen) box.append(this.#branch(value, path));
+      box.ontoggle = () => {
+        this.#open.delete(box.open ? `-${name}` : name);
+        this.#open.add(box.open ? name : `-${name}`);
+        if (box.open && box.childElementCount === 1) box.append(this.#branch(value, path));
+      };
+      return h("li", {}, box);
+    }
+    const label = h("span", { class: "label" }, `${key}: `);
+    if (typeof value !== "number" && typeof value !== "boolean") {
+      return h("li", {}, label, value === null ? "not a number" : String(value) || "(empty)");
+    }
+    const button = h("button", { type: "button", class: "number-value", title: "Plot it", "data-path": path.join("/") }, String(value));
+    button.setAttribute("aria-label", `${path.join(" ")} ${String(value)}, plot`);
+    button.onclick = () => this.#plot(path);
+    return h("li", {}, label, button);
+  }
+
+  #publisher(): HTMLElement {
+    const rate = h("input", { id: "publish-rate", inputmode: "decimal", value: "10", autocomplete: "off" });
+    const once = h("button", {}, icon("skip"), "Publish once");
+    const again = h("button", { type: "button" }, icon("play"), "Publish again and again");
+    const stop = () => {
+      clearInterval(this.#timer);
+      this.#timer = undefined;
+      again.replaceChildren(icon("play"), "Publish again and again");
+    };
+    again.onclick = () => {
+      if (this.#timer !== undefined) return stop();
+      const hertz = Number(rate.value.replace(",", "."));
+      if (!(hertz > 0 && hertz <= 50)) return this.#say("The rate is a number up to 50 Hz.", "bad");
+      if (!this.#send()) return;
+      this.#timer = setInterval(() => this.#send() || stop(), 1000 / hertz);
+      again.replaceChildren(icon("pause"), "Stop publishing");
+    };
+    const form = h(
+      "form",
+      { class: "card publish", "aria-label": "Publish" },
+      h("label", { for: "publish" }, `A message for ${this.topic}, as JSON; what is left out is zero`),
+      this.#text,
+      h("div", { class: "row" }, once, again, h("div", { class: "field rate" }, h("label", { for: rate.id }, "Hz"), rate)),
+      this.#says,
+    );
+    form.onsubmit = (event) => {
+      event.preventDefault();
+      this.#send();
+    };
+    return h("details", {}, h("summary", {}, "Publish"), form);
+  }
+
+  /** Publishes what is written; returns whether that was possible. */
+  #send(): boolean {
+    let message: Json;
+    try {
+      message = JSON.parse(this.#text.value || "{}") as Json;
+    } catch (error) {
+      this.#say(`This is no JSON: ${(error as Error).message}`, "bad");
+      return false;
+    }
+    if (!isMessage(message)) {
+      this.#say("A message is written {...}.", "bad");
+      return false;
+    }
+    this.#robot.link.onStatus = ({ level, msg }) => level === "error" && this.#say(msg, "bad");
+    const isSent = this.#robot.link.publish(this.topic, message, { type: this.#type, id: "data" });
+    this.#say(isSent ? "Published." : "Not connected.", isSent ? "good" : "bad");
+    return isSent;
+  }
+
+  #say(text: string, kind: string): void {
+    this.#says.dataset.kind = kind;
+    setText(this.#says, text);
+  }
+}
+
+interface PlotLine {
+  name: string;
+  series: Series;
+  colour: string;
+  close: () => void;
+}
+
+/** Numbers over the last minute. */
+class Plot {
+  readonly element = h("section", { class: "card plot", "aria-label": "Plot", hidden: "" });
+  readonly #robot: Robot;
+  readonly #legend = h("ul", { class: "plot-legend" });
+  readonly #host = h("div", { class: "plot-host" });
+  readonly #lines = new Map<string, PlotLine>();
+  #chart: uPlot | null = null;
+  #library: typeof uPlot | null = null;
+
+  constructor(robot: Robot) {
+    this.#robot = robot;
+    this.element.append(this.#host, this.#legend);
+  }
+
+  close(): void {
+    for (const { close } of this.#lines.values()) close();
+    this.#chart?.destroy();
+  }
+
+  /** Plots a number of a topic, or no longer. */
+  toggle(topic: string, type: string, path: Path): void {
+    const name = `${topic} ${path.join(" ")}`;
+    const old = this.#lines.get(name);
+    if (old) {
+      old.close();
+      this.#lines.delete(name);
+    } else if (this.#lines.size >= PLOTS) {
+      this.#robot.notify(`A plot has ${PLOTS} lines at most: press one below it to remove it.`);
+      return;
+    } else {
+      const series = new Series();
+      const taken = new Set([...this.#lines.values()].map(({ colour }) => colour));
+      const colour = COLOURS.find((one) => !taken.has(one))!;
+      const close = this.#robot.link.subscribe(topic, (message) => series.add(performance.now(), numberAt(message, path)), { type });
+      this.#lines.set(name, { name, series, colour, close });
+    }
+    void this.#rebuild();
+  }
+
+  async #rebuild(): Promise<void> {
+    this.element.hidden = this.#lines.size === 0;
+    this.#legend.replaceChildren(
+      ...[...this.#lines.values()].map(({ name, colour, close }) => {
+        const button = h("button", { type: "button", "aria-label": `Remove ${name}` }, h("i", {}), name, icon("cross"));
+        button.style.setProperty("--colour", colour);
+        button.onclick = () => {
+          close();
+          this.#lines.delete(name);
+          void this.#rebuild();
+        };
+        return h("li", {}, button);
+      }),
+    );
+    if (this.#lines.size === 0) return;
+    this.#library ??= (await import("uplot")).default;
+    this.#chart?.destroy();
+    const style = getComputedStyle(document.documentElement);
+    const axis = { stroke: style.getPropertyValue("--faint"), grid: { stroke: style.getPropertyValue("--edge") }, ticks: { stroke: style.getPropertyValue("--edge") } };
+    const options: uPlot.Options = {
+      width: this.#host.clientWidth || 300,
+      height: 220,
+      legend: { show: false },
+      scales: { x: { time: false, range: [-60, 0] } },
+      axes: [{ ...axis, values: (_, ticks) => ticks.map((tick) => `${tick} s`) }, { ...axis, size: 60 }],
+      series: [{}, ...[...this.#lines.values()].map(({ name, colour }) => ({ label: name, stroke: colour, width: 2, spanGaps: false }))],
+    };
+    this.#chart = new this.#library(options, [[]], this.#host);
+    this.draw();
+  }
+
+  draw(): void {
+    if (!this.#chart || this.element.hidden) return;
+    const width = this.#host.clientWidth;
+    if (width > 0 && width !== this.#chart.width) this.#chart.setSize({ width, height: 220 });
+    this.#chart.setData(columns([...this.#lines.values()].map(({ series }) => series), performance.now()) as uPlot.AlignedData);
+    this.#host.dataset.points = String(this.#chart.data[0].length);
+  }
+}

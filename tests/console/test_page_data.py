@@ -1,0 +1,201 @@
+"""The pages of data, muxes and the log in a real browser."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from rbxcompose.base.requests import Refused
+from tests.console.browser import CHROMIUM
+from tests.console.fake_gateway import FakeGateway
+from tests.console.looks import PHONE, overflows, too_small, violations
+from tests.console.test_page_robot import DESCRIBED, component
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
+
+TOPICS = {"/scan": "sensor_msgs/msg/LaserScan", "/pose": "geometry_msgs/msg/Pose2D"}
+POSE = {"x": 1.5, "y": None, "name": "", "flags": [True, False]}
+LOOK_AT = "mux/LookAtMux/component/cmd_vel"
+
+
+def has_topics(gateway: FakeGateway) -> None:
+    gateway.answers["/rosapi/topics"] = lambda _: {"topics": list(TOPICS), "types": list(TOPICS.values())}
+    gateway.latched["/pose"] = POSE
+
+
+def test_a_topic_shows_its_messages_and_a_number_is_plotted(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    has_topics(gateway)
+    page = open_page(page_name="data")
+    page.get_by_label("Find a topic").fill("pos")
+    expect(page.get_by_role("button", name="/scan")).to_be_hidden()
+    page.get_by_role("button", name="/pose").click()
+    messages = page.get_by_label("Messages of /pose")
+    expect(messages).to_contain_text("y: not a number")
+    expect(messages).to_contain_text("name: (empty)")
+    messages.get_by_text("flags (2)").click()
+    expect(messages.get_by_role("button", name="flags 0 true, plot")).to_be_visible()
+    messages.get_by_role("button", name="x 1.5, plot").click()
+    expect(page.get_by_role("button", name="Remove /pose x")).to_be_visible()
+    for x in (2.0, 3.0):
+        gateway.say("/pose", POSE | {"x": x})
+    page.wait_for_function("Number(document.querySelector('.plot-host').dataset.points) >= 2")
+    expect(messages.get_by_role("button", name="x 3, plot")).to_be_visible()
+    assert violations(page) == []
+    messages.get_by_role("button", name="Pause").click()
+    gateway.say("/pose", POSE | {"x": 4.0})
+    page.get_by_role("button", name="Remove /pose x").click()
+    expect(page.get_by_label("Plot", exact=True)).to_be_hidden()
+    expect(messages.get_by_role("button", name="x 3, plot")).to_be_visible()
+
+
+def test_a_message_is_published_and_what_is_wrong_is_said(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+    has_topics(gateway)
+    page = open_page(page_name="data")
+    page.get_by_role("button", name="/pose").click()
+    page.get_by_text("Publish", exact=True).click()
+    text = page.get_by_label("A message for /pose")
+    expect(text).to_have_value(json.dumps(POSE, indent=2))
+    text.fill("{x: 1}")
+    page.get_by_role("button", name="Publish once").click()
+    expect(page.get_by_text("This is no JSON")).to_be_visible()
+    text.fill('{"x": 7}')
+    page.get_by_role("button", name="Publish once").click()
+    expect(page.get_by_text("Published.")).to_be_visible()
+    (published,) = [frame for _, frame in gateway.frames if frame["op"] == "publish"]
+    assert (published["topic"], published["msg"], published["type"]) == ("/pose", {"x": 7}, TOPICS["/pose"])
+    page.get_by_label("Hz").fill("1000")
+    page.get_by_role("button", name="Publish again and again").click()
+    expect(page.get_by_text("a number up to 50 Hz")).to_be_visible()
+
+
+def an_input(name: str, priority: int, state: str, **more: Any) -> dict[str, Any]:
+    plain = {"topic": f"/cmd_vel/{name}", "why": "", "until": None, "silent_for": 0.1}
+    return {"name": name, "priority": priority, "state": state, **plain, **more}
+
+
+def a_mux(holder: str, mode: str = "priority", **states: str) -> dict[str, Any]:
+    inputs = [an_input(name, 100 - 10 * turn, state) for turn, (name, state) in enumerate(states.items())]
+    about = {"output": "/cmd_vel", "mode": mode, "why": f"{holder} holds", "selected": holder}
+    return {"name": "cmd_vel", "holder": holder, "inputs": inputs, "locks": [], **about}
+
+
+def has_mux(gateway: FakeGateway) -> None:
+    gateway.windows[DESCRIBED] = [component("cmd_vel", "mux", requests={"mux.LookAtMux": False})]
+    gateway.windows[LOOK_AT] = a_mux("navigation", teleop="silent", navigation="holds")
+
+
+def test_it_is_seen_who_commands_and_an_input_is_locked(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+    has_mux(gateway)
+
+    def lock(request: dict[str, Any]) -> str:
+        gateway.show(LOOK_AT, a_mux("teleop", teleop="holds", navigation="locked"))
+        return f"locked {request['inputs'][0]}"
+
+    gateway.answers["mux.LockMuxInputs"] = lock
+    page = open_page(page_name="mux")
+    mux = page.get_by_label("cmd_vel", exact=True)
+    expect(mux.get_by_role("status")).to_have_text("Navigation commands")
+    expect(mux.get_by_role("row", name="teleop")).to_contain_text("Silent")
+    mux.get_by_role("button", name="Lock navigation").click()
+    expect(page.get_by_text("locked navigation")).to_be_visible()
+    expect(mux.get_by_role("status")).to_have_text("Teleop commands")
+    expect(mux.get_by_role("button", name="Unlock navigation")).to_be_visible()
+    assert violations(page) == []
+
+
+def test_an_input_is_selected_where_inputs_are(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+    has_mux(gateway)
+    gateway.windows[LOOK_AT] = a_mux("a", mode="select", a="holds", b="waits")
+
+    def refuse(_: dict[str, Any]) -> str:
+        raise Refused("b must rest first")
+
+    gateway.answers["mux.SelectMuxInput"] = refuse
+    page = open_page(page_name="mux")
+    expect(page.get_by_role("button", name="Select a", exact=True)).to_be_disabled()
+    page.get_by_role("button", name="Select b").click()
+    expect(page.get_by_text("b must rest first")).to_be_visible()
+    assert gateway.asked("mux.SelectMuxInput") == [{"component": "cmd_vel", "type": "mux.SelectMuxInput", "input": "b"}]
+
+
+class Log:
+    """A log that grows."""
+
+    def __init__(self, gateway: FakeGateway) -> None:
+        self.records: list[dict[str, Any]] = []
+        self.findings: list[dict[str, Any]] = []
+        gateway.answers["/console/log"] = self.answer
+        self.add("info", "mission", "go_to corner_1")
+        self.add("warning", "battery", "Low battery", detail="at 12 V")
+
+    def add(self, level: str, source: str, text: str, **more: str) -> None:
+        self.records.append({"time": 1.0 + len(self.records), "level": level, "source": source, "text": text, **more})
+
+    def answer(self, request: dict[str, Any]) -> dict[str, Any]:
+        answer: dict[str, Any] = {"records": self.records[request["after"] :], "after": len(self.records)}
+        if request["after"] == 0:
+            answer["findings"] = self.findings
+        return {"success": True, "message": "", "answer": answer}
+
+
+def test_the_log_grows_and_is_filtered(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+    log = Log(gateway)
+    page = open_page(page_name="log")
+    lines = page.get_by_role("listitem")
+    expect(lines).to_have_count(2)
+    expect(lines.first).to_contain_text("Warning")
+    log.add("error", "base", "no odometry")
+    expect(lines.first).to_contain_text("no odometry")
+    page.get_by_label("Level").select_option("Warnings and errors")
+    expect(lines).to_have_count(2)
+    page.get_by_label("Component").select_option("battery")
+    expect(lines).to_have_count(1)
+    page.get_by_text("Details").click()
+    expect(page.get_by_text("at 12 V")).to_be_visible()
+    page.get_by_label("Find in the log").fill("corner")
+    expect(lines).to_have_count(0)
+    with page.expect_download() as download:
+        page.get_by_label("Find in the log").fill("")
+        page.get_by_role("button", name="Download").click()
+    assert download.value.suggested_filename == "turtlebot.log"
+    assert violations(page) == []
+
+
+def test_what_check_found_stands_above_the_log(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+    place = {"file": "robot.yaml", "line": 7, "column": 3}
+    said = {"code": "RBX3141", "severity": "warning", "message": "joystick below navigation", "help": "raise it"}
+    Log(gateway).findings = [{**place, **said}]
+    page = open_page(page_name="log")
+    page.get_by_text("1 finding of check").click()
+    expect(page.get_by_label("Findings of check")).to_contain_text("robot.yaml:7:3 RBX3141")
+    assert violations(page) == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("name", ["data", "mux", "log"])
+def test_they_fit_a_phone(open_page: Callable[..., Page], gateway: FakeGateway, name: str, scheme: str) -> None:
+    has_topics(gateway)
+    has_mux(gateway)
+    Log(gateway)
+    page = open_page(page_name=name, viewport=PHONE, color_scheme=scheme, has_touch=True)
+    ready = {"data": "/pose", "mux": "Lock all", "log": "Pause"}[name]
+    page.get_by_role("button", name=ready).first.click()
+    page.wait_for_load_state()
+    assert not overflows(page)
+    assert too_small(page) == []
+    assert violations(page) == []
+
+
+def test_what_is_not_there_is_said(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+    gateway.windows[DESCRIBED] = [component("base", "diff_drive_sim")]
+    gateway.answers["/rosapi/topics"] = lambda _: {"topics": [], "types": []}
+    page = open_page(page_name="mux")
+    expect(page.get_by_text("This robot has no mux.")).to_be_visible()
+    page.get_by_role("link", name="Data").click()
+    expect(page.get_by_text("Nothing publishes or listens.")).to_be_visible()
