@@ -228,8 +228,8 @@ class ServesPage(Capability):
 
     port: Setting[int]
     """TCP port."""
-    is_lan: Setting[bool] = Setting(False)
-    """Whether other machines may open it, with a token."""
+    listen: Setting[str] = Setting("local")
+    """Who may open it: `local`, or `lan` also for other machines, with a token."""
     commands: Setting[str] = Setting("")
     """The topic on which people drive by it, by its full name; empty if they cannot."""
     fleet: Setting[Mapping[str, str]] = Setting(MappingProxyType({}))

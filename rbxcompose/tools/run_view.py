@@ -105,7 +105,7 @@ class _Watch:
                 if not self._options.is_stepped:
                     for instance in self._plan.instances:
                         for page in declared(instance.type, instance.config, ServesPage):
-                            show_link(name, page.port.value, is_lan=page.is_lan.value)
+                            show_link(name, page.port.value, is_lan=page.listen.value == "lan")
                 if self._options.is_detached:
                     self._started.let_go()
                     return 0

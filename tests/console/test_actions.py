@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.domains.console.protocol import Answer, CancelGoal, SendGoal, Serve, ServiceCall, Unserve
+from rbxcompose.domains.console.protocol import CancelGoal, SendGoal, Serve, ServiceAnswer, ServiceCall, Unserve
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.rcl_interfaces import (
     GetParameters,
@@ -162,11 +162,11 @@ def test_a_client_serves_and_fails_what_it_leaves_open() -> None:
     assert (first["op"], first["args"]) == ("call_service", {"data": True})
     client.does("service_response", service="bell", id=first["id"], values={"message": "ding"}, result=True)
     client.does("service_response", service="bell", id=second["id"], values="broken", result=False)
-    assert room.asked() == [Answer(1, SetBool.Response(message="ding")), Answer(2, None, "broken")]
+    assert room.asked() == [ServiceAnswer(1, SetBool.Response(message="ding")), ServiceAnswer(2, None, "broken")]
     (status,) = client.does("service_response", service="bell", id=first["id"], values={})
     assert "no open request" in status["msg"]
     client.leaves()
-    assert room.asked() == [Answer(3, None, "the client that served it has left"), Unserve("/bell")]
+    assert room.asked() == [ServiceAnswer(3, None, "the client that served it has left"), Unserve("/bell")]
     assert third["id"] == "request:3"
 
 

@@ -10,14 +10,14 @@ import pytest
 
 from rbxcompose.domains.console import streams as module
 from rbxcompose.domains.console.streams import Streams
-from rbxcompose.domains.console.video import Wanted, WrongPictureError
+from rbxcompose.domains.console.video import Picture, WrongPictureError
 from rbxcompose.msgs.sensor_msgs import Image
 
 TOPIC = "/camera"
 
 
-def want(width: int = 0, topic: str = TOPIC) -> Wanted:
-    return Wanted(topic, "jpeg", width, 0, 95, is_inverted=False)
+def want(width: int = 0, topic: str = TOPIC) -> Picture:
+    return Picture(topic, "jpeg", width, 0, 95, is_inverted=False)
 
 
 def image(value: int) -> Image:
@@ -35,7 +35,7 @@ class Camera:
         monkeypatch.setattr(module, "encoded", self.encode)
         monkeypatch.setattr(asyncio, "to_thread", self.to_thread)
 
-    def encode(self, message: Image, want: Wanted) -> bytes:
+    def encode(self, message: Image, want: Picture) -> bytes:
         value = bytes(message.data)[0]
         if value == 255:
             raise WrongPictureError("broken")
@@ -48,13 +48,7 @@ class Camera:
 
     def subscribe(self, topic: str, message: object, then: Callable[[Any], None]) -> Any:
         self.listeners.append(then)
-        camera = self
-
-        class End:
-            def close(self) -> None:
-                camera.listeners.remove(then)
-
-        return End()
+        return lambda: self.listeners.remove(then)
 
     async def shows(self, *values: int) -> None:
         for value in values:

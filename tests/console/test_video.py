@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image as Pictures
 
-from rbxcompose.domains.console.video import Wanted, WrongPictureError, encoded, pixels, wanted
+from rbxcompose.domains.console.video import Picture, WrongPictureError, encoded, pixels, wanted
 from rbxcompose.msgs.sensor_msgs import CompressedImage, Image
 
 RED = (200, 30, 10)
@@ -29,16 +29,16 @@ def opened(data: bytes) -> Pictures.Image:
 @pytest.mark.parametrize(
     ("query", "want"),
     [
-        ({"topic": "/camera"}, Wanted("/camera", "jpeg", 0, 0, 95, is_inverted=False)),
+        ({"topic": "/camera"}, Picture("/camera", "jpeg", 0, 0, 95, is_inverted=False)),
         (
             {"topic": "camera", "type": "png", "width": "320.4", "quality": "9", "invert": ""},
-            Wanted("/camera", "png", 320, 0, 9, is_inverted=True),
+            Picture("/camera", "png", 320, 0, 9, is_inverted=True),
         ),
-        ({"topic": "a", "type": "ros_compressed", "quality": "50"}, Wanted("/a", "jpeg", 0, 0, 50, is_inverted=False)),
+        ({"topic": "a", "type": "ros_compressed", "quality": "50"}, Picture("/a", "jpeg", 0, 0, 50, is_inverted=False)),
     ],
     ids=["plain", "png", "compressed"],
 )
-def test_an_address_says_what_is_wanted(query: dict[str, str], want: Wanted) -> None:
+def test_an_address_says_what_is_wanted(query: dict[str, str], want: Picture) -> None:
     assert wanted(query) == want
 
 
@@ -97,13 +97,13 @@ def test_what_is_no_picture_is_refused(message: Image) -> None:
 
 def test_a_picture_has_the_size_that_is_wanted_and_keeps_its_shape() -> None:
     message = image("rgb8", bytes(RED) * 200, 20, 10)
-    picture = opened(encoded(message, Wanted("/a", "png", 10, 0, 3, is_inverted=False)))
+    picture = opened(encoded(message, Picture("/a", "png", 10, 0, 3, is_inverted=False)))
     assert (picture.size, picture.getpixel((5, 2))) == ((10, 5), RED)
 
 
 def test_a_picture_may_be_turned() -> None:
     message = image("mono8", bytes((10, 200)))
-    picture = opened(encoded(message, Wanted("/a", "png", 0, 0, 3, is_inverted=True)))
+    picture = opened(encoded(message, Picture("/a", "png", 0, 0, 3, is_inverted=True)))
     assert list(picture.tobytes()) == [200, 10]
 
 
@@ -111,7 +111,7 @@ def test_what_is_compressed_already_is_passed_on() -> None:
     written = BytesIO()
     Pictures.new("RGB", (4, 2), RED).save(written, "JPEG")
     message = CompressedImage(format="rgb8; jpeg compressed bgr8", data=written.getvalue())
-    assert encoded(message, Wanted("/a", "jpeg", 0, 0, 95, is_inverted=False)) == written.getvalue()
-    assert opened(encoded(message, Wanted("/a", "jpeg", 2, 0, 95, is_inverted=False))).size == (2, 1)
+    assert encoded(message, Picture("/a", "jpeg", 0, 0, 95, is_inverted=False)) == written.getvalue()
+    assert opened(encoded(message, Picture("/a", "jpeg", 2, 0, 95, is_inverted=False))).size == (2, 1)
     with pytest.raises(WrongPictureError):
-        encoded(CompressedImage(format="jpeg", data=b"x"), Wanted("/a", "png", 0, 0, 3, is_inverted=False))
+        encoded(CompressedImage(format="jpeg", data=b"x"), Picture("/a", "png", 0, 0, 3, is_inverted=False))

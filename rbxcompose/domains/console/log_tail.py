@@ -4,10 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from rbxcompose.base.levels import Level
-from rbxcompose.runtime.log import Record
-
 MOST = 500  # records at once
+_LEVELS = {"OK": "info", "WARN": "warning"}  # others are errors
 _MOST_BYTES = 256 * 1024  # that are read of a log, from its end
 
 
@@ -42,10 +40,11 @@ def findings(path: Path) -> list[Any]:
 
 
 def _shown(line: bytes) -> dict[str, Any] | None:
+    """Return a record, as `runtime.log` writes it; None for a line that a full disk has torn."""
     try:
-        record = Record.from_json(line.decode())
-    except ValueError:
-        return None  # torn by a full disk
-    level = {Level.OK: "info", Level.WARN: "warning"}.get(record.level, "error")
-    fields = {"time": record.time, "level": level, "source": record.source, "text": record.text}
-    return fields | ({"detail": record.detail} if record.detail else {})
+        fields = json.loads(line)
+        level = _LEVELS.get(fields["level"], "error")
+        shown = {"time": float(fields["t"]), "level": level, "source": fields["source"], "text": fields["text"]}
+    except (ValueError, KeyError, TypeError):
+        return None
+    return shown | ({"detail": fields["detail"]} if fields.get("detail") else {})

@@ -120,8 +120,8 @@ class Unserve:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
-    """Answer a request; without a response, by why there is none."""
+class ServiceAnswer:
+    """ServiceAnswer a request; without a response, by why there is none."""
 
     number: int
     response: Message | None
@@ -158,7 +158,7 @@ class AskRobot:
 
 
 @dataclass(frozen=True, slots=True)
-class Save:
+class SaveSettings:
     """Write parameters into the manifest, or with `is_trial` only find what would be; pass that to `robot_answered`."""
 
     number: int
@@ -167,7 +167,7 @@ class Save:
 
 
 @dataclass(frozen=True, slots=True)
-class ReadLog:
+class TailLog:
     """Read the robot's log behind a place, and pass it to `Bridge.robot_answered`."""
 
     number: int
@@ -199,12 +199,12 @@ BusRequest = (
     | ServiceCall
     | Serve
     | Unserve
-    | Answer
+    | ServiceAnswer
     | SendGoal
     | CancelGoal
     | AskRobot
-    | Save
-    | ReadLog
+    | SaveSettings
+    | TailLog
     | Watch
     | Unwatch
 )
@@ -801,15 +801,15 @@ class Bridge:
         if served is None or served.client != client.number or number not in served.open:
             raise BadFrameError(f"there is no open request to '{service}' of this id")
         if data.get("result") is False:
-            self._requests.append(Answer(number, None, _short(data.get("values")) or "it was refused"))
+            self._requests.append(ServiceAnswer(number, None, _short(data.get("values")) or "it was refused"))
         else:
             response = from_json(served.type.Response, data.get("values") or {}, self._stamp)
-            self._requests.append(Answer(number, response))
+            self._requests.append(ServiceAnswer(number, response))
         served.open.discard(number)
 
     def _end_serving(self, service: str) -> None:
         served = self._served.pop(service)
-        self._requests += (Answer(number, None, "the client that served it has left") for number in served.open)
+        self._requests += (ServiceAnswer(number, None, "the client that served it has left") for number in served.open)
         self._requests.append(Unserve(service))
 
     # Parameters, by the names that rosapi has for them: `/battery:runtime`, or `/battery/runtime` as in ROS 1
@@ -1026,13 +1026,13 @@ class Bridge:
         after = given.get("after", 0)
         if not isinstance(after, int) or isinstance(after, bool):
             raise WrongMessageError("'after' is a whole number: that of the last answer")
-        self._requests.append(ReadLog(number, after))
+        self._requests.append(TailLog(number, after))
 
     def _save_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
         names = given.get("names", [])
         if not isinstance(names, list) or not all(isinstance(one, str) and _SETTING.fullmatch(one) for one in names):
             raise WrongMessageError("'names' are components, or their parameters: 'battery', 'battery.runtime'")
-        self._requests.append(Save(number, tuple(names), given.get("dry_run") is True))
+        self._requests.append(SaveSettings(number, tuple(names), given.get("dry_run") is True))
 
     def _rosapi(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
         """Return the answer of `/rosapi/NAME`."""

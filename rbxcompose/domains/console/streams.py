@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
-from typing import Any, Protocol
+from typing import Any
 
-from rbxcompose.domains.console.video import IMAGES, Wanted, WrongPictureError, encoded
+from rbxcompose.domains.console.video import IMAGES, Picture, WrongPictureError, encoded
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.types import Message
 
@@ -15,18 +15,10 @@ FIRST = 10.0  # [s] for the first picture of a topic
 BOUNDARY = "boundarydonotcross"  # as web_video_server has it, which some viewers expect
 
 
-class Closable(Protocol):
-    """A subscription."""
-
-    def close(self) -> None:
-        """End it."""
-        ...
-
-
 class _Stream:
     """One picture of a topic, as some viewers want it."""
 
-    def __init__(self, want: Wanted) -> None:
+    def __init__(self, want: Picture) -> None:
         self.want = want
         self.viewers = 0
         self.frame: bytes = b""
@@ -58,14 +50,19 @@ class Streams:
     """All streams of a robot. Topics are subscribed to while somebody looks."""
 
     def __init__(
-        self, type_of: Callable[[str], str], subscribe: Callable[[str, type[Message], Callable[[Any], None]], Closable]
+        self,
+        type_of: Callable[[str], str],
+        subscribe: Callable[[str, type[Message], Callable[[Any], None]], Callable[[], None]],
     ) -> None:
-        """Use `type_of` for the type of a topic, empty if there is none, and `subscribe` to get its messages."""
-        self._type_of, self._subscribe = type_of, subscribe
-        self._streams: dict[Wanted, _Stream] = {}
-        self._topics: dict[str, Closable] = {}
+        """Use `type_of` for the type of a topic, empty if there is none.
 
-    async def frames(self, want: Wanted) -> AsyncIterator[bytes]:
+        `subscribe` gets its messages until what it returns is called.
+        """
+        self._type_of, self._subscribe = type_of, subscribe
+        self._streams: dict[Picture, _Stream] = {}
+        self._topics: dict[str, Callable[[], None]] = {}
+
+    async def frames(self, want: Picture) -> AsyncIterator[bytes]:
         """Yield pictures, the newest ones only, until the viewer leaves.
 
         Raises:
@@ -85,21 +82,26 @@ class Streams:
         finally:
             self._leave(stream)
 
-    async def snapshot(self, want: Wanted) -> bytes:
+    async def snapshot(self, want: Picture) -> bytes:
         """Return one picture.
 
         Raises:
             WrongPictureError: if there is none.
         """
         frames = self.frames(want)
+        first = asyncio.ensure_future(anext(frames))
         try:
-            return await asyncio.wait_for(anext(frames), FIRST)
-        except TimeoutError as error:
-            raise WrongPictureError(f"no picture came on '{want.topic}' in {FIRST:.0f} s") from error
+            await asyncio.wait({first}, timeout=FIRST)
+            if not first.done():
+                raise WrongPictureError(f"no picture came on '{want.topic}' in {FIRST:.0f} s")
+            return first.result()
         finally:
+            if not first.done():
+                first.cancel()
+                await asyncio.wait({first})
             await frames.aclose()  # type: ignore[attr-defined]
 
-    def _joined(self, want: Wanted) -> _Stream:
+    def _joined(self, want: Picture) -> _Stream:
         type_ = self._type_of(want.topic)
         if type_ not in IMAGES:
             what = f"its messages are '{type_}'" if type_ else "there is no such topic"
@@ -126,7 +128,7 @@ class Streams:
         del self._streams[stream.want]
         topic = stream.want.topic
         if not any(other.want.topic == topic for other in self._streams.values()):
-            self._topics.pop(topic).close()
+            self._topics.pop(topic)()
 
 
 def part(frame: bytes, mime: str) -> bytes:

@@ -29,7 +29,7 @@ class WrongPictureError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class Picture:
     """A picture as viewers want it; those that want the same share it. A size of 0 is that of the camera."""
 
     topic: str
@@ -47,7 +47,7 @@ class Wanted:
         return f"image/{self.form}"
 
 
-def wanted(query: Mapping[str, str]) -> Wanted:
+def wanted(query: Mapping[str, str]) -> Picture:
     """Return what the parameters of an address ask for.
 
     Raises:
@@ -59,7 +59,7 @@ def wanted(query: Mapping[str, str]) -> Wanted:
     written = query.get("type", "mjpeg")
     if (form := _FORMS.get(written)) is None:
         raise WrongPictureError(f"'type' is one of {', '.join(_FORMS)}, not '{written[:40]}'")
-    return Wanted(
+    return Picture(
         f"/{topic.lstrip('/')}",
         form,  # type: ignore[arg-type]
         _whole(query, "width", 0, LARGEST),
@@ -98,7 +98,7 @@ def list_page(topics: Iterable[str]) -> str:
     return f'<!doctype html><html lang="en"><title>Streams</title><h1>Streams</h1>{shown}'
 
 
-def encoded(message: Image | CompressedImage, want: Wanted) -> bytes:
+def encoded(message: Image | CompressedImage, want: Picture) -> bytes:
     """Return the picture of a message.
 
     Raises:

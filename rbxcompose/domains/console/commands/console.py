@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     name = folder.path.name
     for component in answer_of(folder, DescribeRobot()):
         for page in component.capabilities.get("ServesPage", ()):
-            show_link(name, page["port"], is_lan=page["is_lan"], role=Role[arguments.role.upper()])
+            show_link(name, page["port"], is_lan=page["listen"] == "lan", role=Role[arguments.role.upper()])
             return 0
     help_text = "add 'console: {}' to its manifest"
     raise NotDoneError(REFUSED.at(None, f"'{name}' has no console", help=help_text))

@@ -29,7 +29,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rbxcompose.base.clock import SteppedClock
 from rbxcompose.base.config import AngularSpeed, Config, Speed
-from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Refused
 from rbxcompose.bus.graph import Graph, GraphName
@@ -48,18 +47,18 @@ from rbxcompose.domains.console.protocol import (
     RELEASE,
     STOP,
     Advertise,
-    Answer,
     AskRobot,
     Bridge,
     BusRequest,
     CancelGoal,
     Publish,
-    ReadLog,
-    Save,
+    SaveSettings,
     SendGoal,
     Serve,
+    ServiceAnswer,
     ServiceCall,
     Subscribe,
+    TailLog,
     Unadvertise,
     Unserve,
     Unsubscribe,
@@ -67,7 +66,7 @@ from rbxcompose.domains.console.protocol import (
     Watch,
 )
 from rbxcompose.domains.console.streams import BOUNDARY, Streams, part
-from rbxcompose.domains.console.video import IMAGES, Wanted, WrongPictureError, list_page, viewer_page, wanted
+from rbxcompose.domains.console.video import IMAGES, Picture, WrongPictureError, list_page, viewer_page, wanted
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.runtime.control import NoAnswerError, ask_as_data
@@ -173,7 +172,7 @@ class Gateway(Component[GatewayConfig]):
         needed = (NeedsExtra(Setting(package), Setting("console")) for package in PACKAGES)
         page = ServesPage(
             Setting(config.port, "port"),
-            Setting(config.listen == "lan", "listen"),
+            Setting(config.listen, "listen"),
             Setting(config.drive_topic, "drive_topic"),
             Setting(config.fleet, "fleet"),
         )
@@ -370,13 +369,6 @@ class LiveGraph:
         return sorted({end.node for found in self._graph.topics if found.name == topic for end in getattr(found, side)})
 
 
-@dataclass(frozen=True, slots=True)
-class _Withdrawn:
-    """A subscription that ends by its bus."""
-
-    close: Callable[[], None]
-
-
 class _Unsent:
     """A goal whose server is not known yet."""
 
@@ -555,12 +547,9 @@ class GatewaySession:
             NAME, topic, String, Qos.LATCHED, arrived, max_rate=math.inf, limits=BULK, may_be_silent=True
         )
         self._pump()
-        try:
-            return await asyncio.wait_for(came, _PATIENCE)
-        except TimeoutError:
-            return None
-        finally:
-            self._withdraw(end)
+        await asyncio.wait({came}, timeout=_PATIENCE)
+        self._withdraw(end)
+        return came.result() if came.done() else None
 
     def _video(self) -> list[Any]:
         """Return the pages of pictures, at the addresses of web_video_server."""
@@ -568,7 +557,7 @@ class GatewaySession:
         from starlette.responses import Response as Answer
         from starlette.routing import Route
 
-        def shown(show: Callable[[Request, Wanted], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
+        def shown(show: Callable[[Request, Picture], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
             async def answer(request: Request) -> Response:
                 if self._role(request) < Role.VIEW:
                     return PlainTextResponse("this needs a link with a token\n", 401)
@@ -579,7 +568,7 @@ class GatewaySession:
 
             return answer
 
-        async def stream(_: Request, want: Wanted) -> Response:
+        async def stream(_: Request, want: Picture) -> Response:
             frames = self._streams.frames(want)
             first = await anext(frames)  # so that what is wrong has an answer of its own
 
@@ -592,11 +581,11 @@ class GatewaySession:
             kind = f"multipart/x-mixed-replace;boundary={BOUNDARY}"
             return StreamingResponse(parts(), media_type=kind, headers={"cache-control": "no-store"})
 
-        async def snapshot(_: Request, want: Wanted) -> Response:
+        async def snapshot(_: Request, want: Picture) -> Response:
             frame = await self._streams.snapshot(want)
             return Answer(frame, media_type=want.mime, headers={"cache-control": "no-store"})
 
-        async def viewer(request: Request, _: Wanted) -> Response:
+        async def viewer(request: Request, _: Picture) -> Response:
             return HTMLResponse(viewer_page(request.url.query))
 
         async def listed(request: Request) -> Response:
@@ -610,12 +599,14 @@ class GatewaySession:
     def _image_topics(self) -> list[str]:
         return [topic for topic, type_ in self._graph.topics().items() if type_ in IMAGES]
 
-    def _subscribe_to_images(self, topic: str, message: type[Message], then: Callable[[Any], None]) -> _Withdrawn:
+    def _subscribe_to_images(
+        self, topic: str, message: type[Message], then: Callable[[Any], None]
+    ) -> Callable[[], None]:
         end = self._bus.subscribe(
             NAME, topic, message, Qos.BULK, then, max_rate=math.inf, limits=BULK, may_be_silent=True
         )
         self._pump()
-        return _Withdrawn(partial(self._withdraw, end))
+        return partial(self._withdraw, end)
 
     @property
     def _cookie(self) -> str:
@@ -778,7 +769,7 @@ class GatewaySession:
                 self._serve(service, type_)
             case Unserve(service):
                 self._withdraw(self._ends.pop((Serve, service)))
-            case Answer(number, response, error):
+            case ServiceAnswer(number, response, error):
                 asked = self._asked_of_clients.pop(number)
                 asked.fail(error) if response is None else asked.reply(response)
             case SendGoal():
@@ -787,9 +778,9 @@ class GatewaySession:
                 self._goals[number].cancel()
             case AskRobot():
                 self._begin(self._ask_robot(request))
-            case ReadLog():
+            case TailLog():
                 self._begin(self._read_log(request))
-            case Save():
+            case SaveSettings():
                 self._begin(self._save(request))
             case Watch():
                 self._stop_watching(request.window)
@@ -874,15 +865,15 @@ class GatewaySession:
         self._bridge.robot_answered(request.number, answer, refusal)
         self._pump()
 
-    async def _read_log(self, request: ReadLog) -> None:
+    async def _read_log(self, request: TailLog) -> None:
         answer = await asyncio.to_thread(tail, self._folder.path / LOG, request.after)
         if request.after == 0:
             answer["findings"] = findings(self._folder.path / FINDINGS)
         self._bridge.robot_answered(request.number, answer)
         self._pump()
 
-    async def _save(self, request: Save) -> None:
-        """Save as the command line does, in a process of its own: it needs the whole compiler."""
+    async def _save(self, request: SaveSettings) -> None:
+        """SaveSettings as the command line does, in a process of its own: it needs the whole compiler."""
         trial = ("--dry-run",) if request.is_trial else ()
         robot = ("--robot", self._folder.path.name)
         command = (sys.executable, "-m", "rbxcompose", "param", "save", "--json", *robot, *trial, *request.names)
