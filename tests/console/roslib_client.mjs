@@ -1,6 +1,6 @@
 // What pages do with roslib: those of ROS 2, and those that were written for ROS 1. Prints JSON.
 import { pathToFileURL } from "node:url";
-const { Action, ActionClient, Goal, Param, Ros, Service } = await import(
+const { Action, ActionClient, Goal, Param, Ros, Service, Topic } = await import(
   pathToFileURL(`${process.argv[2]}/node_modules/roslib/dist/RosLib.js`)
 );
 
@@ -21,6 +21,13 @@ const speed = new Param({ ros, name: "/base:max_speed" });
 told.speed = await asked((then, no) => speed.get(then, no));
 told.set = await asked((then, no) => new Param({ ros, name: "/battery:runtime" }).set(120, then, no));
 told.names = await asked((then, no) => ros.getParams(then, no));
+
+for (const compression of ["cbor", "png"]) {
+  const odometry = new Topic({ ros, name: "/odom", messageType: "nav_msgs/Odometry", compression });
+  const message = await asked((then) => odometry.subscribe(then));
+  told[compression] = [message.child_frame_id, message.pose.covariance.length];
+  odometry.unsubscribe();
+}
 
 const pose = (x) => ({ header: { frame_id: "map" }, pose: { position: { x, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } } });
 const go = new Action({ ros, name: "/go_to", actionType: "nav2_msgs/action/NavigateToPose" });

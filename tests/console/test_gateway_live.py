@@ -279,6 +279,7 @@ def test_roslib_does_all_that_pages_do(robot: Robot) -> None:
     assert told["raw"] == ["std_msgs/Header header", "string child_frame_id"]
     assert set(told["decoded"]) == {"linear", "angular"}
     assert (told["speed"], "/base:max_speed" in told["names"]) == (0.5, True)
+    assert told["cbor"] == told["png"] == ["base_footprint", 36]
     assert told["fed_back"]
     assert "there is no action '/nothing'" in told["refused"]
     assert told["statuses"] == [1, 3]  # active, succeeded

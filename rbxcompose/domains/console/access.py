@@ -43,7 +43,8 @@ _ROLES = {
     "unsubscribe": Role.VIEW,
     "set_level": Role.VIEW,
     "status": Role.VIEW,
-    "fragment": Role.VIEW,  # what it is a part of is judged when it is whole
+    "fragment": Role.NOBODY,  # what is within is judged by itself
+    "png": Role.NOBODY,
     "auth": Role.NOBODY,
     "advertise_service": Role.CONFIGURE,  # others would believe its answers
     "advertise_action": Role.CONFIGURE,

@@ -17,6 +17,17 @@ from typing import Any
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.console import old_actions, rosapi
 from rbxcompose.domains.console.access import Role, needed
+from rbxcompose.domains.console.encodings import (
+    COMPRESSIONS,
+    SMALLEST_PIECE,
+    Pieces,
+    WrongEncodingError,
+    as_cbor,
+    as_png,
+    as_raw_cbor,
+    from_png,
+    pieces,
+)
 from rbxcompose.domains.console.json_messages import WrongMessageError, arguments, encoded, from_json, to_json
 from rbxcompose.domains.console.lease import LATEST, DriveLease, DriveLimits, Lateness, limited, moves
 from rbxcompose.domains.console.rosapi import GraphView
@@ -41,7 +52,7 @@ LONGEST_PATIENCE = 60.0  # [s]
 
 _STATUSES = {Outcome.SUCCEEDED: 4, Outcome.CANCELED: 5, Outcome.ABORTED: 6}  # of action_msgs/GoalStatus
 LEVELS = ("info", "warning", "error", "none")
-LATER = re.compile(r"(un)?advertise_action|action_(feedback|result)|fragment|png|cbor(-raw)?")
+LATER = re.compile(r"(un)?advertise_action|action_(feedback|result)")
 """Operations of the protocol that are not served yet."""
 
 WINDOWS = "/console/windows/"
@@ -215,18 +226,31 @@ class BadFrameError(ValueError):
 
 
 class _Shared:
-    """A message for several clients, or an answer of the robot, which is encoded when the first of them takes it."""
+    """A message for several clients, or an answer of the robot, encoded once in each form that somebody takes."""
 
-    __slots__ = ("_message", "_text")
+    __slots__ = ("_encoded", "_message", "_stamp")
 
-    def __init__(self, message: Message | None, text: str = "") -> None:
-        self._message, self._text = message, text
+    def __init__(self, message: Message | None, text: str = "", stamp: int = 0) -> None:
+        self._message, self._stamp = message, stamp
+        self._encoded: dict[str, str | bytes] = {"none": text} if text or message is None else {}
 
     @property
     def text(self) -> str:
-        if not self._text and self._message is not None:
-            self._text = encoded(self._message)
-        return self._text
+        if "none" not in self._encoded and self._message is not None:
+            self._encoded["none"] = encoded(self._message)
+        return str(self._encoded["none"])
+
+    def frame(self, head: str, topic: str, compression: str) -> str | bytes:
+        """Return the frame that publishes it; `head` begins one of text."""
+        if self._message is None or compression in ("none", "png"):
+            frame = f"{head}{self.text}}}"
+            return as_png(frame) if compression == "png" else frame
+        key = f"{compression} {topic}"
+        if key not in self._encoded:
+            is_raw = compression == "cbor-raw"
+            made = as_raw_cbor(topic, self._message, self._stamp) if is_raw else as_cbor(topic, self._message)
+            self._encoded[key] = made
+        return self._encoded[key]
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,13 +259,15 @@ class _Wish:
 
     throttle: float
     queue: int
+    compression: str = "none"
 
 
 class _Stream:
     """A topic on its way to one client, under the name by which the client knows it."""
 
     def __init__(self, name: str, topic: str) -> None:
-        self.topic = topic
+        self.topic, self._name = topic, name
+        self.compression = "none"
         self.wishes: dict[str | None, _Wish] = {}
         self._head = f'{{"op":"publish","topic":{json.dumps(name)},"msg":'
         self._waiting: deque[_Shared] = deque()
@@ -252,6 +278,7 @@ class _Stream:
         """Do what suits all subscriptions: the lowest throttle, the longest queue."""
         self._throttle = min(wish.throttle for wish in self.wishes.values())
         self._queue = max(wish.queue for wish in self.wishes.values())
+        self.compression = [*self.wishes.values()][-1].compression
         self._waiting = deque(self._waiting, maxlen=self._queue or DEPTH)
         self._due = min(self._due, now + self._throttle)
 
@@ -264,13 +291,13 @@ class _Stream:
         self._waiting.append(message)
         return True
 
-    def take(self, now: float) -> str | None:
+    def take(self, now: float) -> str | bytes | None:
         """Return the next frame if it is due."""
         if not self._waiting or self.pause(now) > 0:
             return None
         if self._throttle and self._queue:
             self._pass(now)
-        return f"{self._head}{self._waiting.popleft().text}}}"
+        return self._waiting.popleft().frame(self._head, self._name, self.compression)
 
     @property
     def throttle(self) -> float:
@@ -297,6 +324,10 @@ class _Client:
         self.noted = ""  # last in the log
         self.level = LEVELS.index("warning")
         self.frames: deque[str] = deque()
+        self.piece_size = 0  # [characters]; 0: whole frames
+        self.sent_pieces: deque[str] = deque()  # of the frame that is being sent
+        self.pieces_so_far = 0
+        self.pieces = Pieces(LARGEST)  # that came
         self.streams: dict[str, _Stream] = {}  # by the name that it uses; the next to be served is the first
         self.advertised: dict[str, type[Message]] = {}
         self.open_calls = 0  # with goals
@@ -439,7 +470,7 @@ class Bridge:
             data = _parsed(frame)
             identity = data.get("id")
             self._carry_out(client, data)
-        except (BadFrameError, WrongMessageError) as error:
+        except (BadFrameError, WrongEncodingError, WrongMessageError) as error:
             self._status(client, "error", str(error), identity)
         return self._done()
 
@@ -459,9 +490,19 @@ class Bridge:
         self.woken.discard(number)
         return self._done()
 
-    def next_frame(self, number: int, now: float) -> str | None:
+    def next_frame(self, number: int, now: float) -> str | bytes | None:
         """Return what to send to a client now; None if nothing is due. Topics take turns."""
         client = self._clients[number]
+        if client.sent_pieces:
+            return client.sent_pieces.popleft()
+        frame = self._whole_frame(client, now)
+        if isinstance(frame, str) and 0 < client.piece_size < len(frame):
+            client.pieces_so_far += 1
+            client.sent_pieces.extend(pieces(frame, client.piece_size, f"fragment:{client.pieces_so_far}"))
+            return client.sent_pieces.popleft()
+        return frame
+
+    def _whole_frame(self, client: _Client, now: float) -> str | bytes | None:
         if client.frames:
             return client.frames.popleft()
         for name, stream in client.streams.items():
@@ -480,9 +521,9 @@ class Bridge:
 
     # What the bus does
 
-    def arrived(self, topic: str, message: Message, now: float) -> None:
-        """Pass a message on to the clients that listen."""
-        self._pass_on(topic, _Shared(message), now)
+    def arrived(self, topic: str, message: Message, now: float, stamp: int = 0) -> None:
+        """Pass a message that came at `stamp` [ns] on to the clients that listen."""
+        self._pass_on(topic, _Shared(message, stamp=stamp), now)
 
     def seen(self, window: str, answer: object, now: float, refusal: str = "") -> None:
         """Pass what the robot answers to a query on, or why it refuses, if that is another answer than before."""
@@ -584,6 +625,9 @@ class Bridge:
         op = data.get("op")
         if not isinstance(op, str):
             raise BadFrameError("a frame has an 'op', which is a text")
+        if (size := _count(data, "fragment_size")) > 0:
+            least = max(SMALLEST_PIECE, size)
+            client.piece_size = min(client.piece_size or least, least)
         if not isinstance(data.get("id"), str | int | float | None):
             raise BadFrameError("an 'id' is a text")
         if (operation := _OPERATIONS.get(op)) is not None:
@@ -614,6 +658,13 @@ class Bridge:
             client.noted = text
             self.notes.append(f"{client.who} ({client.role.word}): {text}")
 
+    def _fragment(self, client: _Client, data: Mapping[str, Any]) -> None:
+        if (frame := client.pieces.add(data)) is not None:
+            self._carry_out(client, _within(frame))
+
+    def _png(self, client: _Client, data: Mapping[str, Any]) -> None:
+        self._carry_out(client, _within(from_png(data.get("data"), LARGEST)))
+
     def _auth(self, client: _Client, data: Mapping[str, Any]) -> None:
         """Give a client the role of its token, which is the `mac` of rosbridge's `auth`."""
         role = self._admit(token) if isinstance(token := data.get("mac"), str) else Role.NOBODY
@@ -623,9 +674,10 @@ class Bridge:
 
     def _subscribe(self, client: _Client, data: Mapping[str, Any]) -> None:
         name, topic = _topic_of(data)
-        if (compression := data.get("compression", "none")) not in ("none", "", None):
-            raise BadFrameError(f"the compression '{_short(compression)}' is not yet served")
-        wish = _Wish(_count(data, "throttle_rate", math.inf) / 1000, min(_count(data, "queue_length"), LONGEST_QUEUE))
+        if (compression := data.get("compression") or "none") not in COMPRESSIONS:
+            raise BadFrameError(f"a compression is one of {', '.join(COMPRESSIONS)}, not '{_short(compression)}'")
+        throttle = _count(data, "throttle_rate", math.inf) / 1000
+        wish = _Wish(throttle, min(_count(data, "queue_length"), LONGEST_QUEUE), compression)
         is_window = topic.startswith(WINDOWS)
         is_old = self._old_parts(topic) is not None
         message = None if is_window or is_old else self._message_on(topic, data)
@@ -646,6 +698,7 @@ class Bridge:
         if stream is None:
             stream, is_new = client.streams.setdefault(name, _Stream(name, topic)), True
             listened.streams.append((client.number, stream))
+        stream.wishes.pop(_key(data), None)  # the newest is the last
         stream.wishes[_key(data)] = wish
         stream.follow_wishes(self._now)
         self._follow_windows(topic)
@@ -1151,6 +1204,8 @@ class Bridge:
 
 _OPERATIONS: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any]], None]] = {
     "advertise": Bridge._advertise,
+    "fragment": Bridge._fragment,
+    "png": Bridge._png,
     "advertise_service": Bridge._advertise_service,
     "unadvertise_service": Bridge._unadvertise_service,
     "service_response": Bridge._service_response,
@@ -1198,6 +1253,14 @@ def _parsed(frame: str | bytes) -> dict[str, Any]:
         raise BadFrameError("the frame is not JSON") from error
     if not isinstance(data, dict):
         raise BadFrameError("a frame is a map with an 'op'")
+    return data
+
+
+def _within(frame: str) -> dict[str, Any]:
+    """Return a frame that came in pieces or in a picture: neither holds another one."""
+    data = _parsed(frame)
+    if data.get("op") in ("fragment", "png"):
+        raise BadFrameError("what comes in pieces or in a picture is a frame itself")
     return data
 
 

@@ -85,7 +85,7 @@ if TYPE_CHECKING:
 
 STATIC = Path(__file__).parents[1] / "static"  # the built page
 MOST_CLIENTS = 64
-PACKAGES = ("PIL", "segno", "starlette", "uvicorn", "websockets")
+PACKAGES = ("PIL", "cbor2", "segno", "starlette", "uvicorn", "websockets")
 SOCKETS = ("/", "/rosbridge")  # where WebSockets are taken
 _PAUSE = 0.1  # [s] between two looks for the robot's own state
 _LOOKS = 100
@@ -703,7 +703,7 @@ class GatewaySession:
         while not self._bridge.is_overrun(number) and number not in self._unknown:
             wake.clear()
             if (frame := self._bridge.next_frame(number, self._now)) is not None:
-                await web_socket.send_text(frame)
+                await (web_socket.send_text(frame) if isinstance(frame, str) else web_socket.send_bytes(frame))
                 continue
             pause = self._bridge.pause(number, self._now)
             timer = None if math.isinf(pause) else self._loop.call_later(pause, wake.set)
@@ -749,7 +749,7 @@ class GatewaySession:
                     topic,
                     message,
                     qos,
-                    lambda arrived: self._bridge.arrived(topic, arrived, self._now),
+                    lambda arrived: self._bridge.arrived(topic, arrived, self._now, self._stamp),
                     max_rate=math.inf,
                     limits=BULK,
                     may_be_silent=True,

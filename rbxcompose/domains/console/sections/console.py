@@ -49,7 +49,9 @@ class ConsoleModel(Config):
     """The role that visitors need at least for topics, services and actions, by patterns: `/right_arm/*: configure`."""
     port: int = Field(8080, ge=1, le=65535)
     """TCP port of the page."""
-    first_page: Literal["drive"] = "drive"
+    first_page: Literal[
+        "data", "diagnostics", "drive", "fleet", "log", "map", "mission", "model", "mux", "parameters", "robot"
+    ] = "drive"
     """The page that is shown first."""
     drive: DrivePage = DrivePage()
     """How people drive from the page."""
