@@ -18,9 +18,10 @@ const found = Object.values(import.meta.glob<Card>("./cards/*.ts", { eager: true
 
 const LOOK = 500; // [ms] between two values
 const MOST = 6; // values of one message
+const LONGEST = 80; // letters of a text
 const SETTLED: Record<string, string> = { "4": "Done", "5": "Canceled", "6": "Failed" };
 /** Messages that are drawn or followed, not read. */
-const UNREADABLE = /Image$|PointCloud|OccupancyGrid|LaserScan|TFMessage|Marker|Path$|Trajectory|DiagnosticArray|SceneObjects|PlanningScene/;
+const UNREADABLE = /robot_description|Image$|PointCloud|OccupancyGrid|LaserScan|TFMessage|Marker|Path$|Trajectory|DiagnosticArray|SceneObjects|PlanningScene/;
 const FINISHED = 4;
 
 /** Fills a card with all that a component offers, and returns what closes it. */
@@ -43,7 +44,7 @@ export function fillCard(body: HTMLElement, component: Component, robot: Robot):
 }
 
 function isReadable(port: Port): boolean {
-  return port.kind === "out" && port.topic !== "" && !UNREADABLE.test(port.type);
+  return port.kind === "out" && port.topic !== "" && !UNREADABLE.test(`${port.topic} ${port.type}`);
 }
 
 function showValue(list: HTMLElement, port: Port, robot: Robot): () => void {
@@ -74,6 +75,7 @@ function showValue(list: HTMLElement, port: Port, robot: Robot): () => void {
 
 /** Returns a value as people read it. */
 export function shown(value: Json, unit = ""): string {
+  if (typeof value === "string" && value.length > LONGEST) return `${value.slice(0, LONGEST)}\u2026`;
   const text = typeof value === "number" ? (Number.isInteger(value) && !unit ? String(value) : formatNumber(value, unit)) : value === null ? UNKNOWN : String(value);
   return unit && value !== null ? `${text}\u202f${unit}` : text;
 }

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { columns, numberAt, Rate, Series, writable } from "./data";
+import { columns, numberAt, Rate, Series, shapeOf, writable } from "./data";
 
 describe("a rate", () => {
   it("is that of the last seconds, and unknown before the second message", () => {
@@ -42,6 +42,11 @@ describe("series", () => {
       [undefined, 2, undefined],
     ]);
   });
+});
+
+it("messages have one shape while only their values differ", () => {
+  expect(shapeOf({ a: 1, b: ["x", "y"], c: {} })).toBe(shapeOf({ a: null, b: ["", "z"], c: {} }));
+  expect(shapeOf({ b: ["x"] })).not.toBe(shapeOf({ b: ["x", "y"] }));
 });
 
 it("a message to publish has no header", () => {

@@ -27,12 +27,25 @@ export class Rate {
 /** A number somewhere in a message, by its keys and places: `["pose", "position", "x"]`. */
 export type Path = readonly string[];
 
-/** Returns a number of a message, or null: NaN comes as null. */
-export function numberAt(message: Json, path: Path): number | null {
+/** Returns a value of a message, or null if there is none. */
+export function valueAt(message: Json, path: Path): Json {
   let at: Json | undefined = message;
   for (const key of path) at = Array.isArray(at) ? at[Number(key)] : isMessage(at ?? null) ? (at as { [key: string]: Json })[key] : undefined;
+  return at ?? null;
+}
+
+/** Returns a number of a message, or null: NaN comes as null. */
+export function numberAt(message: Json, path: Path): number | null {
+  const at = valueAt(message, path);
   if (typeof at === "boolean") return Number(at);
   return typeof at === "number" ? at : null;
+}
+
+/** Returns what two messages have in common whose values stand at the same places: keys, lengths, texts or numbers. */
+export function shapeOf(value: Json): string {
+  if (Array.isArray(value)) return `[${value.length}${value.length > 0 ? shapeOf(value[0]!) : ""}]`;
+  if (isMessage(value)) return `{${Object.entries(value).map(([key, inner]) => `${key}:${shapeOf(inner)}`).join()}}`;
+  return typeof value === "string" ? "s" : "n";
 }
 
 /** Numbers over time, for a plot: seconds ago and values, oldest first. */

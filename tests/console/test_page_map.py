@@ -64,9 +64,8 @@ def pose(x: float, y: float, heading: float) -> dict[str, Any]:
     return {"position": moved(x, y), "orientation": turned(heading)}
 
 
-@pytest.fixture
-def rolling(gateway: FakeGateway) -> FakeGateway:
-    """A robot at (1, 0.5) in `map`, by a transform to `odom`, in which it is at (0.5, 0) and looks along x."""
+def rolls(gateway: FakeGateway) -> None:
+    """Let the robot be at (1, 0.5) in `map`, by a transform to `odom`, in which it is at (0.5, 0) and looks along x."""
     gateway.config = {**CONFIG, "places": PLACES}
     gateway.windows["robot/DescribeRobot"] = [GO_TO, CHARGER]
     gateway.answers["/go_to"] = lambda _: {"distance_remaining": 3.0}
@@ -75,6 +74,11 @@ def rolling(gateway: FakeGateway) -> FakeGateway:
     gateway.latched["/tf_static"] = {"transforms": [transform("map", "odom", 1.0, 0.0, math.pi / 2)]}
     frames = {"header": {"frame_id": "odom"}, "child_frame_id": "base_footprint"}
     gateway.repeated = {"/odom": {**frames, "pose": {"pose": pose(0.5, 0.0, 0.0)}}}
+
+
+@pytest.fixture
+def rolling(gateway: FakeGateway) -> FakeGateway:
+    rolls(gateway)
     return gateway
 
 

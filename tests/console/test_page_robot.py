@@ -73,8 +73,7 @@ LEVEL = definition("acme_msgs/SetLevel_Request", value="float32")
 SPRAY = definition("acme_msgs/Spray_Goal", nozzle="string", angle="float64", amount="float64", dry="boolean")
 
 
-@pytest.fixture
-def robot(gateway: FakeGateway) -> FakeGateway:
+def has_components(gateway: FakeGateway) -> None:
     gateway.windows[DESCRIBED] = [STRANGER, BASE, MUX, SERVOS]
     gateway.windows[RUNNING] = {
         "stop": None,
@@ -90,6 +89,11 @@ def robot(gateway: FakeGateway) -> FakeGateway:
     gateway.latched["/odom"] = {"twist": {"twist": {"linear": {"x": 0.25}, "angular": {"z": 0}}}}
     gateway.latched["/flow"] = {"data": 3.25}
     gateway.latched["/joint_states"] = {"name": ["pan", "slide"], "position": [0.7853981, 0.012]}
+
+
+@pytest.fixture
+def robot(gateway: FakeGateway) -> FakeGateway:
+    has_components(gateway)
     return gateway
 
 

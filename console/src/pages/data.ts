@@ -1,6 +1,6 @@
 /** Data: topics with their types and rates, what they carry, plots of numbers, and publishing. */
 import type uPlot from "uplot";
-import { columns, numberAt, Rate, Series, writable, type Path } from "../data";
+import { columns, numberAt, Rate, Series, shapeOf, valueAt, writable, type Path } from "../data";
 import { emptyCard, h, icon, setText } from "../dom";
 import type { Page, Robot } from "../page";
 import { isMessage, type Json, type Message } from "../rosbridge";
@@ -111,6 +111,9 @@ class TopicView {
   readonly #text = h("textarea", { id: "publish", rows: "6", spellcheck: "false" });
   readonly #says = h("p", { class: "says", role: "status" });
   readonly #open = new Set<string>();
+  /** What shows each value that can be seen: where a message is as the last one, nothing is drawn again under a finger. */
+  readonly #leaves = new Map<string, (value: Json) => void>();
+  #shape = "";
   readonly #close: () => void;
   #message: Message | null = null;
   #isShown = true;
@@ -145,9 +148,14 @@ class TopicView {
     const isCopying = selection !== null && !selection.isCollapsed && this.#tree.contains(selection.anchorNode);
     if (this.#isShown || this.#paused || !this.#message || isCopying) return;
     this.#isShown = true;
-    const focused = document.activeElement instanceof HTMLElement && this.#tree.contains(document.activeElement) ? document.activeElement.dataset.path : undefined;
-    this.#tree.replaceChildren(this.#branch(this.#message, []));
-    if (focused !== undefined) this.#tree.querySelector<HTMLElement>(`[data-path="${CSS.escape(focused)}"]`)?.focus();
+    const shape = shapeOf(this.#message);
+    if (shape === this.#shape) {
+      for (const [path, show] of this.#leaves) show(valueAt(this.#message, path.split("/")));
+    } else {
+      this.#shape = shape;
+      this.#leaves.clear();
+      this.#tree.replaceChildren(this.#branch(this.#message, []));
+    }
     if (!this.#isWritten) this.#text.value = writable(this.#message);
   }
 
@@ -178,18 +186,30 @@ class TopicView {
       box.ontoggle = () => {
         this.#open.delete(box.open ? `-${name}` : name);
         this.#open.add(box.open ? name : `-${name}`);
-        if (box.open && box.childElementCount === 1) box.append(this.#branch(value, path));
+        if (box.open && box.childElementCount === 1) box.append(this.#branch(valueAt(this.#message, path), path));
       };
       return h("li", {}, box);
     }
     const label = h("span", { class: "label" }, `${key}: `);
-    if (typeof value !== "number" && typeof value !== "boolean") {
-      return h("li", {}, label, value === null ? "not a number" : String(value) || "(empty)");
+    if (typeof value === "string") {
+      const text = h("span");
+      this.#keep(path, (next) => setText(text, String(next) || "(empty)"), value);
+      return h("li", {}, label, text);
     }
-    const button = h("button", { type: "button", class: "number-value", title: "Plot it", "data-path": path.join("/") }, String(value));
-    button.setAttribute("aria-label", `${path.join(" ")} ${String(value)}, plot`);
+    const button = h("button", { type: "button", class: "number-value", title: "Plot it", "data-path": path.join("/") });
+    const show = (next: Json) => {
+      const shown = next === null ? "not a number" : String(next);
+      setText(button, shown);
+      button.setAttribute("aria-label", `${path.join(" ")} ${shown}, plot`);
+    };
+    this.#keep(path, show, value);
     button.onclick = () => this.#plot(path);
     return h("li", {}, label, button);
+  }
+
+  #keep(path: Path, show: (value: Json) => void, value: Json): void {
+    show(value);
+    this.#leaves.set(path.join("/"), show);
   }
 
   #publisher(): HTMLElement {

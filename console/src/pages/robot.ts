@@ -135,7 +135,7 @@ class RobotView {
       const status = h("p", { class: "chip", role: "status" });
       this.#statuses.set(component.name, status);
       const head = h("header", {}, h("h2", {}, formatName(component.name)), status);
-      const about = h("p", { class: "label" }, component.about, h("small", {}, ` ${component.type}`));
+      const about = h("p", { class: "label" }, component.about.replaceAll("`", ""), h("small", {}, ` ${component.type}`));
       const card = h("article", { class: "card component", "aria-label": component.name }, head, about);
       closers.push(fillCard(card, component, this.#robot));
       return card;
