@@ -64,6 +64,7 @@ def plot(page: Page) -> None:
     for name in "xy":
         page.locator(f'[data-path="pose/pose/position/{name}"]').click()
     page.wait_for_timeout(RUNNING)
+    page.evaluate("scrollTo(0, 0)")
 
 
 ROBOTS: dict[str, dict[str, Callable[[Page], None]]] = {

@@ -283,13 +283,17 @@ class _Stream:
         self._due = min(self._due, now + self._throttle)
 
     def offer(self, message: _Shared, now: float) -> bool:
-        """Take a message, unless it comes too early and nothing may wait; return whether it was taken."""
+        """Take a message, unless it comes too early and nothing may wait; return whether its client has to look again.
+
+        While others wait, it will look anyway.
+        """
         if self._throttle and not self._queue:
             if now < self._due:
                 return False
             self._pass(now)
+        was_empty = not self._waiting
         self._waiting.append(message)
-        return True
+        return was_empty
 
     def take(self, now: float) -> str | bytes | None:
         """Return the next frame if it is due."""
