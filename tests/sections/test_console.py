@@ -81,8 +81,4 @@ def test_a_robot_that_does_not_drive_has_a_console_too(tmp_path: Path) -> None:
 def test_the_network_is_served_with_roles_by_names(tmp_path: Path) -> None:
     guard = "{/arm/*: configure}"
     config = gateway(tmp_path, f"{BASE}console: {{listen: lan, guard: {guard}, origins: ['http://localhost:8181']}}\n")
-    assert (config.listen, config.guard, config.origins) == (
-        "lan",
-        {"/arm/*": "configure"},
-        ("http://localhost:8181",),
-    )
+    assert (config.listen, config.guard, config.origins) == ("lan", {"/arm/*": "configure"}, ("http://localhost:8181",))
