@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+from base64 import b64encode
+from io import BytesIO
 from typing import Any
 
 import cbor2
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from PIL import Image as Picture
 
 from rbxcompose.domains.console.encodings import Pieces, WrongEncodingError, as_png, from_png, pieces
 from rbxcompose.msgs.cdr import encode
@@ -64,6 +67,13 @@ def test_a_picture_holds_its_frame(frame: str) -> None:
 def test_what_is_no_picture_is_refused(data: object) -> None:
     with pytest.raises(WrongEncodingError):
         from_png(data, LARGEST)
+
+
+def test_a_picture_that_would_be_huge_is_refused_before_it_is_read() -> None:
+    written = BytesIO()
+    Picture.new("1", (40_000, 40_000)).save(written, "PNG")
+    with pytest.raises(WrongEncodingError):
+        from_png(b64encode(written.getvalue()).decode(), LARGEST)
 
 
 def test_a_frame_may_come_in_pieces_or_in_a_picture() -> None:

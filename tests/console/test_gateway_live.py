@@ -253,6 +253,16 @@ def test_pictures_are_streamed_as_by_web_video_server(robot: Robot) -> None:
     assert get("/snapshot?topic=/camera/image_raw&width=x")[0] == 404
 
 
+def test_the_page_gets_the_body_and_nothing_beside_it(robot: Robot) -> None:
+    status, urdf, headers = get("/console/model.urdf")
+    assert (status, headers["content-type"].partition(";")[0]) == (200, "application/xml")
+    assert "<robot" in urdf
+    assert headers["content-security-policy"].startswith("default-src 'self'")
+    assert get("/console/model.urdf", **{"if-none-match": headers["etag"]})[0] == 304
+    for path in ("robot.yaml", "../config", "%2e%2e/%2e%2e/etc/passwd"):
+        assert get(f"/console/meshes/{path}")[0] == 404
+
+
 def test_roslibpy_does_all_that_it_can(robot: Robot) -> None:
     command = [sys.executable, "-m", "tests.console.roslibpy_client", str(PORT)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=50)

@@ -50,6 +50,12 @@ found["cookie"] = [status, "HttpOnly" in cookie, "SameSite=strict" in cookie]
 found["known"] = get("/console/config", Cookie=cookie.partition(";")[0])[0]
 found["bearer"] = get("/console/config", Authorization="Bearer " + tokens["view"])[0]
 
+found["body"] = [
+    get(path, **headers)[0]
+    for path in ("/console/model.urdf", "/console/meshes/0/base.stl")
+    for headers in ({}, {"Authorization": "Bearer " + tokens["view"]})
+]
+
 async def talk(*frames, **options):
     async with connect(f"ws://{place}/rosbridge", **options) as socket:
         for frame in frames:
@@ -123,6 +129,7 @@ def test_only_who_has_a_token_gets_in_and_each_does_what_its_role_may(hosts: Hos
         "cookie": [200, True, True],
         "known": 200,
         "bearer": 200,
+        "body": [401, 404, 401, 404],
         "stranger": ["this needs the role 'operate'; yours is 'nobody'", False],
         "viewer": ["this needs the role 'operate'; yours is 'view'", True],
         "operator": [True],

@@ -1,38 +1,76 @@
-"""The body of the robot for browsers."""
+"""What viewers get of a robot's body, and what they cannot get."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from rbxcompose.domains.console.models import served
+from rbxcompose.domains.console.models import MESHES, ServedModel
 
-
-def urdf(*names: str) -> str:
-    return "".join(f'<visual><geometry><mesh filename="{name}" scale="1 1 1"/></geometry></visual>' for name in names)
-
-
-def test_meshes_have_addresses_by_number_and_only_those_that_are_named(tmp_path: Path) -> None:
-    face, arm = tmp_path / "my face.stl", tmp_path / "arm.dae"
-    for path in (face, arm):
-        path.write_text("solid")
-    model = served(urdf(f"file://{tmp_path}/my%20face.stl", str(arm), f"file://{tmp_path}/my%20face.stl"))
-    assert model.urdf == urdf("meshes/0/my%20face.stl", "meshes/1/arm.dae", "meshes/0/my%20face.stl")
-    assert model.file(0) == (face, "model/stl")
-    assert model.file(1) == (arm, "model/vnd.collada+xml")
-    assert model.file(2) is None
-    assert model.file(-1) is None
+URDF = """<robot name="cart">
+  <link name="base"><visual><geometry><mesh filename="meshes/base.STL"/></geometry></visual></link>
+  <link name="lost"><visual><geometry><mesh filename="package://cart/lost.dae"/></geometry></visual></link>
+</robot>"""
 
 
-@pytest.mark.parametrize("name", ["/etc/passwd", "/nothing/here.stl", "", "/dev/zero.stl"])
-def test_what_is_no_mesh_is_not_served(name: str) -> None:
-    assert served(urdf(name)).file(0) is None
+@pytest.fixture
+def mesh(tmp_path: Path) -> Path:
+    path = tmp_path / "base.STL"
+    path.write_bytes(b"solid base")
+    (tmp_path / "secret").write_text("secret")
+    return path
 
 
-@given(st.text())
-def test_any_text_is_served(text: str) -> None:
-    model = served(text)
-    assert len(model.files) <= text.count("mesh")
+@pytest.fixture
+def model(mesh: Path) -> ServedModel:
+    return ServedModel(URDF, {"meshes/base.STL": str(mesh)})
+
+
+def test_the_urdf_has_addresses_that_the_console_serves(model: ServedModel) -> None:
+    assert model.urdf is not None
+    text = model.urdf.content.decode()
+    assert f'"{MESHES}0/base.STL"' in text
+    assert f'"{MESHES}1/lost.dae"' in text
+    assert "package://" not in text
+    assert model.urdf.kind == "application/xml"
+
+
+def test_a_mesh_comes_with_its_type_and_another_tag_when_it_has_changed(model: ServedModel, mesh: Path) -> None:
+    before = model.mesh("0/base.STL")
+    assert before is not None
+    assert (before.content, before.kind) == (b"solid base", "model/stl")
+    mesh.write_bytes(b"solid other")
+    after = model.mesh("0/base.STL")
+    assert after is not None
+    assert after.tag != before.tag
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "",
+        ".",
+        "secret",
+        "base.STL",
+        "../secret",
+        "0/base.STL/../secret",
+        "/etc/passwd",
+        "%2e%2e/secret",
+        "0/base.STL\0",
+    ],
+)
+def test_nothing_but_the_meshes_of_the_urdf_is_served(model: ServedModel, address: str) -> None:
+    assert model.mesh(address) is None
+
+
+def test_a_mesh_that_was_never_there_or_is_gone_is_not_served(model: ServedModel, mesh: Path) -> None:
+    assert model.mesh("1/lost.dae") is None
+    mesh.unlink()
+    assert model.mesh("0/base.STL") is None
+    mesh.symlink_to(mesh.parent / "secret")
+    assert model.mesh("0/base.STL") is None
+
+
+def test_a_robot_without_a_body_has_no_urdf() -> None:
+    assert ServedModel("", {}).urdf is None

@@ -165,7 +165,7 @@ def test_it_fits_a_phone(open_page: Callable[..., Page], crane: FakeGateway, sch
 
 
 def test_meshes_that_are_missing_are_named(open_page: Callable[..., Page], crane: FakeGateway) -> None:
-    mesh = b'<mesh filename="meshes/0/face.stl"/>'
+    mesh = b'<mesh filename="/console/meshes/0/face.stl"/>'
     crane.files["/console/model.urdf"] = URDF.replace(b'<box size="0.4 0.4 0.2"/>', mesh)
     crane.files["/console/meshes/0/face.stl"] = b"no mesh"
     page = open_page(page_name="model")

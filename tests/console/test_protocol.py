@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from rbxcompose.domains.console import json_messages
 from rbxcompose.domains.console.access import Role
 from rbxcompose.domains.console.json_messages import WrongMessageError, from_json, numbers_of, to_json
+from rbxcompose.domains.console.lease import DriveLimits
 from rbxcompose.domains.console.protocol import (
     LARGEST,
     MOST_FRAMES,
@@ -550,6 +551,16 @@ def test_names_may_be_guarded_by_patterns() -> None:
     (status,) = client.does("publish", topic="level", msg={"data": 1})
     assert "the role 'configure'" in status["msg"]
     assert client.does("subscribe", topic="/level") == []
+
+
+@pytest.mark.parametrize(
+    ("topic", "pattern"), [("/cmd_vel", TELEOP), ("/go_to/goal", "/go_to"), ("move_base/goal", "/go_to")]
+)
+def test_no_other_name_leads_round_a_guard(topic: str, pattern: str) -> None:
+    drive = DriveLimits(TELEOP, "geometry_msgs/msg/Twist", 0.5, 1.0, frozenset({"/cmd_vel"}))
+    room = Room(drive, guarded={pattern: Role.CONFIGURE})
+    (status,) = room.client(Role.OPERATE).does("publish", topic=topic, msg={})
+    assert "the role 'configure'" in status["msg"]
 
 
 def test_a_token_of_the_operation_auth_gives_a_role_and_never_takes_one() -> None:

@@ -25,7 +25,7 @@ ROOMS = (
     "tools",
 )
 """Each imports only from itself and from those before it; what stands behind it, it loads by name."""
-DOMAINS = {"arms": "body servos", "bases": "body servos", "servos": "body devices"}
+DOMAINS = {"arms": "body servos", "bases": "body servos", "console": "body", "servos": "body devices"}
 """Which other domains a domain may import; one that is not named here imports none."""
 IMPURE = ("bus", "runtime", "testing", "tools")
 """What the core of a domain does not import: all of it but its plug-ins, and what belongs to its commands."""

@@ -71,7 +71,6 @@ export class RobotScene {
   load(urdf: string, changed: () => void): JointLimits[] {
     const parse = () => {
       const loader = new URDFLoader();
-      loader.workingPath = "console/";
       loader.loadMeshCb = (path, _manager, _material, done) => {
         void readMesh(path).then(
           (mesh) => {

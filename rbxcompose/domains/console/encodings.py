@@ -96,7 +96,7 @@ def from_png(data: object, largest: int) -> str:
         if picture.width * picture.height * 3 > largest:
             raise WrongEncodingError(f"a frame has at most {largest // 2**20} MiB")
         return picture.convert("RGB").tobytes().rstrip(b"\n").decode()
-    except (OSError, ValueError, SyntaxError) as error:  # Pillow's for what is no PNG
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise WrongEncodingError("'data' is no picture with a frame in it") from error
 
 

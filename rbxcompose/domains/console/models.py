@@ -1,46 +1,59 @@
-"""The body of the robot for browsers: its URDF, with addresses of meshes that the gateway serves."""
+"""The robot's body for viewers: its URDF with addresses of meshes that the console serves, and those meshes."""
 
 from __future__ import annotations
 
-import re
+import hashlib
+import os
+from collections.abc import Mapping
 from pathlib import Path
-from urllib.parse import quote, unquote, urlsplit
+from urllib.parse import quote
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import open_regular
+from rbxcompose.base.findings import Finding
+from rbxcompose.domains.body.description import to_xml, with_meshes
+from rbxcompose.domains.body.files import mesh_names
+from rbxcompose.domains.body.xml_reader import read_urdf
 
-MESHES = "meshes"  # below the address of the URDF
-_FILE = re.compile(r'(<mesh\b[^>]*\bfilename\s*=\s*)(["\'])(.*?)\2', re.DOTALL)
-_TYPES = {".stl": "model/stl", ".dae": "model/vnd.collada+xml", ".obj": "model/obj"}
+MESHES = "/console/meshes/"
+TYPES = {".stl": "model/stl", ".dae": "model/vnd.collada+xml", ".obj": "model/obj", ".glb": "model/gltf-binary"}
+_OTHER = "application/octet-stream"
 
 
 @dataclass(frozen=True, slots=True)
+class ServedFile:
+    """What a browser gets, with the tag by which it knows that it has the same already."""
+
+    content: bytes
+    kind: str
+    tag: str
+
+
 class ServedModel:
-    """A URDF whose meshes are at `meshes/NUMBER/NAME`, and the file of each number."""
+    """The URDF of a robot, and the meshes that it names; nothing else can be asked for."""
 
-    urdf: str
-    files: tuple[Path, ...]
+    def __init__(self, urdf: str, meshes: Mapping[str, str]) -> None:
+        """Take the URDF, empty if the robot has no body, and the files that exist, by their names in the URDF."""
+        self.urdf: ServedFile | None = None
+        self._files: dict[str, Path] = {}
+        root = read_urdf(urdf, "the URDF") if urdf else None
+        if root is None or isinstance(root, Finding):
+            return
+        # What a browser asks for is looked up, and never becomes part of a path; the name is for people.
+        addresses = {name: f"{number}/{Path(name).name}" for number, name in enumerate(sorted({*mesh_names(root)}))}
+        self._files = {address: Path(meshes[name]) for name, address in addresses.items() if name in meshes}
+        served = {name: f"{MESHES}{quote(address)}" for name, address in addresses.items()}
+        text = to_xml(with_meshes(root, served)).encode()
+        self.urdf = ServedFile(text, "application/xml", f'"{hashlib.sha256(text).hexdigest()[:32]}"')
 
-    def file(self, number: int) -> tuple[Path, str] | None:
-        """Return a file with its media type; None if there is no such mesh, or no file of a known kind."""
-        if not 0 <= number < len(self.files):
+    def mesh(self, address: str) -> ServedFile | None:
+        """Return the mesh at an address below `MESHES`; None if the URDF names none there, or its file is gone."""
+        if (path := self._files.get(address)) is None:
             return None
-        path = self.files[number]
-        kind = _TYPES.get(path.suffix.lower())
-        return (path, kind) if kind and path.is_file() else None
-
-
-def served(urdf: str) -> ServedModel:
-    """Return what is served of a URDF: only files that it names have an address."""
-    files: dict[str, Path] = {}
-
-    def address(found: re.Match[str]) -> str:
-        name = found[3]
-        path = files.setdefault(name, _path(name))
-        return f"{found[1]}{found[2]}{MESHES}/{list(files).index(name)}/{quote(path.name)}{found[2]}"
-
-    rewritten = _FILE.sub(address, urdf)
-    return ServedModel(rewritten, tuple(files.values()))
-
-
-def _path(name: str) -> Path:
-    return Path(unquote(urlsplit(name).path) if name.startswith("file://") else name)
+        try:
+            with open_regular(path, follow=False) as file:
+                found = os.fstat(file.fileno())
+                tag = f'"{found.st_mtime_ns:x}-{found.st_size:x}"'
+                return ServedFile(file.read(), TYPES.get(path.suffix.lower(), _OTHER), tag)
+        except OSError:  # removed or replaced since the robot was compiled: the page names the mesh that is missing
+            return None

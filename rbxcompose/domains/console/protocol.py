@@ -9,7 +9,7 @@ import json
 import math
 import re
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from types import MappingProxyType
 from typing import Any
@@ -456,6 +456,11 @@ class Bridge:
         self._clients[number] = _Client(number, role, who or f"client {number}")
         return number
 
+    @property
+    def strangers(self) -> int:
+        """Return how many clients have not said who they are."""
+        return sum(client.role is Role.NOBODY for client in self._clients.values())
+
     def role(self, number: int) -> Role:
         """Return what a client may do."""
         return self._clients[number].role
@@ -649,13 +654,21 @@ class Bridge:
         Raises:
             BadFrameError: if another role is needed.
         """
-        least = needed(data, self._guarded)
+        least = max(needed(frame, self._guarded) for frame in self._meanings(data))
         if client.role < least:
             raise BadFrameError(f"this needs the role '{least.word}'; yours is '{client.role.word}'")
         if least > Role.VIEW:
             name = next((str(data[key]) for key in ("topic", "service", "action", "id") if key in data), "")
             if data["op"] != "publish" or _full(name) not in client.advertised:
                 self._note(client, f"{data['op']} {_short(name)}")
+
+    def _meanings(self, data: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+        """Yield a frame, and what it amounts to if its topic stands for another one, or for an action."""
+        yield data
+        if data.get("op") in ("publish", "advertise") and isinstance(topic := data.get("topic"), str):
+            yield {**data, "topic": self._commanded(_full(topic))}
+            if (parts := self._old_parts(_full(topic))) is not None:
+                yield {"op": "send_action_goal", "action": parts[1]}
 
     def _note(self, client: _Client, text: str) -> None:
         if client.noted != text:

@@ -113,7 +113,7 @@ def encoded(message: Image | CompressedImage, want: Picture) -> bytes:
             return data
         try:
             picture = Pictures.open(BytesIO(data)).convert("RGB")
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, SyntaxError, Pictures.DecompressionBombError) as error:
             raise WrongPictureError(f"what is compressed as '{message.format[:40]}' is no picture") from error
     else:
         picture = Pictures.fromarray(pixels(message))

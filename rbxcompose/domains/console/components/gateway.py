@@ -41,7 +41,7 @@ from rbxcompose.commands.lookup import place_of
 from rbxcompose.domains.console.access import LOCAL_NAMES, Door, Role, network_names, own_secret, role_of, secret_path
 from rbxcompose.domains.console.lease import DriveLimits
 from rbxcompose.domains.console.log_tail import findings, tail
-from rbxcompose.domains.console.models import served
+from rbxcompose.domains.console.models import MESHES, ServedFile, ServedModel
 from rbxcompose.domains.console.protocol import (
     LARGEST,
     RELEASE,
@@ -67,7 +67,6 @@ from rbxcompose.domains.console.protocol import (
 )
 from rbxcompose.domains.console.streams import BOUNDARY, Streams, part
 from rbxcompose.domains.console.video import IMAGES, Picture, WrongPictureError, list_page, viewer_page, wanted
-from rbxcompose.msgs.std_msgs import String
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.runtime.control import NoAnswerError, ask_as_data
 from rbxcompose.runtime.folder import FINDINGS, BrokenStateError, RobotFolder, all_folders
@@ -85,6 +84,7 @@ if TYPE_CHECKING:
 
 STATIC = Path(__file__).parents[1] / "static"  # the built page
 MOST_CLIENTS = 64
+MOST_STRANGERS = 8  # clients that have not said yet who they are
 PACKAGES = ("PIL", "cbor2", "segno", "starlette", "uvicorn", "websockets")
 SOCKETS = ("/", "/rosbridge")  # where WebSockets are taken
 _PAUSE = 0.1  # [s] between two looks for the robot's own state
@@ -145,6 +145,10 @@ class GatewayConfig(Config):
     """The values of the manifest: topic, type and field of each, and the unit of the number in the message."""
     places: dict[str, dict[str, Any]] = {}
     """The places of the manifest: `x` and `y` [m], `heading` [rad] and `colour` of each."""
+    urdf: str = ""
+    """Text of the URDF; empty if the robot has no body."""
+    meshes: dict[str, str] = {}
+    """The mesh files that exist, by their names in the URDF."""
 
     @property
     def drive(self) -> DriveLimits | None:
@@ -419,7 +423,6 @@ class GatewaySession:
         self._is_command: dict[str, bool] = dict.fromkeys((STOP["type"], RELEASE["type"]), True)
         self._is_command |= dict.fromkeys(("robot.RobotStatus", _DESCRIBE["type"]), False)
         self._saving = asyncio.Lock()
-        self._served = served("")
         self._watches: dict[str, asyncio.Task[None]] = {}  # by window
         guest.scheduler.on_error = lambda owner, error: self._loop.call_exception_handler(
             {"message": str(error), "exception": error}
@@ -510,46 +513,32 @@ class GatewaySession:
 
     def _model(self) -> list[Any]:
         """Return the addresses of the body and its meshes."""
-        from starlette.responses import FileResponse, PlainTextResponse
-        from starlette.responses import Response as Answer
         from starlette.routing import Route
 
+        model = ServedModel(self._config.urdf, self._config.meshes)
+
         async def urdf(request: Request) -> Response:
-            if self._role(request) < Role.VIEW:
-                return PlainTextResponse("this needs a link with a token\n", 401)
-            if (text := await self._description()) is None:
-                return PlainTextResponse("this robot has no body\n", 404)
-            self._served = served(text)
-            return Answer(self._served.urdf, media_type="application/xml", headers={"cache-control": "no-store"})
+            return self._file(request, model.urdf)
 
         async def mesh(request: Request) -> Response:
-            found = self._served.file(request.path_params["number"])
-            if self._role(request) < Role.VIEW or found is None:
-                return PlainTextResponse("there is no such mesh\n", 404)
-            path, kind = found
-            return FileResponse(path, media_type=kind)
+            if self._role(request) < Role.VIEW:
+                return self._file(request, None)
+            return self._file(request, await asyncio.to_thread(model.mesh, request.path_params["address"]))
 
-        return [Route("/console/model.urdf", urdf), Route("/console/meshes/{number:int}/{name}", mesh)]
+        return [Route("/console/model.urdf", urdf), Route(f"{MESHES}{{address:path}}", mesh)]
 
-    async def _description(self) -> str | None:
-        """Return the URDF that the robot publishes; None if it publishes none."""
-        known = [topic for topic, type_ in self._graph.topics().items() if type_ == String.TYPE]
-        topic = next((topic for topic in known if topic.endswith("/robot_description")), None)
-        if topic is None:
-            return None
-        came: asyncio.Future[str] = self._loop.create_future()
+    def _file(self, request: Request, file: ServedFile | None) -> Response:
+        """Return a file of the robot's body to who may see it, unless the browser has it already."""
+        from starlette.responses import JSONResponse, Response
 
-        def arrived(message: String) -> None:
-            if not came.done():
-                came.set_result(message.data)
-
-        end = self._bus.subscribe(
-            NAME, topic, String, Qos.LATCHED, arrived, max_rate=math.inf, limits=BULK, may_be_silent=True
-        )
-        self._pump()
-        await asyncio.wait({came}, timeout=_PATIENCE)
-        self._withdraw(end)
-        return came.result() if came.done() else None
+        if self._role(request) < Role.VIEW:
+            return JSONResponse({"message": "this needs a link with a token"}, 401)
+        if file is None:
+            return JSONResponse({"message": "the robot's body has no such file"}, 404)
+        headers = {"etag": file.tag, "cache-control": "no-cache"}
+        if file.tag in request.headers.get("if-none-match", ""):
+            return Response(status_code=304, headers=headers)
+        return Response(file.content, media_type=file.kind, headers=headers)
 
     def _video(self) -> list[Any]:
         """Return the pages of pictures, at the addresses of web_video_server."""
@@ -673,10 +662,11 @@ class GatewaySession:
     async def _talk(self, web_socket: WebSocket) -> None:
         """Serve one client until it leaves."""
         await web_socket.accept()
-        if len(self._bridge) >= MOST_CLIENTS:
+        role = self._role(web_socket)
+        if len(self._bridge) >= MOST_CLIENTS or (role is Role.NOBODY and self._bridge.strangers >= MOST_STRANGERS):
             await web_socket.close(1013)
             return
-        number = self._bridge.open(self._role(web_socket), _address(web_socket))
+        number = self._bridge.open(role, _address(web_socket))
         self._wakes[number] = asyncio.Event()
         shy = self._loop.call_later(_SHY, self._ask_who, number)
         sender = asyncio.create_task(self._send(web_socket, number))

@@ -12,6 +12,7 @@ from rbxcompose.compiler.model.values import value_of
 from rbxcompose.compiler.sections.bus import bus
 from rbxcompose.compiler.sections.places import places
 from rbxcompose.compiler.sections.values import values
+from rbxcompose.domains.body.sections.body import body
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Contents, Reading, WantedComponent, Wiring
@@ -75,6 +76,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         "camera": _camera(read.drive.camera, components, namespace),
         "values": _values(contents, components, namespace),
         "places": _places(contents),
+        **_body(contents),
     }
     yield WantedComponent(GATEWAY, GATEWAY, config, ("console",))
 
@@ -100,6 +102,13 @@ def _places(contents: Contents) -> dict[str, object]:
         }
         for name, place in contents.of(places).items()
     }
+
+
+def _body(contents: Contents) -> dict[str, object]:
+    """Return the description that is published, and its mesh files; nothing if the robot has no body."""
+    if (found := contents.of(body)) is None:
+        return {}
+    return {"urdf": found.published, "meshes": {name: str(path) for name, path in found.meshes.items()}}
 
 
 def _drive(page: DrivePage, components: Mapping[str, RobotComponent], namespace: str) -> dict[str, object]:
