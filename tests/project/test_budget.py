@@ -45,7 +45,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/arms": (12431, 74, 2, 1135),
     "domains/bases": (1444, 14, 0, 113),
     "domains/body": (3540, 28, 2, 372),
-    "domains/console": (2772, 20, 4, 248),
+    "domains/console": (2789, 20, 3, 254),
     "domains/devices": (741, 9, 0, 80),
     "domains/diagnostics": (2349, 24, 4, 214),
     "domains/muxes": (1984, 15, 1, 116),
