@@ -14,13 +14,13 @@ from rbxcompose.domains.console.access import (
     Door,
     Role,
     needed,
-    network_address,
     own_secret,
     renew_secret,
     role_of,
     secret_path,
     token_of,
 )
+from rbxcompose.domains.console.links import network_address
 
 ROLES = [Role.VIEW, Role.OPERATE, Role.CONFIGURE]
 SECRET = bytes(32)
@@ -80,6 +80,16 @@ def test_a_secret_stays_until_it_is_renewed_and_nobody_else_reads_it(
     renew_secret()
     assert own_secret() != first
     assert os.listdir(secret_path().parent) == [secret_path().name]
+
+
+def test_a_secret_that_could_be_guessed_is_not_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    own_secret()
+    secret_path().write_bytes(b"")
+    with pytest.raises(OSError, match="damaged"):
+        own_secret()
+    renew_secret()
+    assert len(own_secret()) == 32
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,7 @@ def test_viewers_of_the_same_share_an_encoding_and_the_topic(run: Run) -> None:
         assert sorted(camera.encoded) == [(7, 0), (7, 8)]
         for viewer in viewers:
             assert camera.listeners
-            await viewer.aclose()  # type: ignore[attr-defined]
+            await viewer.aclose()
         assert camera.listeners == []
 
     run(look)
@@ -100,7 +100,7 @@ def test_frames_that_are_overtaken_are_never_encoded(run: Run) -> None:
         await camera.shows()
         assert await first in (b"\x01", b"\x04")
         assert camera.encoded == [(1, 0), (4, 0)]
-        await viewer.aclose()  # type: ignore[attr-defined]
+        await viewer.aclose()
 
     run(look)
 

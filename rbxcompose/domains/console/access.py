@@ -6,6 +6,7 @@ operation `auth`.
 """
 
 import base64
+import errno
 import hashlib
 import hmac
 import ipaddress
@@ -13,12 +14,14 @@ import os
 import secrets
 import socket
 from collections.abc import Mapping
+from contextlib import suppress
 from enum import IntEnum
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import replace_file
 
 LOCAL_NAMES = ("127.0.0.1", "localhost", "[::1]")  # of this machine
 _SECRET_BYTES = 32
@@ -94,15 +97,19 @@ def own_secret() -> bytes:
     """Return the secret of this user; made, for nobody else to read, if there is none.
 
     Raises:
-        OSError: if it can neither be read nor written.
+        OSError: if it can neither be read nor written, or is damaged.
     """
     path = secret_path()
-    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        renew_secret()
-        return path.read_bytes()
+    if not path.exists():
+        made = path.with_name(f"{path.name}.{os.getpid()}")
+        _write_secret(made)
+        with suppress(FileExistsError):  # another process was first: its links are out
+            os.link(made, path)
+        made.unlink()
+    secret = path.read_bytes()
+    if len(secret) != _SECRET_BYTES:  # tokens of a known secret could be guessed
+        raise OSError(errno.EINVAL, "it is damaged: 'rbxcompose console --renew' makes another", str(path))
+    return secret
 
 
 def renew_secret() -> None:
@@ -111,16 +118,12 @@ def renew_secret() -> None:
     Raises:
         OSError: if it cannot be written.
     """
-    path = secret_path()
+    _write_secret(secret_path())
+
+
+def _write_secret(path: Path) -> None:
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    new = path.with_name(f"{path.name}.{os.getpid()}")
-    handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    try:
-        os.write(handle, secrets.token_bytes(_SECRET_BYTES))
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-    new.replace(path)
+    replace_file(path, secrets.token_bytes(_SECRET_BYTES), mode=0o600)
 
 
 def token_of(secret: bytes, robot: str, role: Role) -> str:
@@ -190,18 +193,3 @@ def network_names() -> tuple[str, ...]:
     """Return the names by which others in the network know this machine."""
     name = socket.gethostname().lower()
     return tuple(dict.fromkeys((name, f"{name.partition('.')[0]}.local")))
-
-
-def network_address() -> str:
-    """Return the address that others in the network reach this machine by; of this machine only, if there is none."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as chosen:
-        try:
-            chosen.connect(("192.0.2.1", 9))  # documentation's network: nothing is sent
-        except OSError:
-            return LOCAL_NAMES[0]
-        return str(chosen.getsockname()[0])
-
-
-def link(host: str, port: int, token: str = "") -> str:
-    """Return the address of the page; what is behind `#` is not sent by browsers, and in no log of a server."""
-    return f"http://{host}:{port}/" + (f"#token={token}" if token else "")

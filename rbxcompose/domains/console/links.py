@@ -1,17 +1,10 @@
-"""The link of a robot's page, and its picture for the camera of a phone."""
+"""Links to a robot's page: where it is in the network, the token within, and the picture for the camera of a phone."""
 
+import socket
 import sys
 
 from rbxcompose.commands.console import emit
-from rbxcompose.domains.console.access import (
-    LOCAL_NAMES,
-    Role,
-    link,
-    network_address,
-    own_secret,
-    secret_path,
-    token_of,
-)
+from rbxcompose.domains.console.access import LOCAL_NAMES, Role, own_secret, secret_path, token_of
 
 
 def show_link(robot: str, port: int, *, is_lan: bool, role: Role = Role.OPERATE) -> None:
@@ -30,3 +23,18 @@ def show_link(robot: str, port: int, *, is_lan: bool, role: Role = Role.OPERATE)
         import segno  # of the extra `console`, which a robot with a page has
 
         segno.make(address, error="l").terminal(compact=True, border=2)
+
+
+def link(host: str, port: int, token: str = "") -> str:
+    """Return the address of the page; what is behind `#` is not sent by browsers, and in no log of a server."""
+    return f"http://{host}:{port}/" + (f"#token={token}" if token else "")
+
+
+def network_address() -> str:
+    """Return the address that others in the network reach this machine by; of this machine only, if there is none."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as chosen:
+        try:
+            chosen.connect(("192.0.2.1", 9))  # documentation's network: nothing is sent
+        except OSError:
+            return LOCAL_NAMES[0]
+        return str(chosen.getsockname()[0])

@@ -12,14 +12,13 @@ from typing import Any
 
 from rbxcompose.sdk.bound import Outcome
 
-PARTS = ("goal", "cancel", "status", "feedback", "result")
-_TOPIC = re.compile(rf"(?P<action>/.+)/(?P<part>{'|'.join(PARTS)})")
+_TOPIC = re.compile(r"(?P<action>/.+)/(?P<part>goal|cancel|status|feedback|result)")
 _STANDS_FOR = {"/move_base": "nav2_msgs/action/NavigateToPose"}
 _NEW_NAMES = {"target_pose": "pose"}  # of fields of goals
 _OLD_NAMES = {"current_pose": "base_position"}  # of fields of feedback
-PENDING, ACTIVE = 0, 1
+ACTIVE = 1
 STATES = {Outcome.SUCCEEDED: 3, Outcome.CANCELED: 2, Outcome.ABORTED: 4, Outcome.REJECTED: 5, Outcome.LOST: 9}
-"""Numbers of `actionlib_msgs/GoalStatus`."""
+"""Numbers of `actionlib_msgs/GoalStatus`, as is `ACTIVE`."""
 MOST_STATUSES = 20
 
 

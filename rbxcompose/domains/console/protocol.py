@@ -30,7 +30,7 @@ from rbxcompose.domains.console.encodings import (
 )
 from rbxcompose.domains.console.json_messages import WrongMessageError, arguments, encoded, from_json, to_json
 from rbxcompose.domains.console.lease import LATEST, DriveLease, DriveLimits, Lateness, limited, moves
-from rbxcompose.domains.console.rosapi import GraphView
+from rbxcompose.domains.console.rosapi import GraphView, absolute
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.rcl_interfaces import GetParameters, ListParameters, SetParameters
 from rbxcompose.msgs.types import Action, Message, Service
@@ -132,7 +132,7 @@ class Unserve:
 
 @dataclass(frozen=True, slots=True)
 class ServiceAnswer:
-    """ServiceAnswer a request; without a response, by why there is none."""
+    """Answer a request; without a response, by why there is none."""
 
     number: int
     response: Message | None
@@ -242,14 +242,17 @@ class _Shared:
 
     def frame(self, head: str, topic: str, compression: str) -> str | bytes:
         """Return the frame that publishes it; `head` begins one of text."""
-        if self._message is None or compression in ("none", "png"):
-            frame = f"{head}{self.text}}}"
-            return as_png(frame) if compression == "png" else frame
+        is_text = compression == "none" or (self._message is None and compression != "png")
+        if is_text:
+            return f"{head}{self.text}}}"
         key = f"{compression} {topic}"
         if key not in self._encoded:
-            is_raw = compression == "cbor-raw"
-            made = as_raw_cbor(topic, self._message, self._stamp) if is_raw else as_cbor(topic, self._message)
-            self._encoded[key] = made
+            if self._message is None or compression == "png":
+                self._encoded[key] = as_png(f"{head}{self.text}}}")
+            elif compression == "cbor":
+                self._encoded[key] = as_cbor(topic, self._message)
+            else:
+                self._encoded[key] = as_raw_cbor(topic, self._message, self._stamp)
         return self._encoded[key]
 
 
@@ -659,15 +662,15 @@ class Bridge:
             raise BadFrameError(f"this needs the role '{least.word}'; yours is '{client.role.word}'")
         if least > Role.VIEW:
             name = next((str(data[key]) for key in ("topic", "service", "action", "id") if key in data), "")
-            if data["op"] != "publish" or _full(name) not in client.advertised:
+            if data["op"] != "publish" or absolute(name) not in client.advertised:
                 self._note(client, f"{data['op']} {_short(name)}")
 
     def _meanings(self, data: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
         """Yield a frame, and what it amounts to if its topic stands for another one, or for an action."""
         yield data
         if data.get("op") in ("publish", "advertise") and isinstance(topic := data.get("topic"), str):
-            yield {**data, "topic": self._commanded(_full(topic))}
-            if (parts := self._old_parts(_full(topic))) is not None:
+            yield {**data, "topic": self._commanded(absolute(topic))}
+            if (parts := self._old_parts(absolute(topic))) is not None:
                 yield {"op": "send_action_goal", "action": parts[1]}
 
     def _note(self, client: _Client, text: str) -> None:
@@ -805,7 +808,7 @@ class Bridge:
         if client.open_calls >= MOST_SUBSCRIPTIONS:
             raise BadFrameError(f"at most {MOST_SUBSCRIPTIONS} calls of a client are open")
         self._calls_so_far += 1
-        number, full, given = self._calls_so_far, _full(name), data.get("args")
+        number, full, given = self._calls_so_far, absolute(name), data.get("args")
         self._calls[number] = _Waiting(client.number, data.get("id"), name)
         client.open_calls += 1
         try:
@@ -954,7 +957,7 @@ class Bridge:
         if not isinstance(name := given.get("name"), str):
             raise WrongMessageError("'name' is a text")
         node, sign, parameter = name.rpartition(":") if ":" in name else name.rpartition("/")
-        node = _full(node)
+        node = absolute(node)
         if not sign or f"{node}/get_parameters" not in self._graph.services():
             raise WrongMessageError(f"there is no node with a parameter '{_short(name)}'")
         return node, parameter
@@ -974,7 +977,7 @@ class Bridge:
         try:
             self._require(client, data)
             wants_feedback = data.get("feedback") is True
-            goal = _Goal(client.number, data.get("id"), name, _full(name), is_old=False)
+            goal = _Goal(client.number, data.get("id"), name, absolute(name), is_old=False)
             self._begin_goal(client, goal, data.get("args"), wants_feedback=wants_feedback)
         except (BadFrameError, WrongMessageError) as error:
             refused = _Goal(client.number, data.get("id"), name, "", is_old=False)
@@ -1286,22 +1289,18 @@ def _topic_of(data: Mapping[str, Any]) -> tuple[str, str]:
     name = data.get("topic")
     if not isinstance(name, str) or not _is_name(name):
         raise BadFrameError("'topic' is the name of a topic")
-    return name, _full(name)
+    return name, absolute(name)
 
 
 def _service_of(data: Mapping[str, Any]) -> str:
     name = data.get("service")
     if not isinstance(name, str) or not _is_name(name):
         raise BadFrameError("'service' is the name of a service")
-    return _full(name)
+    return absolute(name)
 
 
 def _is_name(name: str) -> bool:
     return len(name) <= _LONGEST_ROS_NAME and _NAME.fullmatch(name) is not None
-
-
-def _full(name: str) -> str:
-    return f"/{name.lstrip('/')}"
 
 
 def _key(data: Mapping[str, Any]) -> str | None:

@@ -11,7 +11,7 @@ from rbxcompose.msgs.definitions import FieldShape, FieldType, parse_type
 from rbxcompose.msgs.types import Message
 
 _LINE = "=" * 80
-_EXAMPLES = {"string": "", "wstring": "", "boolean": False}
+_EXAMPLES = {"string": "", "wstring": "", "bool": False}
 _HOST = "localhost"
 _VERSION = {"version": 2, "distro": "jazzy"}  # the release whose types and wire format the bus has
 
@@ -109,7 +109,7 @@ def _topics_and_raw_types(graph: GraphView) -> dict[str, Any]:
 
 
 def _node_details(graph: GraphView, node: str) -> dict[str, Any]:
-    wanted = _full(node)
+    wanted = absolute(node)
     return {
         "publishing": [topic for topic in graph.topics() if wanted in graph.publishers(topic)],
         "subscribing": [topic for topic in graph.topics() if wanted in graph.subscribers(topic)],
@@ -122,18 +122,18 @@ _ANSWERS: Mapping[str, Callable[..., dict[str, Any]]] = {
     "topics_and_raw_types": _topics_and_raw_types,
     "services": lambda graph: {"services": sorted(graph.services())},
     "action_servers": lambda graph: {"action_servers": sorted(graph.actions())},
-    "action_type": lambda graph, action: {"type": graph.actions().get(_full(action), "")},
+    "action_type": lambda graph, action: {"type": graph.actions().get(absolute(action), "")},
     "nodes": lambda graph: {"nodes": list(graph.nodes())},
     "node_details": _node_details,
-    "topic_type": lambda graph, topic: {"type": graph.topics().get(_full(topic), "")},
-    "service_type": lambda graph, service: {"type": graph.services().get(_full(service), "")},
-    "service_node": lambda graph, service: {"node": next(iter(graph.servers(_full(service))), "")},
-    "service_host": lambda graph, service: {"host": _HOST if _full(service) in graph.services() else ""},
+    "topic_type": lambda graph, topic: {"type": graph.topics().get(absolute(topic), "")},
+    "service_type": lambda graph, service: {"type": graph.services().get(absolute(service), "")},
+    "service_node": lambda graph, service: {"node": next(iter(graph.servers(absolute(service))), "")},
+    "service_host": lambda graph, service: {"host": _HOST if absolute(service) in graph.services() else ""},
     "service_providers": lambda graph, type_: {"providers": _of_type(graph.services(), type_, "srv")},
     "topics_for_type": lambda graph, type_: {"topics": _of_type(graph.topics(), type_, "msg")},
     "services_for_type": lambda graph, type_: {"services": _of_type(graph.services(), type_, "srv")},
-    "publishers": lambda graph, topic: {"publishers": list(graph.publishers(_full(topic)))},
-    "subscribers": lambda graph, topic: {"subscribers": list(graph.subscribers(_full(topic)))},
+    "publishers": lambda graph, topic: {"publishers": list(graph.publishers(absolute(topic)))},
+    "subscribers": lambda graph, topic: {"subscribers": list(graph.subscribers(absolute(topic)))},
     "get_ros_version": lambda graph: dict(_VERSION),
 }
 
@@ -202,7 +202,8 @@ def _of_type(names: Mapping[str, str], type_: str, kind: str) -> list[str]:
     return [name for name, known in names.items() if known == wanted]
 
 
-def _full(name: str) -> str:
+def absolute(name: str) -> str:
+    """Return a name with its first slash, which clients may leave out."""
     return f"/{name.lstrip('/')}"
 
 

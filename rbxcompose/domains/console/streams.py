@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncGenerator, Callable
 from typing import Any
 
 from rbxcompose.domains.console.video import IMAGES, Picture, WrongPictureError, encoded
@@ -35,15 +35,17 @@ class _Stream:
             self._task = asyncio.get_running_loop().create_task(self._encode())
 
     async def _encode(self) -> None:
-        while self._newest is not None:
-            message, self._newest = self._newest, None
-            try:
-                self.frame, self.error = await asyncio.to_thread(encoded, message, self.want), ""  # type: ignore[arg-type]
-            except WrongPictureError as error:
-                self.frame, self.error = b"", str(error)
-            self.changed.set()
-            self.changed = asyncio.Event()
-        self._is_busy = False
+        try:
+            while self._newest is not None:
+                message, self._newest = self._newest, None
+                try:
+                    self.frame, self.error = await asyncio.to_thread(encoded, message, self.want), ""  # type: ignore[arg-type]
+                except WrongPictureError as error:
+                    self.frame, self.error = b"", str(error)
+                self.changed.set()
+                self.changed = asyncio.Event()
+        finally:
+            self._is_busy = False
 
 
 class Streams:
@@ -62,7 +64,7 @@ class Streams:
         self._streams: dict[Picture, _Stream] = {}
         self._topics: dict[str, Callable[[], None]] = {}
 
-    async def frames(self, want: Picture) -> AsyncIterator[bytes]:
+    async def frames(self, want: Picture) -> AsyncGenerator[bytes, None]:
         """Yield pictures, the newest ones only, until the viewer leaves.
 
         Raises:
@@ -72,15 +74,28 @@ class Streams:
         try:
             while True:
                 changed = stream.changed
-                if stream.frame or stream.error:
-                    if stream.error:
-                        raise WrongPictureError(stream.error)
+                if stream.error:
+                    raise WrongPictureError(stream.error)
+                if stream.frame:
                     yield stream.frame
-                    await changed.wait()
-                else:
-                    await changed.wait()
+                await changed.wait()
         finally:
             self._leave(stream)
+
+    async def begun(self, want: Picture) -> tuple[bytes, AsyncGenerator[bytes, None]]:
+        """Return the first picture, and those that follow; who takes no more closes them.
+
+        Raises:
+            WrongPictureError: if there is none.
+        """
+        frames = self.frames(want)
+        first = asyncio.ensure_future(anext(frames))
+        await asyncio.wait({first}, timeout=FIRST)
+        if first.done():
+            return first.result(), frames
+        first.cancel()
+        await asyncio.wait({first})
+        raise WrongPictureError(f"no picture came on '{want.topic}' in {FIRST:.0f} s")
 
     async def snapshot(self, want: Picture) -> bytes:
         """Return one picture.
@@ -88,18 +103,9 @@ class Streams:
         Raises:
             WrongPictureError: if there is none.
         """
-        frames = self.frames(want)
-        first = asyncio.ensure_future(anext(frames))
-        try:
-            await asyncio.wait({first}, timeout=FIRST)
-            if not first.done():
-                raise WrongPictureError(f"no picture came on '{want.topic}' in {FIRST:.0f} s")
-            return first.result()
-        finally:
-            if not first.done():
-                first.cancel()
-                await asyncio.wait({first})
-            await frames.aclose()  # type: ignore[attr-defined]
+        first, frames = await self.begun(want)
+        await frames.aclose()
+        return first
 
     def _joined(self, want: Picture) -> _Stream:
         type_ = self._type_of(want.topic)

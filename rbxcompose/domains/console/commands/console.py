@@ -9,7 +9,7 @@ import argparse
 
 from rbxcompose.commands.console import NotDoneError, emit
 from rbxcompose.commands.lookup import REFUSED, add_robot_option, answer_of, find_robot
-from rbxcompose.domains.console.access import Role, renew_secret
+from rbxcompose.domains.console.access import Role, renew_secret, secret_path
 from rbxcompose.domains.console.links import show_link
 from rbxcompose.runtime.requests import DescribeRobot
 
@@ -27,7 +27,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the link."""
     if arguments.renew:
-        renew_secret()
+        try:
+            renew_secret()
+        except OSError as error:
+            raise NotDoneError(REFUSED.at(None, f"{secret_path()}: {error.strerror}")) from error
         emit("tokens are renewed: links that were given away open nothing once their robots are up again")
         return 0
     folder = find_robot(arguments.robot)

@@ -105,6 +105,7 @@ _HEADERS = (
     (b"x-frame-options", b"DENY"),
     (b"referrer-policy", b"no-referrer"),
 )
+_LOCKED = {"message": "this needs a link with a token"}
 _DESCRIBE = {"type": "robot.DescribeRobot"}
 _SHOWN = 60  # characters of a name that is wrong
 _NOT_BUILT = Path(__file__).parents[1] / "not_built.html"
@@ -487,7 +488,7 @@ class GatewaySession:
         async def config(request: Request) -> Response:
             role = self._role(request)
             if role < Role.VIEW:
-                return JSONResponse({"message": "this needs a link with a token"}, 401)
+                return JSONResponse(_LOCKED, 401)
             return JSONResponse(self._shown_config() | {"role": role.word}, headers={"cache-control": "no-store"})
 
         async def log_in(request: Request) -> Response:
@@ -532,7 +533,7 @@ class GatewaySession:
         from starlette.responses import JSONResponse, Response
 
         if self._role(request) < Role.VIEW:
-            return JSONResponse({"message": "this needs a link with a token"}, 401)
+            return JSONResponse(_LOCKED, 401)
         if file is None:
             return JSONResponse({"message": "the robot's body has no such file"}, 404)
         headers = {"etag": file.tag, "cache-control": "no-cache"}
@@ -542,14 +543,14 @@ class GatewaySession:
 
     def _video(self) -> list[Any]:
         """Return the pages of pictures, at the addresses of web_video_server."""
-        from starlette.responses import HTMLResponse, PlainTextResponse, StreamingResponse
+        from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, StreamingResponse
         from starlette.responses import Response as Answer
         from starlette.routing import Route
 
         def shown(show: Callable[[Request, Picture], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
             async def answer(request: Request) -> Response:
                 if self._role(request) < Role.VIEW:
-                    return PlainTextResponse("this needs a link with a token\n", 401)
+                    return JSONResponse(_LOCKED, 401)
                 try:
                     return await show(request, wanted(request.query_params))
                 except WrongPictureError as error:
@@ -558,14 +559,16 @@ class GatewaySession:
             return answer
 
         async def stream(_: Request, want: Picture) -> Response:
-            frames = self._streams.frames(want)
-            first = await anext(frames)  # so that what is wrong has an answer of its own
+            first, frames = await self._streams.begun(want)  # so that what is wrong has an answer of its own
 
             async def parts() -> AsyncIterator[bytes]:
-                yield part(first, want.mime)
-                with suppress(WrongPictureError):
-                    async for frame in frames:
-                        yield part(frame, want.mime)
+                try:
+                    yield part(first, want.mime)
+                    with suppress(WrongPictureError):
+                        async for frame in frames:
+                            yield part(frame, want.mime)
+                finally:
+                    await frames.aclose()
 
             kind = f"multipart/x-mixed-replace;boundary={BOUNDARY}"
             return StreamingResponse(parts(), media_type=kind, headers={"cache-control": "no-store"})
@@ -579,7 +582,7 @@ class GatewaySession:
 
         async def listed(request: Request) -> Response:
             if self._role(request) < Role.VIEW:
-                return PlainTextResponse("this needs a link with a token\n", 401)
+                return JSONResponse(_LOCKED, 401)
             return HTMLResponse(list_page(self._image_topics()))
 
         routes = {"/stream": stream, "/snapshot": snapshot, "/stream_viewer": viewer}
@@ -679,6 +682,7 @@ class GatewaySession:
             shy.cancel()
             sender.cancel()
             del self._wakes[number]
+            self._unknown.discard(number)
             self._do(self._bridge.close(number, self._now, self._stamp))
 
     def _ask_who(self, number: int) -> None:
@@ -700,7 +704,6 @@ class GatewaySession:
             await wake.wait()
             if timer is not None:
                 timer.cancel()
-        self._unknown.discard(number)
         await web_socket.close(1008)
 
     # The bus
@@ -863,7 +866,7 @@ class GatewaySession:
         self._pump()
 
     async def _save(self, request: SaveSettings) -> None:
-        """SaveSettings as the command line does, in a process of its own: it needs the whole compiler."""
+        """Save as the command line does, in a process of its own: it needs the whole compiler."""
         trial = ("--dry-run",) if request.is_trial else ()
         robot = ("--robot", self._folder.path.name)
         command = (sys.executable, "-m", "rbxcompose", "param", "save", "--json", *robot, *trial, *request.names)
