@@ -56,6 +56,14 @@ def plan(page: Page) -> None:
     page.wait_for_timeout(1500)
 
 
+def whole_world(page: Page) -> None:
+    """Show the robot in all of its world."""
+    look(page)
+    page.get_by_label("World", exact=True).check()
+    page.get_by_role("button", name="All of the world").click()
+    page.wait_for_timeout(3000)
+
+
 def plot(page: Page) -> None:
     """Plot where the robot is."""
     look(page)
@@ -73,7 +81,9 @@ ROBOTS: dict[str, dict[str, Callable[[Page], None]]] = {
         "data": plot,
     },
     "pi_robot": {"model": plan},
+    "house": {"map": look, "model": whole_world},
 }
+PREFIXES = {"house": "navigation"}  # of the names of pictures, where they are not about the console
 
 
 def free_port() -> int:
@@ -99,14 +109,14 @@ def running(robot: str) -> Iterator[str]:
             subprocess.run([*command, "down", robot], env=own, check=True)
 
 
-def draw(browser: Browser, url: str, pages: dict[str, Callable[[Page], None]]) -> None:
+def draw(browser: Browser, url: str, pages: dict[str, Callable[[Page], None]], prefix: str = "console") -> None:
     """Draw pages of one robot."""
     for scheme, suffix in SCHEMES.items():
         for name, prepare in pages.items():
             page = browser.new_page(viewport=SIZE, color_scheme=scheme, device_scale_factor=1.5)
             page.goto(f"{url}#{name}")
             prepare(page)
-            page.screenshot(path=DOCS / f"console_{name}{suffix}.png")
+            page.screenshot(path=DOCS / f"{prefix}_{name}{suffix}.png")
             page.close()
 
 
@@ -127,7 +137,7 @@ def main() -> None:
                     waiting = browser.new_page()
                     waiting.wait_for_timeout(RUNNING)
                     waiting.close()
-                    draw(browser, url, pages)
+                    draw(browser, url, pages, PREFIXES.get(robot, "console"))
     finally:
         gateway.close()
         other.close()

@@ -34,6 +34,8 @@ MENU: Mapping[str, str | Mapping[str, str]] = {
         "Bodies": "body.md",
         "Servos": "servos.md",
         "Arms": "arms.md",
+        "Worlds and navigation": "navigation.md",
+        "Seeing": "seeing.md",
         "Several hosts": "systems.md",
         "ROS 2": "interop.md",
     },

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 REAL_TIME = {
-    "servos and faults": (
+    "servos, faults and pages": (
         "tests/actuation/test_bus_load",
         "tests/actuation/test_dynamixel_bus",
         "tests/actuation/test_recovery",
         "tests/cli/test_servo",
         "tests/controllers/test_diff_drive_bytes",
+        "tests/console/test_page",
         "tests/exposure/",
         "tests/faults/",
-    ),
-    "robots and systems": (
-        "tests/console/test_gateway_live",
-        "tests/console/test_page",
         "tests/net/",
         "tests/robots/test_real_picking",
         "tests/robots/test_three_levels",
+    ),
+    "robots and systems": (
+        "tests/console/test_gateway_live",
         "tests/runtime/test_apply_for_real",
         "tests/runtime/test_changes_for_real",
         "tests/runtime/test_external_clock",

@@ -183,7 +183,7 @@ function inputOf(one: Field, port: Port): { element: HTMLElement; read: () => st
 }
 
 /** Returns a button that calls a service, or sends a goal and becomes the one that cancels it. */
-function runButton(port: Port, robot: Robot, title: string, message: () => Message, says: HTMLElement): HTMLButtonElement {
+export function runButton(port: Port, robot: Robot, title: string, message: () => Message, says: HTMLElement): HTMLButtonElement {
   const isAction = port.kind === "serves_action";
   const button = h("button", { type: "button" }, icon(isAction ? "play" : "skip"), title);
   let cancel: (() => void) | null = null;

@@ -31,6 +31,8 @@ export interface Place {
 export interface Config {
   robot: string;
   about: string;
+  /** The pages that there are, in this order; all if it is empty. */
+  pages: string[];
   firstPage: string;
   drive: DriveConfig | null;
   /** The topic of the pictures that drivers see, empty if there is none. */
@@ -98,6 +100,7 @@ export function parseConfig(json: unknown): Config {
   return {
     robot: text(json.robot) || "robot",
     about: text(json.about),
+    pages: Array.isArray(json.pages) ? json.pages.map(text) : [],
     firstPage: text(json.first_page),
     camera: text(json.camera),
     role: text(json.role) || "configure",

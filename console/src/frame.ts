@@ -75,16 +75,15 @@ export function showFrame(config: Config, link: Rosbridge): void {
 }
 
 function route(host: HTMLElement, tabs: HTMLElement, robot: Robot): void {
-  const pages = allPages.filter((page) => page.isFor?.(robot) ?? true);
+  const wanted = robot.config.pages;
+  const pages = allPages.filter((page) => (page.isFor?.(robot) ?? true) && (wanted.length === 0 || wanted.includes(page.name)));
+  if (wanted.length > 0) pages.sort((a, b) => wanted.indexOf(a.name) - wanted.indexOf(b.name));
   const links = pages.map((page) => h("a", { href: `./#${page.name}` }, page.title));
   tabs.append(...links);
   let close = () => undefined as void;
   const open = () => {
-    const wanted = [location.hash.slice(1), robot.config.firstPage];
-    const turn = Math.max(
-      0,
-      wanted.map((name) => pages.findIndex((page) => page.name === name)).find((at) => at >= 0) ?? 0,
-    );
+    const names = [location.hash.slice(1), robot.config.firstPage];
+    const turn = names.map((name) => pages.findIndex((page) => page.name === name)).find((at) => at >= 0) ?? 0;
     const page = pages[turn];
     close();
     host.replaceChildren();

@@ -7,6 +7,7 @@ import {
   fitted,
   formatLength,
   Frames,
+  costPixels,
   gridPixels,
   gridStep,
   IDENTITY,
@@ -17,6 +18,7 @@ import {
   poseOf,
   quaternionOf,
   readGrid,
+  readMarkers,
   readPath,
   readScan,
   readTransform,
@@ -258,6 +260,12 @@ describe("a grid", () => {
     ]);
   });
 
+  it("of costs is seen through where it is cheap", () => {
+    const costs = costPixels(readGrid({ ...message, data: [0, 100, 50, -1, 0, 0] })!, [1, 2, 3]);
+    expect([...costs.slice(4 * 5, 4 * 6)]).toEqual([1, 2, 3, 140]);
+    expect([...costs].filter((_, at) => at % 4 === 3)).toEqual([0, 0, 70, 0, 0, 140]);
+  });
+
   it("that does not have as many cells as it says is none", () => {
     expect(readGrid({ ...message, data: [0] })).toBeNull();
     expect(readGrid({ ...message, info: { ...info, resolution: 0 } })).toBeNull();
@@ -292,5 +300,34 @@ describe("the trail", () => {
     trail.add({ x: 90, y: 0 }, 500_000);
     expect(trail.points).toEqual([]);
     expect(distance({ x: 0, y: 0 }, { x: 3, y: 4 })).toBe(5);
+  });
+});
+
+describe("markers", () => {
+  const pose = { position: { x: 1, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: Math.SQRT1_2, w: Math.SQRT1_2 } };
+  const point = (x: number, y: number) => ({ x, y, z: 0 });
+  const marker = { header: { frame_id: "map" }, action: 0, pose, color: { r: 1, g: 0.5, b: 0, a: 1 } };
+  const corners = [point(0, 0), point(2, 0), point(0, 1)];
+  const outline = { ...marker, type: 4, points: [...corners, point(0, 0)] };
+
+  it("are areas where a line is closed, turned by their pose, and texts", () => {
+    const text = { ...marker, type: 9, text: "stairs: keep out" };
+    const { frame, areas, labels } = readMarkers({ markers: [{ header: { frame_id: "/map" }, action: 3 }, outline, text] });
+    expect(frame).toBe("map");
+    expect(areas).toHaveLength(1);
+    expect(areas[0]!.colour).toBe("rgb(255 128 0 / 1)");
+    expect(areas[0]!.corners).toHaveLength(3);
+    near(areas[0]!.corners[0]!, { x: 1, y: 2 });
+    expect(labels).toMatchObject([{ at: { x: 1, y: 0 }, text: "stairs: keep out" }]);
+  });
+  it("are nothing that is drawn where they are open lines, of other types, or elsewhere", () => {
+    const others = [
+      { ...outline, points: corners },
+      { ...outline, type: 1 },
+      { ...outline, action: 2 },
+      { ...outline, header: { frame_id: "odom" } },
+    ];
+    expect(readMarkers({ markers: [{ ...marker, type: 0 }, ...others] })).toEqual({ frame: "map", areas: [], labels: [] });
+    expect(readMarkers({})).toEqual({ frame: "", areas: [], labels: [] });
   });
 });

@@ -151,6 +151,28 @@ function readNumbers<K extends string>(message: Json | undefined, names: readonl
     : null;
 }
 
+/** A transform that somebody has published, and when [s]. */
+export interface Stamped {
+  parent: string;
+  child: string;
+  transform: Transform;
+  stamp: number;
+}
+
+/** Returns the transforms of a `tf2_msgs/TFMessage`; those that miss a number are left out. */
+export function readTransforms({ transforms }: Message): Stamped[] {
+  return (Array.isArray(transforms) ? transforms.filter(isMessage) : []).flatMap((stamped) => {
+    const transform = readTransform(stamped.transform);
+    const stamp = isMessage(stamped.header) ? secondsOf(stamped.header.stamp) : 0;
+    return transform ? [{ parent: frameOf(stamped), child: plain(String(stamped.child_frame_id)), transform, stamp }] : [];
+  });
+}
+
+/** Returns a `builtin_interfaces/Time` in seconds. */
+export function secondsOf(stamp: Json | undefined): number {
+  return isMessage(stamp) ? Number(stamp.sec) + Number(stamp.nanosec) / 1e9 : 0;
+}
+
 export function frameOf(message: Message): string {
   return isMessage(message.header) && typeof message.header.frame_id === "string" ? plain(message.header.frame_id) : "";
 }
@@ -180,6 +202,49 @@ export function readPath(path: Message): Vector[] {
   });
 }
 
+/** A part of the map with a line around it, `colour` as a style sheet has it. */
+export interface Area {
+  corners: Vector[];
+  colour: string;
+}
+
+/** What is drawn of a `visualization_msgs/MarkerArray`: closed lines, and texts. */
+export interface Markers {
+  frame: string;
+  areas: Area[];
+  labels: { at: Vector; text: string }[];
+}
+
+const [LINE_STRIP, TEXT] = [4, 9]; // types of markers
+
+/** Returns the markers that are in the frame of the first one. */
+export function readMarkers(message: Message): Markers {
+  const all = Array.isArray(message.markers) ? message.markers.filter(isMessage) : [];
+  const frame = all[0] ? frameOf(all[0]) : "";
+  const drawn: Markers = { frame, areas: [], labels: [] };
+  for (const marker of all) {
+    const place = readTransform(marker.pose);
+    if (!place || frameOf(marker) !== frame || marker.action !== 0) continue;
+    if (marker.type === TEXT) drawn.labels.push({ at: place.translation, text: String(marker.text) });
+    if (marker.type !== LINE_STRIP || !Array.isArray(marker.points)) continue;
+    const corners = marker.points.flatMap((point) => {
+      const read = readNumbers(point, ["x", "y", "z"]);
+      return read ? [applied(place, read)] : [];
+    });
+    const [first, last] = [corners[0], corners.at(-1)];
+    const isClosed = corners.length > 3 && first && last && distance(first, last) === 0;
+    if (isClosed) drawn.areas.push({ corners: corners.slice(1), colour: readColour(marker.color) });
+  }
+  return drawn;
+}
+
+function readColour(colour: Json | undefined): string {
+  const parts = readNumbers(colour, ["r", "g", "b", "a"]);
+  if (!parts) return "";
+  const { r, g, b, a } = parts;
+  return `rgb(${[r, g, b].map((part) => Math.round(255 * part)).join(" ")} / ${a})`;
+}
+
 /** A `nav_msgs/OccupancyGrid`: cells of `resolution` [m] from its origin along x, then along y. */
 export interface Grid {
   frame: string;
@@ -198,6 +263,18 @@ export function readGrid(message: Message): Grid | null {
   const origin = readTransform(info.origin);
   if (!origin || !(resolution > 0) || !(width > 0) || data.length !== width * height) return null;
   return { frame: frameOf(message), width, height, resolution, origin, data };
+}
+
+/** Returns the pixels of a grid of costs, RGBA: the dearer a cell, the less is seen through it. */
+export function costPixels({ width, height, data }: Grid, dear: Colour): Uint8ClampedArray<ArrayBuffer> {
+  const pixels = new Uint8ClampedArray(4 * width * height);
+  for (let row = 0; row < height; row += 1) {
+    for (let column = 0; column < width; column += 1) {
+      const value = Number(data[row * width + column]);
+      if (value > 0 && value <= 100) pixels.set([...dear, value * 1.4], 4 * ((height - 1 - row) * width + column));
+    }
+  }
+  return pixels;
 }
 
 export type Colour = readonly [red: number, green: number, blue: number];

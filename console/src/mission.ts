@@ -121,3 +121,29 @@ function fields(value: Message): string {
 export function isSeen(answer: Json): answer is Message & Seen {
   return isMessage(answer) && isMessage(answer.picture) && isMessage(answer.statuses);
 }
+
+/** What tests have tried of a mission: `rbxcompose test --coverage` keeps it. */
+export interface Tested {
+  at: number;
+  tests: number;
+  ways: number;
+  count: number;
+  missing: { node: number; text: string }[];
+}
+
+/** Returns what no test has tried, by number of a node: the ends of ways such as `do.for.go_to: failure`. */
+export function untried(tested: Tested): Map<number, string[]> {
+  const found = new Map<number, string[]>();
+  for (const { node, text } of tested.missing) {
+    found.set(node, [...(found.get(node) ?? []), text.slice(text.lastIndexOf(": ") + 1).trim()]);
+  }
+  return found;
+}
+
+/** Returns how much tests have tried, in a sentence; or that the mission was changed since. */
+export function testedText(tested: Tested, picture: Picture): string {
+  const when = new Date(tested.at * 1000).toLocaleString();
+  if (tested.count !== picture.count) return `The tests of ${when} were for another version of this mission.`;
+  const tried = tested.ways - tested.missing.length;
+  return `Tests took ${tried} of ${tested.ways} ways (${tested.tests} test${tested.tests === 1 ? "" : "s"}, ${when}).`;
+}

@@ -1,5 +1,5 @@
 import { afterEach, describe, expect, it, vi } from "vitest";
-import { parameterOf, parsed, Sender, settingOf, slideOf, valueOf, type Setting, type Value } from "./parameters";
+import { limitsOf, parameterOf, parsed, Sender, settingOf, slideOf, valueOf, type Setting, type Value } from "./parameters";
 
 const descriptor = (more: object) => ({
   name: "runtime",
@@ -14,6 +14,14 @@ const descriptor = (more: object) => ({
 const setting = (more: object = {}): Setting => settingOf("/battery", descriptor(more) as never)!;
 
 describe("a setting", () => {
+  it("has its limits in words", () => {
+    expect(limitsOf(setting())).toBe("from 0 s");
+    const range = (from_value: number | null, to_value: number | null) => setting({ floating_point_range: [{ from_value, to_value, step: 0 }] });
+    expect(limitsOf(range(1, 7200))).toBe("1 s to 7200 s");
+    expect(limitsOf(range(null, 5))).toBe("up to 5 s");
+    expect(limitsOf(setting({ floating_point_range: [] }))).toBe("");
+  });
+
   it("has the unit and the limits of its description", () => {
     expect(setting()).toMatchObject({ about: "Time from full to empty.", unit: "s", least: 0, most: null });
   });

@@ -87,6 +87,13 @@ export function parsed(setting: Setting, text: string): { value: Value } | { why
   return { value };
 }
 
+/** Returns the limits of a number in words, empty if it has none. */
+export function limitsOf({ least, most, unit }: Setting): string {
+  const shown = (value: number) => `${tidy(value)} ${unit}`.trim();
+  if (least !== null && most !== null) return `${shown(least)} to ${shown(most)}`;
+  return least !== null ? `from ${shown(least)}` : most !== null ? `up to ${shown(most)}` : "";
+}
+
 export interface Slide {
   least: number;
   most: number;

@@ -1,4 +1,4 @@
-import { expect, it } from "vitest";
+import { beforeEach, describe, expect, it, vi } from "vitest";
 import { CallError, LostError, type Message, type Outcome } from "./rosbridge";
 import { Trip } from "./trip";
 
@@ -13,17 +13,23 @@ interface FakeGoal {
 
 function make() {
   const goals: FakeGoal[] = [];
-  const trip = new Trip({
-    act: (_action, _type, _goal, onFeedback = () => undefined) => {
+  const calls: [string, Message | undefined][] = [];
+  const link = {
+    call: (service: string, args?: Message) => {
+      calls.push([service, args]);
+      return Promise.resolve(null);
+    },
+    act: (_action: string, _type: string, _goal: Message, onFeedback: (values: Message) => void = () => undefined) => {
       const goal = { canceled: false, say: onFeedback } as FakeGoal;
       goals.push(goal);
       const done = new Promise<Outcome>((resolve, reject) => Object.assign(goal, { end: resolve, fail: reject }));
       return { done, cancel: () => (goal.canceled = true) };
     },
-  });
+  };
+  const trip = new Trip(link);
   const go = (name: string) => trip.begin("/go_to", "nav2_msgs/NavigateToPose", {}, { name, pose: POSE, frame: "map" });
   const settled = () => new Promise<void>((resolve) => queueMicrotask(() => queueMicrotask(resolve)));
-  return { trip, goals, go, settled };
+  return { trip, goals, calls, link, go, settled };
 }
 
 it("tells how far it is, and that it has arrived", async () => {
@@ -75,4 +81,66 @@ it("is the newest one: what an older one says afterwards does not count", async 
   expect(trip.state.value).toMatchObject({ is: "driving", text: "Driving to Window", left: null });
   trip.cancel();
   expect(goals.map(({ canceled }) => canceled)).toEqual([false, true]);
+});
+
+describe("a goal that this browser sent", () => {
+  const statuses = (...pairs: [id: string, status: number][]) => ({
+    status_list: pairs.map(([uuid, status]) => ({ goal_info: { goal_id: { uuid } }, status })),
+  });
+  const kept = new Map<string, string>();
+  vi.stubGlobal("localStorage", { getItem: (key: string) => kept.get(key) ?? null, setItem: (key: string, text: string) => kept.set(key, text) });
+  beforeEach(() => kept.clear());
+
+  it("is canceled also after the page was loaded again", () => {
+    const { trip, calls, link, go } = make();
+    trip.learn("/go_to", statuses(["old", 2]));
+    go("Dock");
+    trip.learn("/go_to", statuses(["old", 6], ["new", 2]));
+    const again = new Trip(link);
+    again.learn("/go_to", statuses(["old", 6], ["new", 2]));
+    expect(again.state.value).toEqual({ is: "driving", text: "Driving to Dock", pose: POSE, frame: "map", left: null });
+    again.cancel();
+    expect(calls).toEqual([["/go_to/_action/cancel_goal", { goal_info: { goal_id: { uuid: "new" } } }]]);
+    again.learn("/go_to", statuses(["new", 3]));
+    expect(again.state.value.is).toBe("driving");
+    again.learn("/go_to", statuses(["new", 5]));
+    expect(again.state.value).toMatchObject({ is: "canceled", text: "Canceled on the way to Dock", pose: null });
+  });
+
+  it("is not said to be canceled where the robot refuses", async () => {
+    kept.set("map.trip", JSON.stringify({ id: "new", name: "Dock", pose: POSE, frame: "map" }));
+    const { trip, link, settled } = make();
+    trip.learn("/go_to", statuses(["new", 2]));
+    link.call = () => Promise.reject(new CallError("this needs the role 'operate'"));
+    trip.cancel();
+    await settled();
+    expect(trip.state.value).toMatchObject({ is: "driving", text: "Not canceled: this needs the role 'operate'" });
+  });
+
+  it("is known again when the connection is back", async () => {
+    const { trip, goals, go, settled } = make();
+    trip.learn("/go_to", statuses());
+    go("Dock");
+    trip.learn("/go_to", statuses(["new", 2]));
+    goals[0]!.fail(new LostError("the connection was lost"));
+    await settled();
+    trip.learn("/go_to", statuses(["new", 2]));
+    expect(trip.state.value.is).toBe("driving");
+    trip.learn("/go_to", statuses());
+    expect(trip.state.value.is).toBe("none");
+  });
+
+  it("is told apart from the goals of others, and from those that have ended", async () => {
+    const { trip, goals, go, settled } = make();
+    trip.learn("/go_to", statuses(["mission", 2]));
+    expect(trip.state.value.is).toBe("none");
+    go("Dock");
+    trip.learn("/go_to", statuses(["mission", 6], ["new", 2]));
+    goals[0]!.end({ status: 4, values: {} });
+    await settled();
+    trip.learn("/go_to", statuses(["new", 2]));
+    expect(trip.state.value.is).toBe("arrived");
+    trip.learn("/go_to", statuses(["new", 4], ["other", 2]));
+    expect(trip.state.value.is).toBe("arrived");
+  });
 });

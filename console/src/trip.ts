@@ -1,5 +1,6 @@
 /** A drive to a pose: what was asked for, how far it is, and how it ended. It outlives the page that began it. */
 import type { Pose } from "./map";
+import { recall, remember } from "./remembered";
 import {
   ABORTED,
   CANCELED,
@@ -24,24 +25,37 @@ export interface TripState {
   left: number | null;
 }
 
+/** Where somebody wants to go. */
+interface Destination {
+  name: string;
+  pose: Pose;
+  frame: string;
+}
+
+const KEPT = "map.trip";
 const NONE: TripState = { is: "none", text: "No goal yet", pose: null, frame: "", left: null };
 
 export class Trip {
   readonly state = new Signal<TripState>(NONE);
-  readonly #link: Pick<Rosbridge, "act">;
+  readonly #link: Pick<Rosbridge, "act" | "call">;
   #sent: Goal | null = null;
+  #to: Destination | null = null; // of a goal that was sent, until the robot has told its id
+  #known: ReadonlySet<string> = new Set(); // ids of goals that the robot has told
+  #followed: { action: string; id: string; name: string } | null = null; // a goal that was sent before the page was loaded
 
-  constructor(link: Pick<Rosbridge, "act">) {
+  constructor(link: Pick<Rosbridge, "act" | "call">) {
     this.#link = link;
   }
 
   /** Drives to a pose, by an action of a type; `message` is the goal. A newer trip takes the place of an older one. */
-  begin(action: string, type: string, message: Message, to: { name: string; pose: Pose; frame: string }): void {
+  begin(action: string, type: string, message: Message, to: Destination): void {
     const { name, pose, frame } = to;
     const sent = this.#link.act(action, type, message, ({ distance_remaining: left }) => {
       if (this.#sent === sent && typeof left === "number") this.state.set({ ...this.state.value, left });
     });
     this.#sent = sent;
+    this.#followed = null;
+    this.#to = to;
     this.state.set({ is: "driving", text: `Driving to ${name}`, pose, frame, left: null });
     sent.done.then(
       (outcome) => this.#end(sent, endOf(outcome, name)),
@@ -51,13 +65,59 @@ export class Trip {
 
   cancel(): void {
     this.#sent?.cancel();
+    if (!this.#followed) return;
+    const { action, id } = this.#followed;
+    this.#link
+      .call(`${action}/_action/cancel_goal`, { goal_info: { goal_id: { uuid: id } } })
+      .catch((error: Error) => this.state.set({ ...this.state.value, text: `Not canceled: ${error.message}` }));
+  }
+
+  /**
+   * Takes the `action_msgs/GoalStatusArray` of the action. A goal that this browser sent is followed until it ends, also
+   * after the page was loaded again or the connection was lost meanwhile.
+   */
+  learn(action: string, { status_list }: Message): void {
+    const statuses = (Array.isArray(status_list) ? status_list : []).flatMap(readStatus);
+    const running = statuses.find(({ status }) => status < SUCCEEDED);
+    if (this.#to && running && !this.#known.has(running.id)) {
+      remember(KEPT, JSON.stringify({ id: running.id, ...this.#to }));
+      this.#to = null;
+    }
+    this.#known = new Set(statuses.map(({ id }) => id));
+    if (this.#followed) {
+      const { id, name } = this.#followed;
+      const status = statuses.find((each) => each.id === id)?.status;
+      if (status !== undefined && status < SUCCEEDED) return;
+      this.#followed = null;
+      const [is, text] = status === undefined ? ([NONE.is, NONE.text] as const) : endOf({ status, values: null }, name);
+      this.state.set({ ...NONE, is, text });
+    } else if (running && !this.#sent && (this.state.value.is === "none" || this.state.value.is === "unknown")) {
+      const kept = keptOf(running.id);
+      if (!kept) return;
+      const { name, pose, frame } = kept;
+      this.#followed = { action, id: running.id, name };
+      this.state.set({ is: "driving", text: `Driving to ${name}`, pose, frame, left: null });
+    }
   }
 
   #end(sent: Goal, [is, text]: readonly [TripState["is"], string]): void {
     if (this.#sent !== sent) return;
-    this.#sent = null;
+    this.#sent = this.#to = null;
     this.state.set({ ...NONE, is, text });
   }
+}
+
+function readStatus(message: Json): { id: string; status: number }[] {
+  const info = isMessage(message) ? message.goal_info : null;
+  if (!isMessage(message) || !isMessage(info) || !isMessage(info.goal_id)) return [];
+  return [{ id: String(info.goal_id.uuid), status: Number(message.status) }];
+}
+
+/** Returns where a goal goes, if this browser sent it. */
+function keptOf(id: string): Destination | null {
+  const kept = recall(KEPT);
+  const read = kept === null ? null : (JSON.parse(kept) as Destination & { id: string });
+  return read?.id === id ? read : null;
 }
 
 function endOf({ status, values }: Outcome, name: string): readonly [TripState["is"], string] {

@@ -248,6 +248,7 @@ def _reads(dimension: Dimension) -> pydantic.BeforeValidator:
 
 
 Length = Annotated[float, _reads(units.LENGTH), Dimensioned(units.LENGTH)]
+Mass = Annotated[float, _reads(units.MASS), Dimensioned(units.MASS)]
 Time = Annotated[float, _reads(units.TIME), Dimensioned(units.TIME)]
 Speed = Annotated[float, _reads(units.SPEED), Dimensioned(units.SPEED)]
 Acceleration = Annotated[float, _reads(units.ACCELERATION), Dimensioned(units.ACCELERATION)]
@@ -266,12 +267,13 @@ Name = Annotated[str, pydantic.StringConstraints(pattern=r"^[a-z][a-z0-9_]*$", m
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A named pose in `map` [m, m, rad]."""
+    """A named pose in `map` [m, m, rad], and how viewers draw it."""
 
     name: str
     x: float
     y: float
     heading: float
+    colour: str = ""
 
 
 class Secret:

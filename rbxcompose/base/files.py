@@ -32,6 +32,11 @@ def replace_file(path: Path, data: bytes, *, mode: int | None = None) -> None:
     sync_folder(path.parent)
 
 
+def state_folder() -> Path:
+    """Return the folder where programs of this user keep what outlasts a robot's run; it may not exist yet."""
+    return Path(os.environ.get("XDG_STATE_HOME") or Path("~/.local/state").expanduser()) / "rbxcompose"
+
+
 def sync_folder(folder: Path) -> None:
     """Flush a folder to disk, so that its entries survive a power failure."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)

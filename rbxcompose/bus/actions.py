@@ -85,6 +85,7 @@ class ActionServer(Generic[G, R, F]):
         names = ActionNames.of(name)
         self.current: ServedGoal[G, R, F] | None = None  # the goal to carry out; a newer one replaces it
         self.began: Callable[[], None] = lambda: None  # called when there is a goal to carry out
+        self.canceling: Callable[[], None] = lambda: None  # called when the current goal should end soon
         self._name, self._action, self._accept = name, action, accept
         self._process, self._owner = node.process, node.owner
         self._goals: Goals[G, R] = Goals()
@@ -114,7 +115,7 @@ class ActionServer(Generic[G, R, F]):
     def cancel_all(self) -> None:
         """Request the cancellation of the current goal."""
         self._goals.cancel()
-        self._update_status()
+        self._tell_canceling()
 
     def publish_feedback(self, goal: Goal[G, R], message: F) -> None:
         """Publish feedback on a goal that has not ended."""
@@ -191,7 +192,7 @@ class ActionServer(Generic[G, R, F]):
     def _on_cancel(self, request: ServedRequest[CancelGoal.Request, CancelGoal.Response]) -> None:
         info = request.message.goal_info
         code, goals = self._goals.cancel(info.goal_id.uuid, to_nanoseconds(info.stamp))
-        self._update_status()
+        self._tell_canceling()
         request.reply(CancelGoal.Response(return_code=code, goals_canceling=tuple(map(_info, goals))))
 
     def _on_get_result(self, request: ServedRequest[Any, Any]) -> None:
@@ -207,7 +208,12 @@ class ActionServer(Generic[G, R, F]):
     def _on_client_left(self, client: bytes) -> None:
         if self._goals.cancel_from(client):
             self._log("its goal is cancelled: the client is gone")
-            self._update_status()
+            self._tell_canceling()
+
+    def _tell_canceling(self) -> None:
+        if self.current is not None and self.current.cancel_requested:
+            self.canceling()
+        self._update_status()
 
     def _reply_result(self, request: ServedRequest[Any, Any], goal: Goal[G, R]) -> None:
         request.reply(self._action.GetResult.Response(status=goal.state, result=goal.result))

@@ -22,6 +22,7 @@ FAMILIES = {
     "30": "wiring",
     "31": "muxes",
     "35": "rates and units",
+    "36": "worlds and navigation",
     "41": "missions",
     "42": "tests of missions",
     "50": "diagnostics",

@@ -91,7 +91,12 @@ def kind_of(path: Path) -> str:
 
 def is_system(written: str) -> bool:
     """Return whether a command-line path names the file of a system."""
-    return Path(written).is_file() and kind_of(Path(written)) == "System"
+    path: object = Path(written)
+    if written.startswith("rbx:"):
+        from rbxcompose.manifest.files import find  # takes longer to import
+
+        path = find(written)
+    return isinstance(path, Path) and path.is_file() and kind_of(path) == "System"
 
 
 def system_and_robot(written: str) -> tuple[str, str] | None:

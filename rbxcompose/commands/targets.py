@@ -1,6 +1,7 @@
 """The robots that a verb is about: by file, by folder, or the only one here; and the layers put over them."""
 
 import argparse
+import json
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
@@ -11,7 +12,7 @@ from typing import TypedDict
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Severity, Span, kind
 from rbxcompose.commands.console import NotDoneError
-from rbxcompose.commands.options import kind_of
+from rbxcompose.commands.options import is_system, kind_of
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import PREFIX, ROBOT_FILE, find, project_of, shown_name
@@ -60,7 +61,9 @@ def targets(paths: Iterable[str]) -> Targets:
     out = Targets()
     for written in paths:
         path = Path(written)
-        if written.startswith(PREFIX) or not path.exists():
+        if written.startswith(PREFIX) and is_system(written):
+            out.systems.append(written)
+        elif written.startswith(PREFIX) or not path.exists():
             out.robots.append(written)
         elif path.is_dir():
             robots = [written] if (path / ROBOT_FILE).exists() else robots_below(path)
@@ -164,13 +167,35 @@ class Layers(TypedDict):
 
 
 def add_layer_options(parser: argparse.ArgumentParser) -> None:
-    """Declare `--profile`, `-f`, `--set` and `--real`."""
+    """Declare `--profile`, `-f`, `--set`, `--world`, `--simulator` and `--real`."""
     parser.add_argument("--profile", action="append", default=[], metavar="P", help="apply this profile")
     parser.add_argument(
         "-f", "--file", action="append", default=[], dest="overlays", metavar="FILE", help="apply this overlay"
     )
     parser.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="change one value")
+    parser.add_argument(
+        "--world", action="append", type=_world, dest="sets", metavar="FILE", help="put the simulated robot into it"
+    )
+    parser.add_argument(
+        "--simulator",
+        action="append",
+        type=_simulator,
+        dest="sets",
+        metavar="NAME",
+        help="move it by this: ideal, or physics",
+    )
     parser.add_argument("--real", action="store_true", help="use the real devices; without it, they are simulated")
+
+
+def _simulator(name: str) -> str:
+    """Return the `--set` that chooses what moves the robot."""
+    return f"simulator={json.dumps(name)}"
+
+
+def _world(file: str) -> str:
+    """Return the `--set` that puts a robot into the world of a file; the ending may be left out."""
+    whole = file if file.endswith((".yaml", ".yml")) else f"{file}.yaml"
+    return f"world={json.dumps(whole if whole.startswith(PREFIX) else os.path.abspath(whole))}"
 
 
 def layers_of(arguments: argparse.Namespace) -> Layers:

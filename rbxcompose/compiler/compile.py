@@ -58,13 +58,13 @@ def compile_robot(
 
     parsed: dict[tuple[str, str], ParsedText] = {}  # a profile changes no text
 
-    def compiled(chosen: Sequence[str]) -> Compilation:
+    def compiled(chosen: Sequence[str], own: Set[str] = frozenset()) -> Compilation:
         out = Compilation(sources=Texts(unsaved, parsed))
         manifest = load_robot(
             path,
             profiles=chosen,
             overlays=overlays,
-            sets=sets,
+            sets=[one for one in sets if one.partition("=")[0] not in own],
             sim=not real,
             environment=environment,
             report=out.report,
@@ -83,12 +83,15 @@ def compile_robot(
     if out.robot is not None and not profiles:
         steps = sum(len(mission.program.nodes) for mission in out.robot.missions.values())
         steps = max(LEAST_STEPS, steps + _steps_to_read(out.sources))
+        keys = out.robot.manifest.profile_keys  # a profile is tried with its own value of what `--set` replaces
         for number, (name, span) in enumerate(out.robot.manifest.profiles.items(), 1):
             if number * steps > PROFILE_STEPS:
                 message = f"the profiles from '{name}' on were not tried: it would take too long for this robot"
                 out.report.add(NOT_TRIED.at(span, message, help=f"rbxcompose check --profile {name}"))
                 break
-            _report_profile(span, compiled([name]), out, {SET, *out.robot.manifest.overlays})
+            _report_profile(
+                span, compiled([name], keys.get(name, frozenset())), out, {SET, *out.robot.manifest.overlays}
+            )
     if out.robot is not None and not out.report.has_errors:
         out.plan = build_plan(out.robot)
     return out

@@ -17,7 +17,7 @@ from rbxcompose.manifest.shapes import field_types, keys_at
 from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
 from rbxcompose.manifest.validate import KEYS, UNKNOWN_KEY, validate, where
 
-KINDS = ("Robot", "Part", "Overlay", "Mission", "Test", "System")
+KINDS = ("Robot", "Part", "Overlay", "Mission", "Test", "System", "World")
 """What a manifest may describe."""
 
 
@@ -27,7 +27,7 @@ class ManifestHeader(Config):
     rbx: Literal[1]
     """Version of the language."""
     kind: str
-    """What this file describes: `Robot`, `Part`, `Overlay`, `Mission`, `Test` or `System`."""
+    """What this file describes: `Robot`, `Part`, `Overlay`, `Mission`, `Test`, `System` or `World`."""
     name: Name
     """Its name: lower-case letters, digits and underscores."""
     about: str = ""

@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import KW_ONLY, field, replace
 from enum import Enum
 from functools import cache, cached_property
+from itertools import chain
 from pathlib import Path, PurePosixPath
 from types import GenericAlias
 from typing import Annotated, Any, Generic, Literal, Protocol, TypeVar, cast
@@ -291,6 +292,8 @@ class Declaration(Generic[M]):
     _: KW_ONLY
     files: tuple[str, ...] = EVERYWHERE
     """Kinds of manifests that may contain it."""
+    documents: Mapping[str, type[ManifestHeader]] = field(default_factory=dict)
+    """Kinds of manifests of its own, which it names and reads, with their models: their schemas follow from these."""
     order: int = 95
     """Its place among the others: in schemas, in the reference, and when components are made."""
 
@@ -342,6 +345,8 @@ class Declaration(Generic[M]):
 
     brings: tuple[str, ...] = ()
     """Names of the components that it adds if it is present."""
+    outputs: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """Outputs of these that muxes may take: component -> port -> topic."""
     components: Callable[[Contents, Wiring], Iterable[WantedComponent]] = lambda contents, wiring: ()
     """Returns the components that it defines."""
     always: AlwaysRun | None = None
@@ -349,6 +354,8 @@ class Declaration(Generic[M]):
     levels: Callable[[Contents], Mapping[str, str]] = lambda contents: {}
     """Names of levels (`ok`, `warn`, ...) that values read as `SECTION.NAME`, each with the name of its status in
     `/diagnostics_agg`."""
+    defaults: Callable[[Contents], Mapping[str, object]] = lambda contents: {}
+    """Returns what fields of these names, in components that do not set them, are in place of their own defaults."""
     wires: bool = False
     """Whether its entries decide which components there are, and what they are connected to."""
     connects: Callable[[Contents], Mapping[str, Mapping[str, str]]] = lambda contents: {}
@@ -465,16 +472,37 @@ class Contents:
         self._sections = list(sections if is_whole else others())
         self._others, self._named = others, named
         self._read: dict[str, object] = {}
+        self._reading: set[str] = set()
 
     def of(self, section: Section[Any, R]) -> R:
         """Return the contents of a section; mistakes are added to the report of the documents."""
         if section.name not in self._read:
+            self._reading.add(section.name)
             self._read[section.name] = section.read(Reading(section, self))
+            self._reading.remove(section.name)
         return cast(R, self._read[section.name])
+
+    def is_being_read(self, section: Section[Any, Any]) -> bool:
+        """Return whether a section asks while it is read itself, before it knows what it defines."""
+        return section.name in self._reading
 
     def may_have(self, kind: str, name: str) -> bool:
         """Return whether a name that was not found may stand where nothing could be read, so that it is not wrong."""
-        return kind in self.open_kinds or name in self.stray
+        return kind in self.open_kinds or name in self.stray or self.is_unread(kind)
+
+    def is_unread(self, kind: str) -> bool:
+        """Return whether a file that defines names of a kind could not be read."""
+        defining = (one for one in self._sections if kind in one.defines and one.name in self.root)
+        return any(self._read.get(one.name, one) is None for one in defining)
+
+    def brought(self, kind: str) -> dict[str, object]:
+        """Return the names of a kind that sections define outside the manifest."""
+        defining = (section for section in self._sections if kind in section.defines)
+        return {
+            name: value
+            for section in defining
+            for name, value in section.defined(self.of(section)).get(kind, {}).items()
+        }
 
     @cached_property
     def open_kinds(self) -> frozenset[str]:
@@ -516,10 +544,17 @@ class Contents:
         all_ = list(sections)
         naming = [section for section in all_ if section.names]
         kinds = {COMPONENT, *(section.names for section in naming)}
+        defined = {(kind, section.name): _Defined(self, section, kind) for section in all_ for kind in section.defines}
         found: dict[str, Mapping[str, object]] = {
-            kind: _Names(self, kind, [section for section in naming if section.has_names_of(kind)]) for kind in kinds
+            kind: _Names(
+                self,
+                kind,
+                [section for section in naming if section.has_names_of(kind)],
+                [names for (one, _), names in defined.items() if one == kind],
+            )
+            for kind in kinds
         }
-        return found | {kind: _Defined(self, section, kind) for section in all_ for kind in section.defines}
+        return {kind: names for (kind, _), names in defined.items()} | found
 
 
 class _Kinds(Mapping[str, Mapping[str, object]]):
@@ -543,8 +578,14 @@ class _Kinds(Mapping[str, Mapping[str, object]]):
 class _Names(Mapping[str, object]):
     """The names of a kind; what a name means is read on request."""
 
-    def __init__(self, contents: Contents, kind: str, sections: Iterable[Section[Any, Any]]) -> None:
-        self._contents, self._kind = contents, kind
+    def __init__(
+        self,
+        contents: Contents,
+        kind: str,
+        sections: Iterable[Section[Any, Any]],
+        brought: Iterable[Mapping[str, object]],
+    ) -> None:
+        self._contents, self._kind, self._brought = contents, kind, list(brought)
         chosen = list(sections)
         self._section = {name: section for section in chosen for name in section.names_in(contents.root)}
         self._default = chosen[0] if chosen else None
@@ -556,13 +597,14 @@ class _Names(Mapping[str, object]):
         return there if there is not None else section.stand_in(name) if section else name
 
     def __contains__(self, name: object) -> bool:
-        return name in self._section or self._contents.may_have(self._kind, str(name))
+        is_known = name in self._section or any(name in names for names in self._brought)
+        return is_known or self._contents.may_have(self._kind, str(name))
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._section)
+        return iter(dict.fromkeys((*self._section, *chain.from_iterable(self._brought))))
 
     def __len__(self) -> int:
-        return len(self._section)
+        return sum(1 for _ in self)
 
 
 class _Defined(Mapping[str, object]):
@@ -573,12 +615,16 @@ class _Defined(Mapping[str, object]):
 
     @property
     def _there(self) -> Mapping[str, object]:
+        if self._contents.is_being_read(self._section):
+            return {}
         return self._section.defined(self._contents.of(self._section)).get(self._kind, {})
 
     def __getitem__(self, name: str) -> object:
         return self._there[name]
 
     def __contains__(self, name: object) -> bool:
+        if self._contents.is_being_read(self._section):
+            return False
         read = self._contents.of(self._section)
         return name in self._there or (read is None and self._section.name in self._contents.root)
 

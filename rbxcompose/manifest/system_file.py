@@ -8,6 +8,7 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from rbxcompose.base.addresses import require_possible
 from rbxcompose.base.config import BitRate, Config, Frequency, Name, Time
 from rbxcompose.manifest.documents import ManifestHeader
+from rbxcompose.manifest.fields import FileName
 
 _SSH = re.compile(r"(ssh://)?([A-Za-z0-9_][A-Za-z0-9_.-]*@)?[A-Za-z0-9\[][A-Za-z0-9.:\]_-]*")
 _COMMAND = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./+-]*")
@@ -41,6 +42,10 @@ def _in_full(value: object) -> object:
     return {} if value is None else value
 
 
+def _in_row(value: object) -> object:
+    return (value,) if isinstance(value, str) else value
+
+
 class SystemFile(ManifestHeader):
     """Robots on several hosts: the hosts, the robots, and which host runs what."""
 
@@ -50,6 +55,9 @@ class SystemFile(ManifestHeader):
     """The robots that run on them, by name; this is the name that `ps` and other verbs know."""
     links: Any = None
     """What is known of the ways between hosts, by name."""
+    world: FileName = ""
+    """The simulated world of all robots with a `spawn`: a file of the kind `World`, relative to this one, or
+    `rbx:worlds/NAME`. They see each other, and cannot drive through each other."""
     profiles: Any = None
     """Changes to the system by name, applied with `--profile NAME`: a site, a shift, another host."""
     security: Literal["none", "tls", "mtls"] = "none"
@@ -91,6 +99,9 @@ class SystemRobotModel(Config):
     that it takes, from the base's settings; `check` refuses a base that takes longer."""
     instances: Annotated[int, Field(ge=1, le=1000)] = 1
     """How many of it there are, as NAME_1, NAME_2 and so on; `on` and `place` with a label take its hosts in turn."""
+    spawn: Annotated[tuple[Name, ...], BeforeValidator(_in_row, json_schema_input_type=Name | tuple[Name, ...])] = ()
+    """Where the robot is put in the system's `world`: a name in `spawn` of that file. `instances` take several in
+    turn."""
     labels: tuple[Name, ...] = ()
     """What `fleet` may call it by, with others."""
     share: tuple[str, ...] = ()

@@ -16,6 +16,7 @@ from rbxcompose.base.geometry import Pose2
 
 T_co = TypeVar("T_co", covariant=True)
 C = TypeVar("C", bound="Capability")
+Outline = tuple[float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +55,8 @@ class Drives(Capability):
     """Acceleration, also of braking [m/s^2]."""
     turn_acceleration: Setting[float] | None = None
     """Angular acceleration, also of braking [rad/s^2]."""
+    wheel_distance: Setting[float] | None = None
+    """Between the points where the wheels touch the ground, which are beside its middle [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +76,26 @@ class RollsOn(Capability):
 
 
 @dataclass(frozen=True, slots=True)
+class TurnsJoints(Capability):
+    """It gives set points of joints to the physics engine, which moves them as far as they are strong."""
+
+    efforts: Setting[Mapping[str, float | None]]
+    """The most that it exerts on each [Nm or N], None if only the body says that."""
+
+
+@dataclass(frozen=True, slots=True)
+class SensesPhysics(Capability):
+    """It measures in the physics engine: pictures if it has a `view`, else how its frame moves."""
+
+    frame: Setting[str]
+    """The link of the body that it is on."""
+    topic: Setting[str]
+    """Below `physics/` and this, the engine tells it what it measures."""
+    view: Setting[tuple[int, int, float]] | None = None
+    """Width and height of its pictures in pixels, and from its left to its right edge [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
 class CommandsMotion(Capability):
     """It sends velocities for a base at its output `commands`, up to these limits."""
 
@@ -81,6 +104,8 @@ class CommandsMotion(Capability):
     """[m/s]."""
     max_turn_rate: Setting[float] | None = None
     """[rad/s]."""
+    protects: bool = False
+    """Whether it commands only to protect the robot, so that nobody else may overrule it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +119,14 @@ class Navigates(Capability):
     """[m/s], unless declared as what it commands."""
     least_time: Callable[[Pose2, Pose2, Drives | None], float] | None = None
     """Returns the least time from a pose to another on this base [s]; without it, that of the way at full speed."""
+
+
+@dataclass(frozen=True, slots=True)
+class SeesEdges(Capability):
+    """It sees whether there is floor below `points` of the base."""
+
+    points: Setting[Mapping[str, tuple[float, float]]]
+    """By name, x (ahead) and y (to the left) from the middle of the base [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +203,8 @@ class WritesFrame(Capability):
     transforms: str
     parent: Setting[str]
     child: Setting[str]
+    needs_parent: bool = False
+    """Whether it only adds `child` to a frame that something else places."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,6 +269,18 @@ class ServesPage(Capability):
     """The topic on which people drive by it, by its full name; empty if they cannot."""
     fleet: Setting[Mapping[str, str]] = Setting(MappingProxyType({}))
     """Where the pages of a system's robots are, by robot: `ADDRESS:PORT`, without an address on the same host."""
+    camera: Setting[str] = Setting("")
+    """The topic of the pictures that it shows, by its full name; empty if there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class SharesWorld(Capability):
+    """It puts the robot into a simulated world, in which the system's other robots are, too."""
+
+    outline: Setting[Outline]
+    """Where the robot begins in `map`, and its size: x, y [m], heading [rad], radius and height [m]."""
+    others: Setting[Mapping[str, Outline]]
+    """The same of the others, by robot; the system knows them."""
 
 
 @dataclass(frozen=True, slots=True)

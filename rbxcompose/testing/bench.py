@@ -44,8 +44,10 @@ class Bench:
     `records` holds what they logged, `events` what they reported to the supervisor.
     """
 
-    def __init__(self, *instances: Instance, plan: Plan | None = None, start: bool = True) -> None:
-        self.clock = SteppedClock()
+    def __init__(
+        self, *instances: Instance, plan: Plan | None = None, start: bool = True, clock: SteppedClock | None = None
+    ) -> None:
+        self.clock = clock or SteppedClock()
         self.scheduler = Scheduler()
         self.records: list[Record] = []
         self.events: list[Notice] = []

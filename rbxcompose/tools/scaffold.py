@@ -1,4 +1,4 @@
-"""New robots, parts, missions and components from templates."""
+"""New robots, parts, missions, worlds and components from templates."""
 
 import importlib.util
 import keyword
@@ -26,6 +26,8 @@ from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.registry import component_names, component_type, declared
 
 PART_ABOUT = "A simulated battery, and the group of its status."
+WORLD_ABOUT = "A room with walls, a table, a bin and a visitor."
+ROOM = (60, 40)  # cells of 10 cm
 ROBOT_ABOUT = "Goes to its places, and home to charge when the battery is low."
 BASE = "diff_drive_sim"
 COMMANDS = "cmd_vel"  # the mux of the template
@@ -46,6 +48,18 @@ def part_files(name: str, about: str = PART_ABOUT) -> dict[str, str]:
     return {
         f"parts/{name}.yaml": render("part.yaml.j2", name=name, about=about),
         f"tests/test_{name}.py": render("part_test.py.j2", name=name),
+    }
+
+
+def world_files(name: str, about: str = WORLD_ABOUT) -> dict[str, str]:
+    """Return the texts of the world's file and of its map, by path; its picture is a PGM in digits."""
+    columns, rows = ROOM
+    inner = ["0", *["254"] * (columns - 2), "0"]
+    lines = [" ".join(line) for line in (["0"] * columns, *[inner] * (rows - 2), ["0"] * columns)]
+    return {
+        f"worlds/{name}.yaml": render("world.yaml.j2", name=name, about=about),
+        f"worlds/{name}_map.yaml": render("world_map.yaml.j2", name=name),
+        f"worlds/{name}_map.pgm": "\n".join((f"P2\n{columns} {rows}\n255", *lines, "")),
     }
 
 

@@ -63,6 +63,8 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
     system = compiled_for(path, arguments, "up")
     if arguments.host is None and any(host.ssh for host in system.hosts.values()):
         return up_everywhere(path, system, arguments)
+    if arguments.host is None and len(system.hosts) == 1:
+        (arguments.host,) = system.hosts
     chosen = chosen_robots(system, arguments)
     if len(chosen) > 1 and not arguments.detach:
         names = ", ".join(one.name for one in chosen)
@@ -102,7 +104,7 @@ def compiled_for(path: str, arguments: argparse.Namespace, verb: str) -> System:
 def layers_of(system: System, robot: PlacedRobot, *, real: bool) -> ChosenLayers:
     """Return the layers that a robot of a system is compiled with, for its supervisor to remember."""
     layers = ChosenLayers(profiles=(robot.model.profile,) if robot.model.profile else (), real=real)
-    if system.path is None or not robot.robot.outside.skills:
+    if system.path is None or not (robot.robot.outside.skills or robot.model.spawn):
         return layers
     return replace(layers, system=str(system.path.resolve()), system_profiles=system.profiles, member=robot.name)
 

@@ -6,7 +6,6 @@ import io
 from collections.abc import Mapping
 
 import numpy as np
-import yourdfpy
 from numpy.typing import NDArray
 
 from rbxcompose.base.geometry import Transform3, rotate
@@ -44,6 +43,8 @@ class Three:
         self.body = description.body
         self.pinocchio = PinocchioModel(description)
         # The parser refuses texts that declare an encoding, and wants bytes.
+        import yourdfpy  # as long as a second, which only those who compare need
+
         self.yourdfpy = yourdfpy.URDF.load(io.BytesIO(description.text.encode()), load_meshes=False)
 
     def poses(self, positions: Positions) -> Mapping[str, dict[str, Array]]:

@@ -38,7 +38,7 @@ def bodies() -> dict[str, Description]:
 
 @pytest.mark.timeout(600)
 def test_three_libraries_agree_on_every_link_of_the_shipped_robots(soak: Soak) -> None:
-    examples = soak.examples(4, 1000)
+    examples = soak.examples(2, 1000)
     found = bodies()
     for name, description in found.items():
         _agree(name, Three(description), examples)

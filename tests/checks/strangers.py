@@ -206,6 +206,19 @@ class FixedPilot(Component[Config]):
         return CommandsMotion("velocity", Setting(1.0)), Navigates("goals", Setting(0.5))
 
 
+@component("toy_reflex")
+class Reflex(Component[Config]):
+    """Moves out of danger."""
+
+    rate = 20.0
+    flight = Out(Twist, "cmd_vel", qos="command")
+
+    @classmethod
+    def capabilities(cls, config: Config) -> tuple[Capability, ...]:
+        """Return that it protects the robot."""
+        return (CommandsMotion("flight", protects=True),)
+
+
 class FillerConfig(Config):
     """A charger."""
 

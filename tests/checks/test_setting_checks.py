@@ -25,8 +25,10 @@ from rbxcompose.sdk.parameters import settings as settings_of
 from rbxcompose.testing import check_text
 from tests.conftest import ROOT
 from tests.shipped import compiled
+from tests.soak import rare
 
 ROBOTS = sorted(path.parent.name for path in (ROOT / "robots").glob("*/robot.yaml"))
+FEW = ("turtlebot", "rover", "pi_robot")  # with a base, a lift, and two arms
 SIZES = (-1.0, 0.0, 1e-6, 0.01, 0.5, 2.0, 100.0)  # by which numbers are multiplied
 POWERED = """rbx: 1
 kind: Robot
@@ -75,7 +77,7 @@ def set_to(config: Config, name: str, value: object) -> Config:
         return config
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", [*FEW, *rare(*(name for name in ROBOTS if name not in FEW))])
 @given(data=st.data())
 @settings(max_examples=8)
 def test_the_findings_are_those_of_all_rules(name: str, data: st.DataObject) -> None:

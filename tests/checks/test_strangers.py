@@ -152,6 +152,28 @@ def test_a_new_robot_may_have_a_strangers_base() -> None:
         read_base("toy_pilot")
 
 
+def muxed(mux: str) -> str:
+    there = "  base: {type: toy_wheels, connect: {velocity: go}}\n  reflex: {type: toy_reflex}\n"
+    return f"{there}muxes:\n  go: {mux}\n"
+
+
+@pytest.mark.parametrize(
+    ("mux", "codes"),
+    [
+        ("{inputs: {me: {priority: 5, timeout: 1 s}, flee: {from: reflex, priority: 9, timeout: 1 s}}}", []),
+        ("{inputs: {me: {priority: 9, timeout: 1 s}, flee: {from: reflex, priority: 5, timeout: 1 s}}}", ["RBX3142"]),
+        ("{mode: latest, inputs: {me: {timeout: 1 s}, flee: {from: reflex, timeout: 1 s}}}", ["RBX3142"]),
+        (
+            "{inputs: {me: {priority: 5, timeout: 1 s}, flee: {from: reflex, priority: 9, timeout: 1 s}},"
+            " locks: {door: {priority: 7, timeout: 1 s}}}",
+            [],
+        ),
+    ],
+)
+def test_nobody_overrules_what_protects_a_strangers_robot(mux: str, codes: list[str], tmp_path: Path) -> None:
+    assert [finding.code for finding in found(muxed(mux), tmp_path)] == codes
+
+
 @pytest.mark.parametrize(
     ("capability", "told"),
     [

@@ -71,7 +71,7 @@ def test_the_tree_is_drawn_as_a_graph(
 def test_wrong_input_is_told(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert "RBX2008" in told(capsys, "show", str(ROOT / "robots/house"), code=1)
+    assert "RBX2008" in told(capsys, "show", str(ROOT / "robots/rooms"), code=1)
     assert "no moving joint 'neck': base_l" in told(capsys, "picture", ROBOT, "--joint", "neck=1", code=2)
     assert "not a number with a unit" in told(capsys, "picture", ROBOT, "--joint", "head_pan_joint=up", code=2)
     assert "cannot be written" in told(capsys, "expand", ROBOT, "--out", str(tmp_path / "no/file"), code=2)

@@ -73,4 +73,4 @@ def test_errors_that_keep_a_body_from_being_read_are_told(capsys: pytest.Capture
 
 
 def test_what_has_no_body_is_told_so(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "error[RBX2008]" in checked(capsys, str(ROOT / "robots/house"), code=1)
+    assert "error[RBX2008]" in checked(capsys, str(ROOT / "robots/rooms"), code=1)

@@ -78,6 +78,7 @@ def test_an_unknown_command_is_wrong_usage_with_a_hint(capsys: pytest.CaptureFix
         ("diag -v", "diag tree -v"),
         ("fleet", "fleet ls"),
         ("mission --robot mini", "mission ls --robot mini"),
+        ("map --topic costmap", "map show --topic costmap"),
         ("msg std_msgs/Bool", "msg show std_msgs/Bool"),
         ("mux", "mux ls"),
         ("param", "param ls"),
@@ -91,6 +92,7 @@ def test_an_unknown_command_is_wrong_usage_with_a_hint(capsys: pytest.CaptureFix
         ("topic info /odom", "topic show /odom"),
         ("action list", "action ls"),
         ("udev", "udev scan"),
+        ("world robots/house", "world show robots/house"),
     ],
 )
 def test_without_an_action_the_most_common_one_is_meant(written: str, usual: str) -> None:

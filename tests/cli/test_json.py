@@ -47,9 +47,11 @@ MISTAKES = {
     "import arbotix": "nowhere.yaml",
     "import diagnostics": "nowhere.yaml",
     "import mux": "nowhere.yaml",
+    "import nav2": "nowhere.yaml",
     "import params": "nowhere.yaml",
     "import srdf": "nowhere.yaml",
     "logs": "--robot nobody",
+    "map show": "",
     "mission cancel": "",
     "mission explore": "patrl robots/turtlebot",
     "mission log": "",
@@ -129,6 +131,7 @@ MISTAKES = {
     "udev install": "nowhere.yaml --yes",
     "udev scan": "nowhere.yaml",
     "why": "components.base robots/turtlebot/robt.yaml",
+    "world show": "nowhere.yaml",
 }
 
 

@@ -54,6 +54,7 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
     folder = tmp_path / "rbxcompose_msgs"
     written = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     own = {
+        "action/FollowPerson.action",
         "action/FollowPoint.action",
         "action/Grip.action",
         "action/LookAtPoint.action",
@@ -66,11 +67,20 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
         "msg/PathConstraints.msg",
         "msg/Sight.msg",
         "msg/TipPoint.msg",
+        "msg/Switches.msg",
+        "msg/World.msg",
+        "msg/WorldHole.msg",
+        "msg/WorldHull.msg",
+        "msg/WorldLight.msg",
+        "msg/WorldRobots.msg",
+        "msg/WorldShape.msg",
         "msg/SceneObject.msg",
         "msg/SceneObjects.msg",
         "msg/SceneShape.msg",
         "action/MoveJoints.action",
+        "action/BackUp.action",
         "action/Recharge.action",
+        "action/RunMission.action",
         "srv/AttachObject.srv",
         "srv/DetachObject.srv",
         "srv/LocateArm.srv",
@@ -82,7 +92,7 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
     assert all(f'"{name}"' in cmake for name in own)
     root = ElementTree.fromstring((folder / "package.xml").read_text())
     assert root.findtext("name") == "rbxcompose_msgs"
-    needed = ["action_msgs", "builtin_interfaces", "geometry_msgs", "std_msgs"]
+    needed = ["action_msgs", "builtin_interfaces", "geometry_msgs", "nav_msgs", "std_msgs"]
     assert [one.text for one in root.iter("depend")] == needed
 
 

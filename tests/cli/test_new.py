@@ -63,7 +63,7 @@ def test_nothing_is_ever_overwritten(project: Path, capsys: pytest.CaptureFixtur
     assert files(project) == ["missions/cart.yaml"]
 
 
-@pytest.mark.parametrize("what", ["robot", "part", "component"])
+@pytest.mark.parametrize("what", ["robot", "part", "world", "component"])
 def test_a_wrong_name_is_a_finding(what: str, project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["new", what, "../Cart", "--yes"]) == 1
     assert "error[RBX9102]" in capsys.readouterr().err

@@ -253,7 +253,7 @@ def test_a_file_that_changes_before_it_is_written_stays(tmp_path: Path) -> None:
     assert "runtime: 50 s" in (tmp_path / "robot.yaml").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("robot", ["turtlebot", "house", "rover"])
+@pytest.mark.parametrize("robot", ["turtlebot", "rooms", "rover"])
 def test_every_live_setting_of_shipped_robots_is_saved_in_one_line_or_refused(robot: str, tmp_path: Path) -> None:
     for name in ("robots", "missions"):
         shutil.copytree(ROOT / name, tmp_path / name)
@@ -275,9 +275,9 @@ def lines_or_code(live: LiveSettings, state: RobotState) -> int | str:
 
 
 def test_a_setting_of_a_library_part_is_refused_with_its_cure(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "robots/house", tmp_path / "robots/house")
+    shutil.copytree(ROOT / "robots/rooms", tmp_path / "robots/rooms")
     shutil.copytree(ROOT / "missions", tmp_path / "missions")
-    state = state_of(tmp_path / "robots/house", ChosenLayers())
+    state = state_of(tmp_path / "robots/rooms", ChosenLayers())
     before = live(state, base_wheels__acceleration=0.5)
     with pytest.raises(NotDoneError) as refused:
         files_with(before, list(before.changes), partial(compiled_as_it_runs, state))

@@ -12,7 +12,6 @@ import pytest
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget
-from rbxcompose.domains.arms.motion.scene_messages import pose_message
 from rbxcompose.msgs.geometry_msgs import Quaternion
 from rbxcompose.msgs.moveit_msgs import (
     AttachedCollisionObject,
@@ -36,6 +35,7 @@ from rbxcompose.msgs.moveit_msgs import (
     TrajectoryConstraints,
     VisibilityConstraint,
 )
+from rbxcompose.msgs.poses import pose_message
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, ReachPose, SceneObjects
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.shape_msgs import SolidPrimitive

@@ -10,7 +10,6 @@ import pytest
 
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion import octree_files
-from rbxcompose.domains.arms.motion.scene_messages import pose_message
 from rbxcompose.domains.body.description import rooted_text
 from rbxcompose.msgs.builtin_interfaces import Time
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
@@ -29,6 +28,7 @@ from rbxcompose.msgs.moveit_msgs import (
     RobotState,
 )
 from rbxcompose.msgs.octomap_msgs import Octomap, OctomapWithPose
+from rbxcompose.msgs.poses import pose_message
 from rbxcompose.msgs.rbxcompose_msgs import SceneObjects
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.shape_msgs import Mesh, Plane, SolidPrimitive

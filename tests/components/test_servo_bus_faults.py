@@ -10,7 +10,7 @@ import pytest
 from rbxcompose.base.requests import Refused
 from rbxcompose.domains.servos.components.servo_bus import ServoBusDriver
 from rbxcompose.domains.servos.joint_states import JointMode
-from rbxcompose.domains.servos.twins.fault_script import InjectFault
+from rbxcompose.domains.servos.twins.fault_script import InjectFault, ListFaults
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.sdk.ports import Qos
@@ -116,6 +116,9 @@ def test_a_request_lets_something_go_wrong_now() -> None:
     assert head.modes() == [JointMode.RELAXED, JointMode.RELAXED]
     with pytest.raises(Refused, match="nobody"):
         head.robot.host.ask("servos", InjectFault("mute", "nobody"))
+    faults = head.robot.host.ask("servos", ListFaults("servos"))
+    assert faults["mute"] == "does not answer, but obeys"
+    assert all(head.robot.host.ask("servos", InjectFault(name, "pan", 0.1)) for name in faults)
 
 
 def test_servos_without_faults_and_those_whose_faults_are_over_move_alike() -> None:

@@ -69,5 +69,27 @@ for (let attempt = 0; attempt < 50 && !told.bell; attempt += 1) {
     await asked((then) => setTimeout(then, 100));
   }
 }
+
+// An action that this page serves: the first goal is carried out, the second is canceled.
+const greet = new Action({ ros, name: "/greet", actionType: "nav2_msgs/action/NavigateToPose" });
+greet.advertise(
+  (goal, id) => {
+    greet.sendFeedback(id, { number_of_recoveries: 7 });
+    if (goal.behavior_tree !== "wait") greet.setSucceeded(id, { error_code: 3 });
+  },
+  (id) => greet.setCanceled(id, { error_code: 4 }),
+);
+const visitor = new Action({ ros, name: "/greet", actionType: "nav2_msgs/action/NavigateToPose" });
+const greeted = (behavior_tree) =>
+  asked((then, no) => {
+    const id = visitor.sendGoal({ behavior_tree }, then, (feedback) => {
+      told.recoveries = feedback.number_of_recoveries;
+      if (behavior_tree === "wait") visitor.cancelGoal(id);
+    }, no);
+  });
+for (let attempt = 0; attempt < 50 && !told.greeted; attempt += 1) {
+  told.greeted = await greeted("").catch(() => asked((then) => setTimeout(then, 100)));
+}
+told.unwanted = await greeted("wait").catch((said) => ({ said }));
 console.log(JSON.stringify(told));
 ros.close();

@@ -3,11 +3,25 @@
 from __future__ import annotations
 
 import json
+from base64 import b64encode
 from typing import Any
 
 import pytest
 
-from rbxcompose.domains.console.protocol import CancelGoal, SendGoal, Serve, ServiceAnswer, ServiceCall, Unserve
+from rbxcompose.domains.console.access import Role
+from rbxcompose.domains.console.protocol import (
+    MOST_SUBSCRIPTIONS,
+    CancelGoal,
+    GoalEnd,
+    GoalFeedback,
+    SendGoal,
+    Serve,
+    ServeAction,
+    ServiceAnswer,
+    ServiceCall,
+    Unserve,
+    UnserveAction,
+)
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.rcl_interfaces import (
     GetParameters,
@@ -129,6 +143,20 @@ def test_a_page_for_ros_1_drives_by_move_base() -> None:
     assert frames["/move_base/status"]["status_list"][0]["status"] == 2
 
 
+def test_a_goal_of_another_client_is_canceled_by_the_service_of_its_action() -> None:
+    room = Room(guarded={"/go_to": Role.CONFIGURE})
+    info = {"goal_info": {"goal_id": {"uuid": b64encode(bytes(range(16))).decode()}}}
+    cancel = {"service": "/go_to/_action/cancel_goal", "args": info}
+    (refused,) = room.client(Role.OPERATE).does("call_service", **cancel)
+    assert "needs the role 'configure'" in refused["values"]
+    assert room.asked() == []
+    assert room.client(Role.CONFIGURE).does("call_service", **cancel) == []
+    (call,) = room.asked()
+    assert isinstance(call, ServiceCall)
+    assert call.service == "/go_to/_action/cancel_goal"
+    assert bytes(call.request.goal_info.goal_id.uuid) == bytes(range(16))  # type: ignore[attr-defined]
+
+
 def test_an_empty_cancel_ends_all_goals_of_the_action() -> None:
     room = Room()
     client = room.client()
@@ -173,6 +201,93 @@ def test_a_client_serves_and_fails_what_it_leaves_open() -> None:
 def test_a_service_that_exists_is_not_served_again() -> None:
     (status,) = Room().client().does("advertise_service", service="/lamp", type="std_srvs/SetBool")
     assert status["msg"] == "'/lamp' is served already"
+
+
+def test_a_client_that_never_answers_fails_the_oldest_request() -> None:
+    room = Room()
+    client = room.client()
+    client.does("advertise_service", service="/bell", type="std_srvs/SetBool")
+    room.asked()
+    for number in range(1, MOST_SUBSCRIPTIONS + 2):
+        room.bridge.requested("/bell", number, SetBool.Request())
+    assert room.bridge.take_requests() == [ServiceAnswer(1, None, "the client that serves it does not answer")]
+
+
+# Actions of clients
+
+
+def served_goals(count: int) -> tuple[Room, Client]:
+    """Return a client that serves an action, to which goals came."""
+    room = Room()
+    client = room.client()
+    assert client.does("advertise_action", action="greet", type=NAVIGATE) == []
+    assert room.asked() == [ServeAction("/greet", NavigateToPose)]
+    for number in range(1, count + 1):
+        room.bridge.goal_came("/greet", number, NavigateToPose.Goal(behavior_tree="hello"))
+    return room, client
+
+
+def test_a_client_carries_out_a_goal_under_the_name_that_it_gave() -> None:
+    room, client = served_goals(1)
+    (goal,) = client.gets()
+    assert (goal["op"], goal["action"], goal["action_type"]) == ("send_action_goal", "greet", NAVIGATE)
+    assert goal["args"]["behavior_tree"] == "hello"
+    named = {"action": "greet", "id": goal["id"]}
+    client.does("action_feedback", **named, values={"distance_remaining": 2.0})
+    client.does("action_result", **named, values={"error_code": 3}, status=4, result=True)
+    told = [GoalFeedback(1, NavigateToPose.Feedback(distance_remaining=2.0))]
+    assert room.asked() == [
+        *told,
+        GoalEnd(1, Outcome.SUCCEEDED, NavigateToPose.Result(error_code=3), "client 1 gave up"),
+    ]
+    (status,) = client.does("action_result", **named)
+    assert "no open goal" in status["msg"]
+
+
+@pytest.mark.parametrize(
+    ("said", "outcome"),
+    [
+        ({}, Outcome.SUCCEEDED),
+        ({"result": False}, Outcome.ABORTED),
+        ({"status": 5, "result": True}, Outcome.CANCELED),
+        ({"status": 6, "result": False}, Outcome.ABORTED),
+    ],
+)
+def test_a_client_ends_a_goal_in_each_way(said: dict[str, Any], outcome: Outcome) -> None:
+    room, client = served_goals(1)
+    (goal,) = client.gets()
+    assert client.does("action_result", action="/greet", id=goal["id"], **said) == []
+    (end,) = room.asked()
+    assert isinstance(end, GoalEnd)
+    assert end.outcome is outcome
+
+
+def test_a_goal_is_unwanted_when_canceled_or_replaced() -> None:
+    room, client = served_goals(2)
+    first, unwanted, second = client.gets()
+    assert (unwanted["op"], unwanted["id"]) == ("cancel_action_goal", first["id"])
+    room.bridge.goal_unwanted("/greet")
+    (canceled,) = client.gets()
+    assert (canceled["op"], canceled["id"]) == ("cancel_action_goal", second["id"])
+    (status,) = client.does("action_result", action="greet", id=first["id"])
+    assert "no open goal" in status["msg"]
+    client.leaves()
+    assert room.asked() == [UnserveAction("/greet")]
+
+
+def test_only_its_server_answers_for_an_action_and_an_end_has_a_status_of_ros() -> None:
+    room, client = served_goals(1)
+    (goal,) = client.gets()
+    for status in (7, "4", None):
+        (said,) = client.does("action_result", action="greet", id=goal["id"], status=status)
+        assert "4 (succeeded)" in said["msg"]
+    other = room.client()
+    for op in ("action_feedback", "action_result", "unadvertise_action"):
+        assert len(other.does(op, action="greet", id=goal["id"])) == 1
+    for action, type_ in (("greet", NAVIGATE), ("go_to", NAVIGATE), ("x", "no/Such"), ("x", 3)):
+        assert len(other.does("advertise_action", action=action, type=type_)) == 1
+    assert client.does("unadvertise_action", action="greet") == []
+    assert room.asked() == [UnserveAction("/greet")]
 
 
 # Parameters and types

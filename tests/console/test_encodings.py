@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import struct
+import zlib
 from base64 import b64encode
 from io import BytesIO
 from typing import Any
@@ -71,9 +73,12 @@ def test_what_is_no_picture_is_refused(data: object) -> None:
 
 def test_a_picture_that_would_be_huge_is_refused_before_it_is_read() -> None:
     written = BytesIO()
-    Picture.new("1", (40_000, 40_000)).save(written, "PNG")
-    with pytest.raises(WrongEncodingError):
-        from_png(b64encode(written.getvalue()).decode(), LARGEST)
+    Picture.new("1", (8, 8)).save(written, "PNG")
+    small = written.getvalue()
+    head = b"IHDR" + struct.pack(">II", 4_000, 4_000) + small[24:29]
+    huge = small[:12] + head + struct.pack(">I", zlib.crc32(head)) + small[33:]
+    with pytest.raises(WrongEncodingError, match="a frame has at most"):
+        from_png(b64encode(huge).decode(), LARGEST)
 
 
 def test_a_frame_may_come_in_pieces_or_in_a_picture() -> None:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import email
+import importlib.util
 import json
 import os
+import re
 import shutil
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -45,8 +48,15 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-PORT = free_port()
+PORT, FOXGLOVE = free_port(), free_port()
 HOST = f"127.0.0.1:{PORT}"
+WORLD = """rbx: 1
+kind: World
+name: far_away
+objects:
+  walker: {shape: person, path: [[0 s, 50 m, 0 m], [600 s, 60 m, 0 m]]}
+"""
+UP: list[float] = []  # before and after the robot came up [s]
 
 
 @pytest.fixture(scope="module")
@@ -56,11 +66,20 @@ def robot() -> Iterator[Robot]:
     base = Path(tempfile.mkdtemp(prefix="rbx"))
     text = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8").partition("\nmissions:")[0]
     camera = "camera: {type: test_picture, topic: camera/image_raw, width: 64, height: 48}"
-    text = text.replace("\ncomponents:\n", f"\ncomponents:\n  {camera}\n")
-    made = Robot(base, f"{text}\nconsole: {{port: {PORT}, drive: {{max_speed: 0.25 m/s}}}}\n")
-    up = made.do("up", "-d", str(made.file), "--set", "bus.port=7891")
-    assert up.returncode == 0, up.stderr
+    text = text.replace("\ncomponents:\n", f"\nworld: world.yaml\n\ncomponents:\n  {camera}\n")
+    base.joinpath("world.yaml").write_text(WORLD, encoding="utf-8")
+    made = Robot(base, f"{text}\nconsole: {{port: {PORT}, foxglove: {FOXGLOVE}, drive: {{max_speed: 0.25 m/s}}}}\n")
+    UP.append(time.monotonic())
+    with socket.create_server(("127.0.0.1", FOXGLOVE)):  # until the robot is up, another program has it
+        up = made.do("up", "-d", str(made.file), "--set", "bus.port=7891")
+        assert up.returncode == 0, up.stderr
+        logs = "" if importlib.util.find_spec("foxglove") else "Foxglove is not served"
+        deadline = time.monotonic() + PATIENCE
+        while "Foxglove is not served" not in logs and time.monotonic() < deadline:
+            logs = made.do("logs", "gateway").stdout
+        assert "Foxglove is not served" in logs
     assert f"console: http://{HOST}/" in up.stdout.splitlines()
+    UP.append(time.monotonic())
     yield made
     began = time.monotonic()
     assert made.do("down").returncode == 0
@@ -295,6 +314,85 @@ def test_roslib_does_all_that_pages_do(robot: Robot) -> None:
     assert told["statuses"] == [1, 3]  # active, succeeded
     assert told["canceled"] == 2
     assert told["bell"] == {"success": True, "message": "ding"}
+    assert (told["greeted"]["error_code"], told["recoveries"]) == (3, 7)
+    assert '"error_code":4' in told["unwanted"]["said"]
+
+
+class Foxglove:
+    """A client of Foxglove's protocol, as far as a test needs it."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+        self.offered: dict[str, dict[str, Any]] = {}  # topics and services, by name
+
+    async def says(self, op: str, **more: Any) -> None:
+        await self.socket.send(json.dumps({"op": op, **more}))
+
+    async def gets(self, op: str | int) -> Any:
+        """Return the next frame of an operation: a text, or bytes of the kind."""
+        while True:
+            frame = await asyncio.wait_for(self.socket.recv(), 10)
+            if isinstance(frame, bytes):
+                if frame[0] == op:
+                    return frame
+                continue
+            told = json.loads(frame)
+            for each in (*told.get("channels", ()), *told.get("services", ())):
+                self.offered[each.get("topic") or each["name"]] = each
+            if told["op"] == op:
+                return told
+
+    async def knows(self, *names: str) -> None:
+        """Wait until all of these are offered."""
+        while not self.offered.keys() >= {*names}:
+            await self.gets("advertise" if "/odom" not in self.offered else "advertiseServices")
+
+
+async def at_foxglove() -> ClientConnection:
+    """Return a connection as soon as it is served."""
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return await connect(f"ws://127.0.0.1:{FOXGLOVE}", subprotocols=[websockets.Subprotocol("foxglove.sdk.v1")])
+        except OSError:
+            if time.monotonic() > deadline:
+                raise
+            await asyncio.sleep(0.1)
+
+
+def test_foxglove_sees_topics_calls_services_and_sets_parameters_but_does_not_drive(robot: Robot) -> None:
+    pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")
+
+    async def talk() -> None:
+        async with await at_foxglove() as socket_:
+            client = Foxglove(socket_)
+            await client.knows("/battery_level", "/set_battery_level", "/battery/get_parameters")
+            level = client.offered["/battery_level"]
+            assert (level["encoding"], level["schemaName"]) == ("cdr", "std_msgs/msg/Float32")
+            assert "float32 data" in level["schema"]
+            service = client.offered["/set_battery_level"]
+            request = struct.pack("<BIII3s", 2, service["id"], 1, 3, b"cdr") + b"\x00\x01\x00\x00"
+            await socket_.send(request + struct.pack("<f", 60.0))
+            assert (await client.gets(3))[1:5] == struct.pack("<I", service["id"])
+            await client.says("subscribe", subscriptions=[{"id": 5, "channelId": level["id"]}])
+            assert 50 < struct.unpack("<f", (await client.gets(1))[-4:])[0] <= 60
+            await client.says("setParameters", parameters=[{"name": "/battery.runtime", "value": 130}], id="a")
+            (runtime,) = (await client.gets("parameterValues"))["parameters"]
+            assert runtime["value"] == 130
+            await client.says("getParameters", parameterNames=[], id="b")
+            names = [each["name"] for each in (await client.gets("parameterValues"))["parameters"]]
+            assert {"/battery.runtime", "/base.max_speed"} <= {*names}
+            wrong = {"encoding": "cdr", "schemaName": "geometry_msgs/msg/Twist"}
+            for number, spelling in enumerate((TELEOP, TELEOP.lstrip("/"))):
+                await client.says("advertise", channels=[{"id": number, "topic": spelling, **wrong}])
+                assert "which knows who drives" in (await client.gets("status"))["message"]
+            for number, spelling in enumerate((f"/{TELEOP}", f"{TELEOP}/", "~/x"), 10):
+                await client.says("advertise", channels=[{"id": number, "topic": spelling, **wrong}])
+                assert "is not a ROS name" in (await client.gets("status"))["message"]
+            await client.says("advertise", channels=[{"id": 2, "topic": "/odom", **wrong}])
+            assert "it is of the type 'nav_msgs/msg/Odometry'" in (await client.gets("status"))["message"]
+
+    asyncio.run(talk())
 
 
 def test_a_cut_socket_stops_the_robot_at_once(robot: Robot) -> None:
@@ -338,6 +436,40 @@ def test_the_page_drives_the_robot(robot: Robot) -> None:
         page.wait_for_timeout(500)
         assert commands.got[-1][1] == 0.0
     assert complaints == []
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
+def test_the_page_shows_the_world_at_the_time_of_the_robot(robot: Robot) -> None:
+    if not console.is_built():
+        pytest.skip("the page cannot be built here")
+    with chromium() as browser:
+        page = browser.new_page()
+        page.goto(f"http://{HOST}/#model")
+        scene = page.locator(".scene")
+        expect(scene).to_have_attribute("data-world", "1", timeout=PATIENCE * 1000)
+        expect(scene).to_have_attribute("data-time", re.compile("."))
+        expect(scene).to_have_attribute("data-place", re.compile(r"\[.*,.*,.*\]"))
+        seen = time.monotonic() - float(scene.get_attribute("data-time") or 0)
+        assert UP[0] < seen < UP[1] + 0.5  # where robot time began
+
+
+def test_a_goal_that_another_connection_sent_is_canceled(robot: Robot) -> None:
+    async def drive(browser: Browser) -> None:
+        status = {"topic": "/go_to/_action/status", "type": "action_msgs/msg/GoalStatusArray"}
+        away = {"pose": {"header": {"frame_id": "map"}, "pose": {"position": {"x": 40.0}, "orientation": {"w": 1.0}}}}
+        goal = {"action": "/go_to", "action_type": "nav2_msgs/action/NavigateToPose", "args": away}
+        await browser.sends("send_action_goal", id="far", **goal)
+        async with connect(f"ws://{HOST}/rosbridge") as socket:
+            other = Browser(socket)
+            await other.sends("subscribe", **status)
+            while not (known := (await other.next("publish"))["msg"]["status_list"]):
+                pass
+            info = {"goal_id": known[-1]["goal_info"]["goal_id"]}
+            answer = await other.calls("/go_to/_action/cancel_goal", goal_info=info)
+            assert answer["return_code"] == 0
+        assert (await browser.next("action_result"))["status"] == 5
+
+    browse(drive)
 
 
 def test_silence_stops_the_robot_and_frees_the_lease(robot: Robot) -> None:

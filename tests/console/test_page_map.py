@@ -13,7 +13,7 @@ from playwright.sync_api import Locator, Page, expect
 from rbxcompose.base.requests import Refused
 from tests.console.browser import CHROMIUM
 from tests.console.fake_gateway import CONFIG, FakeGateway
-from tests.console.looks import PHONE, WIDE, overflows, too_small, violations
+from tests.console.looks import PHONE, WIDE, expect_fit, violations
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
 
@@ -252,6 +252,61 @@ def test_a_path_and_a_scan_are_drawn_in_their_frames(open_page: Callable[..., Pa
     wait_for_colour(page, 1.0, 0.25, [20, 113, 58, 255])
 
 
+def test_zones_are_hatched_and_the_world_is_outlined_if_wanted(
+    open_page: Callable[..., Page], rolling: FakeGateway
+) -> None:
+    """A red zone above the dock, and a box of 0.2 m that has gone from x = 0.2 to 0.6 since robot time 0."""
+    header, colour = {"frame_id": "map"}, {"r": 1.0, "g": 0.0, "b": 0.0, "a": 1.0}
+    corners = [moved(*at) for at in ((-0.1, 0.3), (0.1, 0.3), (0.1, 0.6), (-0.1, 0.6), (-0.1, 0.3))]
+    zone = {"header": header, "action": 0, "type": 4, "pose": pose(0.0, 0.0, 0.0), "points": corners, "color": colour}
+    rolling.latched["/zone_markers"] = {"markers": [zone]}
+    box = {"name": "box", "kind": "box", "size": [0.2, 0.2, 1.0], "x": 0.2, "y": 0.1, "z": 0.0, "heading": 0.0}
+    path = {"times": [0.0, 8.0], "xs": [0.2, 1.0], "ys": [0.1, 0.1], "repeats": False, "colour": ""}
+    stamped = {"stamp": {"sec": 100, "nanosec": 0}, **header}
+    rolling.latched["/world"] = {
+        "map": {"header": stamped, "info": {}, "data": []},
+        "shapes": [box | path],
+        "time": 1.0,
+    }
+    types = TYPES | {"/zone_markers": "visualization_msgs/msg/MarkerArray", "/world": "rbxcompose_msgs/msg/World"}
+    rolling.answers["/rosapi/topics"] = lambda _: {"topics": list(types), "types": list(types.values())}
+    page = open_page(page_name="map")
+    wait_for_colour(page, 0.1, 0.45, [255, 0, 0, 255])
+    later = transform("odom", "laser", 0.0, 0.0, 0.0)
+    later["header"]["stamp"] = {"sec": 103, "nanosec": 0}  # 4 s of robot time
+    rolling.say("/tf", {"transforms": [later]})
+    page.wait_for_function(f"([x, y]) => ({_PIXEL})([x, y])[3] > 0", arg=[*at(page, 0.7, 0.13)])
+    world = page.get_by_role("button", name="/world World")
+    world.click()
+    expect(world).to_have_attribute("aria-pressed", "false")
+    page.reload()
+    expect(world).to_have_attribute("aria-pressed", "false")
+    wait_for_colour(page, 0.1, 0.45, [255, 0, 0, 255])
+    wait_for_colour(page, 0.7, 0.13, [0, 0, 0, 0])
+
+
+def test_a_goal_is_canceled_after_the_page_was_loaded_again(
+    open_page: Callable[..., Page], rolling: FakeGateway
+) -> None:
+    goal = {"goal_info": {"goal_id": {"uuid": "AAECAw=="}}, "status": 2}
+    cancels = "/go_to/_action/cancel_goal"
+    rolling.answers[cancels] = lambda _: {"return_code": 0}
+    page = open_page(page_name="map")
+    page.get_by_role("button", name="Go to Dock").click()
+    expect_drive(page, "Dock")
+    rolling.say("/go_to/_action/status", {"status_list": [goal]})
+    rolling.latched["/go_to/_action/status"] = {"status_list": [goal]}
+    expect(state(page)).to_have_text("Driving to Dock")
+    page.wait_for_function("localStorage.length > 0")
+    page.reload()
+    expect(state(page)).to_have_text("Driving to Dock")
+    page.get_by_role("button", name="Cancel").click()
+    rolling.say("/go_to/_action/status", {"status_list": [{**goal, "status": 5}]})
+    expect(state(page)).to_have_text("Canceled on the way to Dock")
+    (call,) = rolling.calls(cancels)
+    assert call["goal_info"]["goal_id"] == goal["goal_info"]["goal_id"]  # type: ignore[index]
+
+
 def test_places_are_the_way_without_the_canvas(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
     page = open_page(page_name="map")
     places = page.get_by_label("Places")
@@ -367,15 +422,11 @@ def test_places_are_not_drawn_without_a_way_to_map(open_page: Callable[..., Page
     expect(page.get_by_text("they are not drawn")).to_be_visible()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [WIDE, PHONE], ids=["wide", "phone"])
-def test_it_fits_the_window_and_the_finger(
-    open_page: Callable[..., Page], rolling: FakeGateway, size: Any, scheme: str
-) -> None:
-    page = open_page(page_name="map", viewport=size, color_scheme=scheme)
+def test_it_fits_the_window_and_the_finger(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
+    page = open_page(page_name="map")
     page.get_by_text("Another pose").click()
     page.get_by_role("button", name="Go to Dock").click()
     expect(page.get_by_role("button", name="/scan Laser: red dots")).to_be_visible()
-    assert not overflows(page)
-    assert too_small(page) == []
-    assert violations(page) == []
+    for size in (WIDE, PHONE):
+        page.set_viewport_size(size)
+        expect_fit(page)

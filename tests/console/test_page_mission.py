@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 from rbxcompose.base.requests import Refused
 from tests.console.browser import CHROMIUM
 from tests.console.fake_gateway import FakeGateway
-from tests.console.looks import PHONE, WIDE, overflows, too_small, violations
+from tests.console.looks import PHONE, WIDE, expect_fit, violations
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
 
@@ -83,6 +83,25 @@ def test_a_person_pauses_cancels_and_starts_a_mission(open_page: Callable[..., P
     assert violations(page) == []
 
 
+def test_what_no_test_has_tried_is_marked(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
+    missing = [{"node": 1, "text": "do.repeat.go_to: failure"}, {"node": 1, "text": "do.repeat.go_to: timeout"}]
+    known = {"at": 1.8e9, "tests": 2, "ways": 5, "count": 3, "missing": missing}
+    patrol.answers["/console/tested"] = lambda _: {"success": True, "message": "", "answer": known}
+    page = open_page(page_name="mission")
+    step = page.get_by_role("treeitem").filter(has_text="go_to $corner").last
+    expect(step).to_contain_text("not tested: failure, timeout")
+    expect(page.get_by_text("Tests took 3 of 5 ways (2 tests, ")).to_be_visible()
+    assert violations(page) == []
+
+
+def test_tests_of_another_version_are_said_to_be_so(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
+    known = {"at": 1.8e9, "tests": 2, "ways": 5, "count": 4, "missing": [{"node": 1, "text": "x: failure"}]}
+    patrol.answers["/console/tested"] = lambda _: {"success": True, "message": "", "answer": known}
+    page = open_page(page_name="mission")
+    expect(page.get_by_text("were for another version of this mission")).to_be_visible()
+    expect(page.get_by_text("not tested")).to_have_count(0)
+
+
 def test_a_robot_without_missions_says_where_they_are_written(
     open_page: Callable[..., Page], gateway: FakeGateway
 ) -> None:
@@ -138,13 +157,10 @@ def test_what_is_wrong_and_why_is_seen_at_once(open_page: Callable[..., Page], g
 
 
 @pytest.mark.parametrize("name", ["mission", "diagnostics"])
-@pytest.mark.parametrize("size", [WIDE, PHONE], ids=["wide", "phone"])
-def test_it_fits_the_window_and_the_finger(
-    open_page: Callable[..., Page], patrol: FakeGateway, name: str, size: Any
-) -> None:
+def test_it_fits_the_window_and_the_finger(open_page: Callable[..., Page], patrol: FakeGateway, name: str) -> None:
     patrol.windows[TREE] = tree(2)
-    page = open_page(page_name=name, viewport=size, color_scheme="dark")
+    page = open_page(page_name=name)
     expect(page.get_by_role("treeitem").first).to_be_visible()
-    assert not overflows(page)
-    assert too_small(page) == []
-    assert violations(page) == []
+    for size in (WIDE, PHONE):
+        page.set_viewport_size(size)
+        expect_fit(page)

@@ -9,13 +9,14 @@ from collections.abc import Callable
 from io import BytesIO
 from typing import Any
 
+import numpy as np
 import pytest
 from PIL import Image as Picture
 from playwright.sync_api import Page, expect
 
 from tests.console.browser import CHROMIUM
 from tests.console.fake_gateway import FakeGateway
-from tests.console.looks import PHONE, overflows, too_small, violations
+from tests.console.looks import PHONE, expect_fit, violations
 from tests.console.test_page_robot import DESCRIBED, component, port
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
@@ -59,6 +60,19 @@ WAY = {
     }
 }
 
+WORLD = component("world", "world", port("world", "out", "/world", "rbxcompose_msgs/msg/World"))
+LASER = component("laser", "laser_sim", port("scan", "out", "/scan", "sensor_msgs/msg/LaserScan"))
+BEGAN = 1_000  # [s], the stamp of the world at 5 s of robot time
+TURN = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+ORIGIN = {"position": {"x": -2.0, "y": -2.0, "z": 0.0}, "orientation": TURN}
+
+
+def transforms(parent: str, child: str, x: float, after: float = 0.0) -> dict[str, Any]:
+    """Return a message with a transform, published so long [s] after the world."""
+    header = {"frame_id": parent, "stamp": {"sec": BEGAN + int(after), "nanosec": int(after % 1 * 1e9)}}
+    place = {"translation": {"x": x, "y": 0.0, "z": 0.0}, "rotation": TURN}
+    return {"transforms": [{"header": header, "child_frame_id": child, "transform": place}]}
+
 
 @pytest.fixture
 def crane(gateway: FakeGateway) -> FakeGateway:
@@ -72,6 +86,29 @@ def crane(gateway: FakeGateway) -> FakeGateway:
         **dict.fromkeys(("/crane/move", "/arm/move_action", "/arm/execute"), lambda _: {}),
     }
     return gateway
+
+
+@pytest.fixture
+def crane_in_world(crane: FakeGateway) -> FakeGateway:
+    """A crane in a room of 4 m, in which a blue ton goes from y = -1 to y = 1 in 10 s."""
+    around = [100 if 0 in (row, column) or 39 in (row, column) else 0 for row in range(40) for column in range(40)]
+    header = {"frame_id": "map", "stamp": {"sec": BEGAN, "nanosec": 0}}
+    info = {"width": 40, "height": 40, "resolution": 0.1, "origin": ORIGIN}
+    ton = {"name": "ton", "kind": "cylinder", "size": [0.3, 0.9], "x": 1.0, "y": -1.0, "z": 0.0, "heading": 0.0}
+    path = {"times": [0.0, 10.0], "xs": [1.0, 1.0], "ys": [-1.0, 1.0], "repeats": False, "colour": "blue"}
+    room = {"header": header, "info": info, "data": around}
+    crane.latched["/world"] = {"name": "room", "map": room, "shapes": [ton | path], "time": 5.0}
+    crane.latched["/tf_static"] = transforms("map", "odom", 0.0)
+    crane.latched["/tf"] = transforms("odom", "base", 0.0)
+    crane.windows[DESCRIBED] = [*crane.windows[DESCRIBED], WORLD, LASER]
+    return crane
+
+
+def middle_of_blue(page: Page) -> tuple[float, float] | None:
+    """Return where the blue pixels are in the picture, on average."""
+    shown = np.asarray(Picture.open(BytesIO(page.locator(".scene").screenshot())).convert("RGB")).astype(int)
+    rows, columns = np.nonzero((shown[..., 2] > shown[..., 0] + 80) & (shown[..., 0] < 110))
+    return (float(columns.mean()), float(rows.mean())) if len(rows) else None
 
 
 def scene(page: Page, name: str) -> Any:
@@ -115,6 +152,42 @@ def test_sliders_move_a_ghost_unless_they_may_move_the_robot(
     expect(page.get_by_text("Nothing of the robot moves slide joint by a goal")).to_be_visible()
 
 
+def test_the_robot_stands_in_its_world_in_which_things_move(
+    open_page: Callable[..., Page], crane_in_world: FakeGateway
+) -> None:
+    page = open_page(page_name="model")
+    expect(page.locator(".scene")).to_have_attribute("data-world", "1")
+    page.get_by_role("button", name="Top", exact=True).click()
+    expect(page.locator(".scene")).to_have_attribute("data-time", "5")
+    first = middle_of_blue(page)
+    crane_in_world.say("/tf", transforms("odom", "base", 0.0, after=5.0))
+    expect(page.locator(".scene")).to_have_attribute("data-time", "10")
+    second = middle_of_blue(page)
+    crane_in_world.say("/tf", transforms("odom", "base", 0.5, after=5.0))
+    expect(page.locator(".scene")).to_have_attribute("data-place", "[0.5,0,0]")
+    third = middle_of_blue(page)
+    assert first
+    assert second
+    assert third
+    assert math.dist(first, second) > 150  # [px]: the ton went on by 1 m
+    assert math.dist(second, third) > 75  # the camera goes with the robot
+    assert violations(page) == []
+    page.get_by_label("World", exact=True).uncheck()
+    expect(page.locator(".scene")).to_have_attribute("data-world", "")
+    assert middle_of_blue(page) is None
+    page.reload()
+    expect(page.get_by_label("World", exact=True)).not_to_be_checked()
+    assert middle_of_blue(page) is None
+
+
+def test_a_robot_without_a_world_is_asked_for_nothing_of_it(open_page: Callable[..., Page], crane: FakeGateway) -> None:
+    page = open_page(page_name="model")
+    expect(page.get_by_role("button", name="Drag its tip")).to_be_visible()
+    expect(page.get_by_label("World", exact=True)).to_be_hidden()
+    asked = {frame["topic"] for _, frame in crane.frames if frame["op"] == "subscribe"}
+    assert not asked & {"/world", "/tf", "/tf_static", "/scan"}
+
+
 def test_a_goal_of_an_arm_is_planned_shown_and_executed(open_page: Callable[..., Page], crane: FakeGateway) -> None:
     page = open_page(page_name="model", reduced_motion="reduce")
     page.get_by_role("button", name="Drag its tip").click()
@@ -154,14 +227,13 @@ def test_a_pose_that_cannot_be_reached_says_why_and_nothing_is_executed(
     assert crane.goals() == []
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_it_fits_a_phone(open_page: Callable[..., Page], crane: FakeGateway, scheme: str) -> None:
-    page = open_page(page_name="model", viewport=PHONE, color_scheme=scheme, has_touch=True)
+def test_it_fits_a_phone(open_page: Callable[..., Page], crane: FakeGateway) -> None:
+    crane.windows[DESCRIBED] = [*crane.windows[DESCRIBED], WORLD]
+    page = open_page(page_name="model", viewport=PHONE, has_touch=True)
+    expect(page.get_by_label("World", exact=True)).to_be_visible()
     page.get_by_role("button", name="Drag its tip").click()
     expect(page.get_by_label("X cm")).to_have_value("60")
-    assert not overflows(page)
-    assert too_small(page) == []
-    assert violations(page) == []
+    expect_fit(page)
 
 
 def test_meshes_that_are_missing_are_named(open_page: Callable[..., Page], crane: FakeGateway) -> None:

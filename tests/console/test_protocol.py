@@ -104,13 +104,31 @@ def test_the_lowest_throttle_and_the_longest_queue_of_several_subscriptions_coun
     for count in range(5, 10):
         room.arrives("/level", level(count))
     assert [frame["msg"]["data"] for frame in client.gets()] == [8.0]
-    room.now = 1.1
+    room.now = 0.9
     assert client.gets() == []
-    room.now = 1.2
+    room.now = 1.0
     assert [frame["msg"]["data"] for frame in client.gets()] == [9.0]
     room.asked()
     client.does("unsubscribe", topic="/level", id="slow")
     assert room.asked() == [Unsubscribe("/level")]
+
+
+def test_clients_that_came_at_different_times_get_the_same_messages() -> None:
+    room = Room()
+    clients = []
+    for turn in range(4):
+        room.now = turn * 0.03
+        clients.append(client := room.client())
+        client.does("subscribe", topic="/level", type="std_msgs/Float32", throttle_rate=100)
+    got: list[list[float]] = [[] for _ in clients]
+    for step in range(100):
+        room.now = 0.2 + step * 0.02
+        if room.bridge.wants("/level", room.now):
+            room.arrives("/level", level(step))
+        for client, numbers in zip(clients, got, strict=True):
+            numbers += (frame["msg"]["data"] for frame in client.gets())
+    assert got[0] == got[1] == got[2] == got[3]
+    assert len(got[0]) == pytest.approx(20, abs=1)
 
 
 def test_topics_take_turns() -> None:
@@ -276,16 +294,23 @@ def test_a_window_is_looked_through_as_often_as_the_most_curious_client_wants_an
     assert room.asked() == [Unwatch(window)]
 
 
+def test_what_reaches_nobody_is_not_wanted() -> None:
+    room = Room()
+    first, second = room.client(), room.client()
+    for client, throttle in ((first, 100), (second, 500)):
+        client.does("subscribe", topic="/battery_level", type="std_msgs/Float32", throttle_rate=throttle)
+    assert room.bridge.wants("/battery_level", room.now)
+    room.bridge.arrived("/battery_level", Float32(), room.now)
+    assert [room.bridge.wants("/battery_level", room.now + later) for later in (0.05, 0.1)] == [False, True]
+    first.leaves()
+    assert [room.bridge.wants("/battery_level", room.now + later) for later in (0.4, 0.5)] == [False, True]
+    assert not room.bridge.wants("/odom", room.now)
+
+
 @pytest.mark.parametrize("path", ["mission", "mission/ListMissions/name", "x/y/z/w/v"])
 def test_what_is_no_window_is_refused(path: str) -> None:
     (status,) = Room().client().does("subscribe", topic=f"/console/windows/{path}")
     assert "a subject, a query, and its fields" in status["msg"]
-
-
-@pytest.mark.parametrize("op", ["advertise_action", "unadvertise_action", "action_feedback"])
-def test_what_is_not_served_yet_is_said(op: str) -> None:
-    (status,) = Room().client().does(op, id="a")
-    assert status == {"op": "status", "level": "error", "msg": f"the operation '{op}' is not yet served", "id": "a"}
 
 
 @pytest.mark.parametrize(

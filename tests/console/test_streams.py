@@ -10,7 +10,8 @@ import pytest
 
 from rbxcompose.domains.console import streams as module
 from rbxcompose.domains.console.streams import Streams
-from rbxcompose.domains.console.video import Picture, WrongPictureError
+from rbxcompose.domains.console.video import Picture
+from rbxcompose.msgs.images import WrongPictureError
 from rbxcompose.msgs.sensor_msgs import Image
 
 TOPIC = "/camera"

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image as Pictures
 
-from rbxcompose.domains.console.video import Picture, WrongPictureError, encoded, pixels, wanted
+from rbxcompose.domains.console.video import Picture, encoded, wanted
+from rbxcompose.msgs.images import WrongPictureError, pixels
 from rbxcompose.msgs.sensor_msgs import CompressedImage, Image
 
 RED = (200, 30, 10)

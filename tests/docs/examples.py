@@ -25,6 +25,14 @@ URDF = """<robot name="example">
   </joint>
 </robot>
 """
+NAVIGATION = "world: rbx:worlds/house.yaml\nnavigation:\n  planner: {patience: 15 s}\n  costs: {map_only: true}\n"
+FOLLOWER = f"""{NAVIGATION}  people: {{}}
+muxes:
+  cmd_vel:
+    inputs:
+      navigation: {{from: go_to, priority: 10, timeout: 0.5 s}}
+      following: {{from: follow_person, priority: 12, timeout: 0.5 s}}
+"""
 HEAD = """
 body: {urdf: robot.urdf}
 buses: {servos: {type: dynamixel}}
@@ -39,6 +47,8 @@ WALKED_THROUGH = ("tutorial.md", "missions.md", "sdk.md", "systems.md")  # their
 _FENCE = re.compile(r"^```(?P<info>[^\n`]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 _SECTION = re.compile(r"^(?=[^\s#])", re.MULTILINE)
 _ENTRY = re.compile(r"^(?=  [^\s#])", re.MULTILINE)
+_GO_TO = re.compile(r"^( +)go_to:\n(\1  .*\n)+", re.MULTILINE)
+_SPEED = re.compile(r"^args:\n(  .*\n)+", re.MULTILINE)
 _WORK = re.compile(r"^(do|machine):", re.MULTILINE)
 _MISSION_FILE = re.compile(r"(?:\.\./)*missions/")  # however far above the robot's file a page sees it
 _NAMED_MISSION = re.compile(r"\.\./\.\./missions/\w+\.yaml")
@@ -66,6 +76,13 @@ class Block:
         return f"{self.page}:{self.line}"
 
 
+ROBOTS = {
+    "head": HEAD,
+    "navigation": NAVIGATION,
+    "follower": FOLLOWER,
+}  # what the robot of a mission has besides, by a word of its block
+
+
 def blocks_of(text: str, page: str) -> Iterator[Block]:
     for match in _FENCE.finditer(text):
         yield Block(page, text.count("\n", 0, match.start()) + 1, tuple(match["info"].split()), match["text"])
@@ -89,13 +106,16 @@ def checked(block: Block, folder: Path) -> Checked:
     """Compile the manifest or the fragment that a block holds."""
     kind = next((word for word in ("robot", "mission") if word in block.words[1:]), "")
     if kind == "mission":
-        return check_mission(HEADER + block.text, folder, HEAD if "head" in block.words else "")
+        more = next((text for word, text in ROBOTS.items() if word in block.words), "")
+        return check_mission(HEADER + block.text, folder, more)
     if kind == "robot":
         return check_robot(with_sections(ROBOT, block.text), folder, profiles=profiles_of(block.text))
     if "\nkind: Mission\n" in block.text:
         return check_mission(block.text, folder)
     if "\nkind: Part\n" in block.text:
         return check_part(block.text, folder)
+    if "\nkind: World\n" in block.text:
+        return check_world(block.text, folder)
     if "\nkind: Overlay\n" in block.text:
         return check_overlay(block.text, folder)
     return check_robot(block.text, folder)
@@ -107,6 +127,14 @@ def check_part(text: str, folder: Path) -> Checked:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")
     return check_robot(with_sections(ROBOT, "include:\n  example: ../../parts/example.yaml\n"), folder)
+
+
+def check_world(text: str, folder: Path) -> Checked:
+    """Compile the patrol robot in a world."""
+    path = folder / "worlds" / "example.yaml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return check_robot(with_sections(ROBOT, "world: ../../worlds/example.yaml\n"), folder)
 
 
 def check_overlay(text: str, folder: Path) -> Checked:
@@ -140,7 +168,12 @@ def check_robot(
 
 
 def with_sections(robot: str, fragment: str) -> str:
-    """Return a robot's text with the sections of a fragment: an entry takes the place of the one of its name."""
+    """Return a robot's text with the sections of a fragment: an entry takes the place of the one of its name.
+
+    Navigation brings a component `go_to` of its own.
+    """
+    if re.search("^navigation:", fragment, re.MULTILINE):
+        robot = _SPEED.sub("", _GO_TO.sub("", robot))
     sections = _parts(robot, _SECTION)
     for name, section in _parts(fragment, _SECTION).items():
         entries = {**_parts(sections.get(name, ""), _ENTRY), **_parts(section, _ENTRY)}

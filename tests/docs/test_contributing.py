@@ -82,6 +82,7 @@ def test_its_code_passes_ruff(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.soak
 def test_its_code_passes_mypy(tmp_path: Path) -> None:
     """What lies in `rbxcompose` is in `contributed` here, so that mypy uses what it remembers of our package."""
     own = {

@@ -15,6 +15,8 @@ from rbxcompose.testing.manifests import Checked
 from tests.docs.examples import HEADER, ROBOT, check_mission, check_robot, profiles_of, with_sections
 
 NOT_SHOWN = {
+    "RBX3600": "the mistake is in the file of a world",
+    "RBX3604": "the mistake is in the file of a world",
     "RBX1103": "an example would be too large to read; the long number of its page is told as RBX1109",
     "RBX1105": "the comma of its example is told as text that needs quotes, RBX1101",
     "RBX1111": "the mistake is in the bytes of a file",
@@ -28,7 +30,7 @@ NOT_SHOWN = {
         [f"RBX20{n:02}" for n in (*range(1, 16), *range(21, 24))],
         "the mistake is in a URDF file; tests of these try the examples",
     ),
-    **dict.fromkeys(("RBX2017", "RBX2018"), "the mistake is on the command line"),
+    **dict.fromkeys(("RBX2017", "RBX2018", "RBX3640", "RBX3641"), "the mistake is on the command line"),
     "RBX2020": "the mistake needs a xacro file; a test of it has one",
     "RBX7003": "the example would be too large to read",
     "RBX4115": "the example is cut short: nobody wants to read 40 levels",

@@ -30,6 +30,7 @@ sys.stderr.write(json.dumps(told | {"exit": os.waitstatus_to_exitcode(status)}))
 sys.stderr.flush()
 os._exit(0)
 """
+LONG = ("2,000 names near 99 arguments", "900 missions that are missing in a folder of 900", "600 parts")
 THE_WORST = ("500,000 nodes", "doubling parts", "20 MB", "doubling aliases", "a long list filled in many times")
 WORST_OF_ALL = (*THE_WORST, "5,000 interrupts")
 
@@ -52,10 +53,11 @@ def told_of(compiler: subprocess.Popen[str], path: Path, environment: dict[str, 
 
 
 @pytest.mark.timeout(60)
-@pytest.mark.parametrize("project", PROJECTS.values(), ids=PROJECTS)
+@pytest.mark.parametrize("name", [*(name for name in PROJECTS if name not in LONG), *rare(*LONG)])
 def test_a_hostile_project_ends_in_a_finding_within_time_and_memory(
-    compiler: subprocess.Popen[str], project: Project, tmp_path: Path
+    compiler: subprocess.Popen[str], name: str, tmp_path: Path
 ) -> None:
+    project = PROJECTS[name]
     told = told_of(compiler, write(project, tmp_path), dict(project.environment))
     assert told["exit"] == 0
     assert project.code in told["codes"]
@@ -65,7 +67,7 @@ def test_a_hostile_project_ends_in_a_finding_within_time_and_memory(
 
 
 @pytest.mark.timeout(60)
-@pytest.mark.parametrize("name", [*WORST_OF_ALL[:2], *rare(*WORST_OF_ALL[2:])])
+@pytest.mark.parametrize("name", [WORST_OF_ALL[0], *rare(*WORST_OF_ALL[1:])])
 def test_the_command_itself_stays_within_time_and_memory(name: str, tmp_path: Path) -> None:
     if name in WORST:
         text, code = WORST[name]

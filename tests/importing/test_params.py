@@ -84,6 +84,10 @@ def test_a_node_is_a_component_only_if_all_fits(tmp_path: Path) -> None:
         "turn_acceleration": 2.0,
         "command_timeout": 0.5,
         "rate": 50.0,
+        "in_world": False,
+        "wheel_distance": 0.23,
+        "drift": 0.0,
+        "by_physics": False,
     }
     for name, given_ones, is_known in (
         ("base", whole, True),

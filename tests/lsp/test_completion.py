@@ -103,3 +103,23 @@ def test_a_unit_stands_behind_a_space(editor: Editor) -> None:
 
 def test_an_empty_file_gets_the_first_keys() -> None:
     assert [item.label for item in complete(Document(ROBOT, ""), 0, 0)][:4] == ["rbx", "kind", "name", "about"]
+
+
+WORLD = "rbx: 1\nkind: World\nname: w\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "labels"),
+    [
+        ("", {"map", "objects", "spawn", "places"}),
+        ("objects:\n  desk:\n    ", {"box", "cylinder", "shape", "at", "path", "colour"}),
+        ("objects:\n  desk:\n    shape: ", {"person"}),
+        ("places:\n  door:\n    heading: 90 ", {"deg", "rad"}),
+        ("objects:\n  desk:\n    at: {x: 1 m, ", {"y", "heading"}),
+    ],
+)
+def test_a_file_of_a_world_gets_its_own_keys(text: str, labels: set[str], tmp_path: Path) -> None:
+    whole = f"{WORLD}{text}"
+    found = complete(Document(tmp_path / "w.yaml", whole), whole.count("\n"), len(whole.rpartition("\n")[2]))
+    assert labels <= {item.label for item in found}
+    assert "components" not in {item.label for item in found}

@@ -18,7 +18,7 @@ OVERLAY = "rbx: 1\nkind: Overlay\nname: slow\ncomponents:\n  base:\n    max_spee
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    for name in ("robots/turtlebot", "robots/house", "robots/twins", "missions", "parts"):
+    for name in ("robots/turtlebot", "robots/rooms", "robots/twins", "missions", "parts"):
         shutil.copytree(ROOT / name, tmp_path / name)
     return tmp_path
 

@@ -26,7 +26,7 @@ from rbxcompose.tools.lsp.symbols import Mention, Symbol
 from tests.conftest import ROOT
 from tests.soak import Soak
 
-SOME = ("turtlebot", "patroller", "house", "rover", "twins", "box_robot")
+SOME = ("turtlebot", "patroller", "rooms", "rover", "twins", "box_robot")
 FRESH = "zqjxw"  # letters of which some makes a new name out of any other
 _WORD = re.compile(r"[\w.]+")
 
@@ -92,7 +92,7 @@ def shipped(tmp_path_factory: pytest.TempPathFactory) -> Names:
 
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
-    for name in ("robots/turtlebot", "robots/house", "missions"):
+    for name in ("robots/turtlebot", "robots/rooms", "missions"):
         shutil.copytree(ROOT / name, tmp_path / name)
     return tmp_path
 
@@ -127,7 +127,7 @@ def test_a_place_is_renamed_in_all_robots_that_share_a_mission(shipped: Names) -
 
 
 def test_a_place_is_renamed_where_data_are_made_of_places_but_not_in_texts(shipped: Names) -> None:
-    found = shipped.lines(shipped.rename("robots/house/robot.yaml", "  |kitchen: {", "galley"))
+    found = shipped.lines(shipped.rename("robots/rooms/robot.yaml", "  |kitchen: {", "galley"))
     assert found["missions/clean_house.yaml"] == ["galley:"]
     assert found["missions/clean_house_machine.yaml"] == ["go_to: galley"]  # its state and its text stay
 
@@ -136,7 +136,7 @@ def test_an_argument_is_renamed_in_its_part_and_where_it_is_given(shipped: Names
     found = shipped.lines(shipped.rename("parts/battery.yaml", "${args.|runtime}", "lasts"))
     assert found["parts/battery.yaml"] == ["lasts:", "runtime: ${args.lasts}"]
     assert found["robots/twins/robot.yaml"] == ["lasts: 60 s", "lasts: 90 s", "lasts: 45 s"]
-    assert found["robots/house/robot.yaml"] == ["lasts: ${args.runtime}"]
+    assert found["robots/rooms/robot.yaml"] == ["lasts: ${args.runtime}"]
 
 
 def test_a_state_a_loop_and_an_input_are_renamed_where_they_are_meant(shipped: Names) -> None:
@@ -178,8 +178,8 @@ def test_what_cannot_be_right_is_refused_with_the_reason(
 
 def test_what_the_library_brings_is_refused(project: Path) -> None:
     names = Names(project)
-    assert "does not belong to this project" in names.refusal("robots/house/robot.yaml", "battery_|battery.")
-    assert names.lines(names.rename("robots/house/robot.yaml", "values:\n  |battery:", "charge"))
+    assert "does not belong to this project" in names.refusal("robots/rooms/robot.yaml", "battery_|battery.")
+    assert names.lines(names.rename("robots/rooms/robot.yaml", "values:\n  |battery:", "charge"))
 
 
 def test_a_name_of_several_meanings_and_a_folded_text_are_refused(project: Path) -> None:
@@ -270,7 +270,7 @@ def test_after_any_rename_a_robot_is_the_same_but_for_the_name(shipped: Names, s
     symbols = sorted(names.index.symbols, key=str)
 
     @settings(
-        max_examples=400 if soak.is_on else 4,
+        max_examples=400 if soak.is_on else 2,
         derandomize=not soak.is_on,  # some names take a hundred times as long as others
         deadline=None,
         suppress_health_check=[HealthCheck.function_scoped_fixture],

@@ -19,10 +19,10 @@ ROOT = Path(__file__).parents[2]
 WRONG = "{nonsense: [1]}"  # no value is a map with such a key
 FILES = {
     "turtlebot": "robots/turtlebot/robot.yaml",
-    "house": "robots/house/robot.yaml",
+    "rooms": "robots/rooms/robot.yaml",
     "patrol": "missions/patrol.yaml",
 }
-ROBOTS = {"turtlebot": "turtlebot", "house": "house", "patrol": "turtlebot"}
+ROBOTS = {"turtlebot": "turtlebot", "rooms": "rooms", "patrol": "turtlebot"}
 HEADER = ("rbx", "kind", "name", "about", "profiles")
 Told = frozenset[tuple[str, int]]  # code and line
 

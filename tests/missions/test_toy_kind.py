@@ -165,6 +165,9 @@ def test_coverage_counts_its_ways() -> None:
     coverage.add(link(simulated.program, {}), ROBOT, seen.keys)
     assert "do.persist: body" in {way.text for way in coverage.taken}
     assert {way.text for way in coverage.missing} == {"do.persist.go_to: failure"}
+    kept = coverage.by_robot(7.0)[""][simulated.program.name]
+    assert (kept["at"], kept["tests"], kept["ways"], kept["count"]) == (7.0, 1, len(coverage.ways), 2)
+    assert kept["missing"] == [{"node": 1, "text": "do.persist.go_to: failure"}]
 
 
 def test_it_is_drawn() -> None:

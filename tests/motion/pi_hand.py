@@ -6,12 +6,12 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from rbxcompose.base.geometry import Quaternion, Transform3
+from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
 from rbxcompose.domains.arms.goals import goal_of
 from rbxcompose.domains.arms.hand import hand_task
 from rbxcompose.domains.arms.motion.arm_task import ArmTask
-from rbxcompose.domains.arms.motion.hand_task import Gripped, HandTask
+from rbxcompose.domains.arms.motion.hand_task import Gripped, HandTask, PickedObject
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.scene import PlacedObject, PlanningScene
 from rbxcompose.domains.arms.sections.scene import scene
@@ -43,7 +43,7 @@ class HandBench:
         )
         self.now, self.problem, self.is_ready, self.poses = 0.0, "", True, self.config.poses
         self.measured = dict.fromkeys((*self.config.joints, FINGER), (0.0, 0.0))
-        self.uprights: dict[str, Quaternion] = {}
+        self.picked: dict[str, PickedObject] = {}
         self.openings: list[float] = []
         self.stages: list[str] = []
         self.slips = 0.0  # [m] by which the gripper closes farther than it was told

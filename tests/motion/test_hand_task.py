@@ -38,7 +38,7 @@ def picked() -> HandBench:
 def holding(*further: PlacedObject) -> HandBench:
     """Return an arm that holds the target, among further things."""
     bench, before = HandBench(*further, without=("target",)), picked()
-    bench.measured, bench.uprights = dict(before.measured), dict(before.uprights)
+    bench.measured, bench.picked = dict(before.measured), dict(before.picked)
     bench.scene.add(before.scene.objects["target"])
     bench.works.place_objects(bench.objects)
     return bench
@@ -211,6 +211,15 @@ def test_placing_can_be_cancelled_in_each_stage(stage: str) -> None:
     bench.during = lambda now: bench.task.cancel() if now == stage else None
     assert failed(bench, PLACE)[:2] == (stage, "interrupted")
     assert (bench.scene.objects["target"].link == "right_arm_tip") is (stage != "retreat")
+
+
+def test_what_was_lost_on_the_way_is_not_put_down() -> None:
+    bench = holding()
+    bench.slips = 0.02
+    stage, reason, text = failed(bench, PLACE)
+    assert (stage, reason) == ("choose", "nothing_held")
+    assert text == "'target' was lost on the way: the gripper closes to 0 mm"
+    assert bench.scene.objects["target"].link == ROOT
 
 
 def test_an_occupied_place_tells_what_is_there() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import toppra
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -40,6 +39,8 @@ def test_the_path_is_the_one_without_a_limit_of_jerk(seed: int, count: int, jerk
     found = timed(way, FAST, HARD, np.full(3, jerk))
     assert isinstance(found, Trajectory), found
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
+    import toppra  # and with it matplotlib
+
     spline = toppra.SplineInterpolator(along, way, bc_type="natural")
     curve = spline(np.linspace(0.0, along[-1], 20_000))
     for position in found.positions[::5]:

@@ -11,7 +11,6 @@ import pytest
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pairs
 from rbxcompose.domains.arms.motion.moveit import KinematicsQuery
-from rbxcompose.domains.arms.motion.scene_messages import pose_message, pose_of
 from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.moveit_msgs import (
     Constraints,
@@ -23,6 +22,7 @@ from rbxcompose.msgs.moveit_msgs import (
     PositionIKRequest,
     RobotState,
 )
+from rbxcompose.msgs.poses import pose_message, pose_of
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Header
 from tests.motion.toy_arm import kinematics, planner

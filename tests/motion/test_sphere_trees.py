@@ -151,6 +151,7 @@ def test_what_was_fitted_is_kept_and_a_bad_file_is_fitted_again(
         assert path.read_bytes() == whole
 
 
+@pytest.mark.soak
 @pytest.mark.timeout(100)
 def test_spheres_of_a_fine_mesh_are_kept_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))

@@ -13,7 +13,7 @@ import yaml
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("robots", "missions", "parts")
 # Their bodies are files beside them, and a child process would expand most of these for each mutant.
-WITH_BODY = ("box_robot", "head_only", "pedestal_pi", "pi_robot", "rover")
+WITH_BODY = ("kobuki", "box_robot", "head_only", "pedestal_pi", "pi_robot", "rover")
 ODD = [
     *("\x00", "\x1b", "\x85", "\u2028", "\u202e", "\ufeff", "\t", "\r", "\xa0", "é", "\U0001f916", "\\", "'", '"', "#"),
     *(":", ": ", "- ", "? ", "|", ">", "&a ", "*a", "!remove", "!!python/name:x ", "<<: *a", "{", "}", "[", "]", ","),

@@ -21,6 +21,11 @@ def text_of(path: Path) -> str:
     return path.read_text(encoding="utf-8")
 
 
+@cache
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(text_of(path))
+
+
 def module_of(path: Path) -> str:
     """Return the name of a file's module below `rbxcompose`, that of a package with `__init__` behind it."""
     return ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
@@ -28,12 +33,12 @@ def module_of(path: Path) -> str:
 
 @cache
 def imported_by(path: Path) -> tuple[tuple[str, str], ...]:
-    return tuple(imported(text_of(path)))
+    return tuple(imported(tree_of(path)))
 
 
-def imported(text: str) -> Iterator[tuple[str, str]]:
-    """Yield the modules that a text imports anywhere, each with what is taken from it."""
-    for node in ast.walk(ast.parse(text)):
+def imported(tree: ast.Module) -> Iterator[tuple[str, str]]:
+    """Yield the modules that a file imports anywhere, each with what is taken from it."""
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from ((alias.name, "") for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:

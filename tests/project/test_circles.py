@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
 
@@ -47,6 +48,6 @@ def test_a_circle_is_found_wherever_its_imports_stand() -> None:
         "c": "",
         "c.d": "from a import A",
     }
-    pairs = {name: tuple(imported(text)) for name, text in texts.items()}
+    pairs = {name: tuple(imported(ast.parse(text))) for name, text in texts.items()}
     assert set(circle(imports_of(pairs))) == {"a", "b", "c.d"}
     assert circle(imports_of({**pairs, "c.d": ()})) == []

@@ -8,6 +8,8 @@ from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+from tests.project.package import tree_of
+
 PACKAGE = Path(__file__).parents[2] / "rbxcompose"
 
 ROOMS = (
@@ -25,7 +27,15 @@ ROOMS = (
     "tools",
 )
 """Each imports only from itself and from those before it; what stands behind it, it loads by name."""
-DOMAINS = {"arms": "body servos", "bases": "body servos", "console": "body", "servos": "body devices"}
+DOMAINS = {
+    "arms": "body servos worlds",
+    "bases": "body servos worlds",
+    "console": "body",
+    "navigation": "bases body worlds",
+    "servos": "body devices",
+    "vision": "body worlds",
+    "worlds": "body",
+}
 """Which other domains a domain may import; one that is not named here imports none."""
 IMPURE = ("bus", "runtime", "testing", "tools")
 """What the core of a domain does not import: all of it but its plug-ins, and what belongs to its commands."""
@@ -35,7 +45,7 @@ PLUG_IN = re.compile(r"components|sections|commands|command_\w+|controllers|impo
 def imports(path: Path) -> set[str]:
     """Return the modules of the package that a file imports, wherever in it."""
     found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from tests.project.package import PACKAGE, files, text_of
+from tests.project.package import PACKAGE, files, text_of, tree_of
 
 N = 4_000  # characters of a near-miss
 SHORT = 0.004  # [s] in which a linear expression is through with any of them
@@ -37,7 +37,7 @@ def calls() -> tuple[dict[str, set[str]], tuple[tuple[str, str, ast.expr], ...]]
     used: dict[str, set[str]] = {}
     in_place = []
     for path in files():
-        for node in ast.walk(ast.parse(text_of(path))) if CALL.search(text_of(path)) else ():
+        for node in ast.walk(tree_of(path)) if CALL.search(text_of(path)) else ():
             match node:
                 case ast.Attribute(value=ast.Name(id=name) | ast.Attribute(attr=name), attr=method):
                     if method in METHODS:

@@ -14,7 +14,7 @@ from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.testing.bench import Ran, run_robot
 
 FOLDER = Path(__file__).parents[2] / "robots"
-ROBOTS = ("house", "patroller")
+ROBOTS = ("rooms", "patroller")
 ENDLESS = {"patrol_greeting", "random_patrol", "random_patrol_battery", "battery_monitor"}
 LONG = 30.0  # [s] for which those that never end are watched
 
@@ -27,9 +27,6 @@ def compiled(robot: str, *profiles: str) -> Compilation:
 def missions_of(robot: str) -> list[str]:
     whole = compiled(robot).robot
     return [mission for mission in (whole.missions if whole else {}) if mission != "patrol"]
-
-
-MISSIONS = [(robot, mission) for robot in ROBOTS for mission in missions_of(robot)]
 
 
 def starting(plan: Plan, mission: str) -> Plan:
@@ -57,25 +54,28 @@ def test_a_robot_has_no_findings(robot: str) -> None:
     assert list(compiled(robot, "tired").report) == []
 
 
-@pytest.mark.parametrize(("robot", "mission"), MISSIONS)
-def test_a_mission_does_what_it_should(robot: str, mission: str) -> None:
-    run = ran(robot, mission, most=LONG if mission in ENDLESS else 3600.0)
-    assert run.outcome == ("running" if mission in ENDLESS else "success")
-    assert not [text for text in told(run) if text.endswith(": failure")]
-    if mission not in ENDLESS:
-        run.bench.advance(0.5)
-        assert run.bench.host.is_at_rest
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_each_mission_does_what_it_should(robot: str, subtests: pytest.Subtests) -> None:
+    for mission in missions_of(robot):
+        with subtests.test(mission):
+            run = ran(robot, mission, most=LONG if mission in ENDLESS else 3600.0)
+            assert run.outcome == ("running" if mission in ENDLESS else "success")
+            assert not [text for text in told(run) if text.endswith(": failure")]
+            if mission not in ENDLESS:
+                run.bench.advance(0.5)
+                assert run.bench.host.is_at_rest
 
 
 def test_a_house_with_a_short_battery_is_cleaned_all_the_same() -> None:
-    did = told(ran("house", "clean_house", "tired"))
+    did = told(ran("rooms", "clean_house", "tired"))
     assert did.count("recharge: success") >= 1
     done = {text for text in did if text.endswith(": success") and text.split()[0] in ("vacuum", "mop", "scrub")}
     assert done == {f"{chore}: success" for chore in ("vacuum 5 s", "mop 7 s", "scrub 9 s", "mop 5 s")}
 
 
 def test_a_chore_is_never_done_at_the_dock() -> None:
-    did = told(ran("house", "clean_house_steps", "tired"))
+    did = told(ran("rooms", "clean_house_steps", "tired"))
     docked = [at for at, text in enumerate(did) if text == "recharge: success"]
     assert docked
     for at in docked:
@@ -83,7 +83,7 @@ def test_a_chore_is_never_done_at_the_dock() -> None:
 
 
 def test_the_cleaning_machine_runs_the_house_in_its_fixed_order() -> None:
-    did = told(ran("house", "clean_house_machine"))
+    did = told(ran("rooms", "clean_house_machine"))
     rooms = [text.removeprefix("go_to ") for text in did if text.startswith("go_to ") and ":" not in text]
     assert rooms == ["living_room", "kitchen", "bathroom", "hallway"]
     assert "All chores complete!" in did

@@ -15,7 +15,7 @@ from referencing import Registry, Resource
 
 from rbxcompose.base.config import Config, Length, Time
 from rbxcompose.commands.main import main as command
-from rbxcompose.compiler.schema.documents import MAKERS, as_text, files
+from rbxcompose.compiler.schema.documents import as_text, files, makers
 from rbxcompose.compiler.schema.settle import referred
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.registry import FILES, file_model
@@ -26,7 +26,7 @@ from rbxcompose.sdk import Component, component
 from rbxcompose.sdk.registry import PLUGINS
 from tests.conftest import ROOT
 
-NAMES = [kind.lower() for kind in MAKERS]
+NAMES = [kind.lower() for kind in makers()]
 ROBOT = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
 MISSION = "rbx: 1\nkind: Mission\nname: m\n"
 
@@ -45,7 +45,7 @@ def neighbours() -> Any:
 @cache
 def schemas() -> dict[str, Any]:
     """Return each schema as it is printed: alone."""
-    return {kind.lower(): json.loads(as_text(make(sorted(PLUGINS.shipped)))) for kind, make in MAKERS.items()}
+    return {kind.lower(): json.loads(as_text(make(sorted(PLUGINS.shipped)))) for kind, make in makers().items()}
 
 
 def mistakes(text: str) -> list[str]:
@@ -64,8 +64,9 @@ def mistakes(text: str) -> list[str]:
 
 
 def manifests() -> list[Path]:
-    folders = ("robots", "missions", "parts", "overlays")
-    return sorted(path for folder in folders for path in (ROOT / folder).rglob("*.yaml"))
+    folders = ("robots", "missions", "parts", "overlays", "worlds")
+    files = (path for folder in folders for path in (ROOT / folder).rglob("*.yaml"))
+    return sorted(path for path in files if not path.stem.endswith("_map"))
 
 
 @pytest.mark.parametrize("path", manifests(), ids=lambda path: str(path.relative_to(ROOT)))
@@ -160,7 +161,7 @@ class Two(Component[TwoConfig]):
 @pytest.mark.parametrize("kind", ["Robot", "Part", "Overlay"])
 def test_a_type_and_a_setting_cost_few_lines(kind: str) -> None:
     nothing, one, two = (
-        as_text(MAKERS[kind](types)).replace("toy_two", "toy_one").splitlines()
+        as_text(makers()[kind](types)).replace("toy_two", "toy_one").splitlines()
         for types in (["charger"], ["charger", "toy_one"], ["charger", "toy_two"])
     )
     assert more(nothing, one) <= 48
@@ -358,6 +359,23 @@ def test_a_mistake_in_a_mission_is_refused_at_its_place(text: str, place: str) -
     assert place in mistakes(f"{MISSION}{text}\n")
 
 
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("map: [house_map.yaml]", "map"),
+        ("objects: {sofa: {box: [1 m, 2 m]}}", "objects.sofa.box"),
+        ("objects: {sofa: {bocks: [1 m, 2 m, 1 m]}}", "objects.sofa"),
+        ("objects: {Sofa: {shape: person}}", "objects"),
+        ("objects: {man: {shape: dog}}", "objects.man.shape"),
+        ("spawn: {door: {heading: 90}}", "spawn.door.heading"),
+        ("places: {door: {x: 1 deg}}", "places.door.x"),
+        ("components: {}", ""),
+    ],
+)
+def test_a_mistake_in_a_world_is_refused_at_its_place(text: str, place: str) -> None:
+    assert mistakes(f"rbx: 1\nkind: World\nname: w\n{text}\n") == [place]
+
+
 def test_the_examples_of_definitions_are_right() -> None:
     shared = schemas()["robot"]["$defs"]
     for name, definition in shared.items():
@@ -377,7 +395,7 @@ def test_a_component_type_has_its_docstring_as_description_and_its_example() -> 
     assert referred(warn, schemas()["robot"])["x-dimension"] == "ratio"
 
 
-@pytest.mark.parametrize("kind", MAKERS)
+@pytest.mark.parametrize("kind", makers())
 def test_the_command_prints_a_schema(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert command(["schema", kind.lower()]) == 0
     assert json.loads(capsys.readouterr().out)["properties"]["kind"]["const"] == kind

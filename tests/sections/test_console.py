@@ -49,10 +49,10 @@ def test_people_drive_by_the_input_teleop_of_the_mux_before_the_base(tmp_path: P
 
 def test_what_is_written_counts_within_the_limits_of_the_base(tmp_path: Path) -> None:
     drive = "{topic: cmd_vel/joystick, max_speed: 2 m/s, max_turn_rate: 0.5 rad/s}"
-    config = gateway(tmp_path, f"{BASE}{MUX}console: {{port: 80, drive: {drive}}}")
+    config = gateway(tmp_path, f"{BASE}{MUX}console: {{port: 80, pages: [map, drive], drive: {drive}}}")
     others = frozenset({"/cmd_vel", "/cmd_vel/teleop"})
     assert config.drive == DriveLimits("/cmd_vel/joystick", TWIST, 0.5, 0.5, others)
-    assert config.port == 80
+    assert (config.port, config.pages) == (80, ("map", "drive"))
 
 
 def test_names_are_those_on_the_bus(tmp_path: Path) -> None:
@@ -82,3 +82,10 @@ def test_the_network_is_served_with_roles_by_names(tmp_path: Path) -> None:
     guard = "{/arm/*: configure}"
     config = gateway(tmp_path, f"{BASE}console: {{listen: lan, guard: {guard}, origins: ['http://localhost:8181']}}\n")
     assert (config.listen, config.guard, config.origins) == ("lan", {"/arm/*": "configure"}, ("http://localhost:8181",))
+
+
+def test_drivers_see_colours_rather_than_depths(tmp_path: Path) -> None:
+    camera = "  eye: {type: camera_sim, frame: base_footprint, depth: true}\n"
+    assert gateway(tmp_path, f"{BASE}{camera}console: {{}}").camera == "/camera/image_raw"
+    drive = "{drive: {camera: eye}}"
+    assert gateway(tmp_path, f"{BASE}{camera}console: {drive}").camera == "/camera/image_raw"

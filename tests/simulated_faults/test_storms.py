@@ -23,7 +23,7 @@ from tests.soak import Soak
 
 ROBOT = Path(__file__).parents[2] / "robots/turtlebot/robot.yaml"
 BATCHES = 10
-QUICK, MANY = 30, 1_000  # seeds
+QUICK, MANY = 10, 1_000  # seeds
 HARD = (33, 63, 71, 97, 129, 717)  # a stop or restart while something hangs
 
 

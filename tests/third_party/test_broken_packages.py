@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.compiler.schema.documents import MAKERS
+from rbxcompose.compiler.schema.documents import makers
 from rbxcompose.sdk import registry
 from rbxcompose.testing import Checked, check_text
 from tests.third_party.places import put, see
@@ -79,7 +79,7 @@ def test_who_uses_a_broken_type_is_told_the_package_and_why(
     assert checked(tmp_path, "odd").codes == ["RBX9301"]  # also when it is asked for once more
     assert checked(tmp_path, "battery_sim").text == ""
     assert "odd" not in registry.usable_names()
-    assert "component_odd" not in MAKERS["Robot"](registry.usable_names())["$defs"]
+    assert "component_odd" not in makers()["Robot"](registry.usable_names())["$defs"]
 
 
 def test_two_packages_with_one_name_are_both_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

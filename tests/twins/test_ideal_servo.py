@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.clock import SteppedClock
 from rbxcompose.domains.servos.models import servo_models
-from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo, IdealMotor
 from rbxcompose.domains.servos.twins.servo_twin import TwinBus
 from tests.loops import for_all
 
@@ -17,7 +17,7 @@ STATE = ("present_position", "present_speed", "present_load", "present_temperatu
 
 
 def ideal(model: str, clock: SteppedClock) -> TwinBus:
-    return TwinBus([FakeServo(model, 1, is_ideal=True)], clock.now)
+    return TwinBus([FakeServo(model, 1, motor=IdealMotor)], clock.now)
 
 
 @given(name=st.sampled_from(MODELS), goals=st.lists(st.integers(-400, 400), min_size=1, max_size=10))

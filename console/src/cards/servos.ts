@@ -1,8 +1,11 @@
 /** Servos: where each joint is, and buttons that enable and relax it. */
 import type { Card } from "../cards";
-import { h, setText } from "../dom";
+import type { Component } from "../description";
+import { h, icon, setText } from "../dom";
 import { formatName, formatValue, UNKNOWN } from "../format";
 import { isOfJoint, jointsOf, slidingJoints } from "../joints";
+import type { Robot } from "../page";
+import { isMessage, type Message } from "../rosbridge";
 
 export const card: Card = {
   isFor: (component) => jointsOf(component).length > 0,
@@ -28,7 +31,8 @@ export const card: Card = {
       if (relax) buttons.firstElementChild!.append(button("Relax", name, relax.topic, {}));
       return h("tr", {}, h("th", { scope: "row" }, formatName(name.replace(/_joint$/, ""))), cell, buttons);
     });
-    body.append(h("div", { class: "joints", tabindex: "0", role: "region", "aria-label": "Joints" }, h("table", {}, ...rows)), says);
+    const trouble = "servo_bus.ListFaults" in component.requests ? [faultForm(component, robot)] : [];
+    body.append(h("div", { class: "joints", tabindex: "0", role: "region", "aria-label": "Joints" }, h("table", {}, ...rows)), says, ...trouble);
     const states = component.ports.find(({ name, kind }) => name === "joint_states" && kind === "out");
     if (!states) return () => undefined;
     let sliding = new Set<string>();
@@ -54,3 +58,38 @@ export const card: Card = {
     };
   },
 };
+
+/** Returns the form that lets something go wrong with simulated servos. */
+function faultForm(component: Component, robot: Robot): HTMLElement {
+  const box = h("details", { class: "skill" }, h("summary", {}, "Simulate a fault"));
+  const says = h("p", { class: "says", role: "status" });
+  const fill = async () => {
+    try {
+      const faults = await robot.link.ask({ type: "servo_bus.ListFaults", component: component.name });
+      if (isMessage(faults)) box.append(formOf(faults), says);
+    } catch (error) {
+      setText(says, (error as Error).message);
+      box.append(says);
+    }
+  };
+  const formOf = (faults: Message) => {
+    const what = Object.entries(faults).map(([name, about]) => h("option", { value: name }, `${formatName(name)}: ${String(about)}`));
+    const of = jointsOf(component).map(({ name }) => h("option", { value: name }, formatName(name)));
+    const [joint, fault, lasts] = [h("select", { id: `of-${component.name}` }, ...of), h("select", { id: `fault-${component.name}` }, ...what), h("input", { id: `lasts-${component.name}`, type: "number", min: "1", value: "10" })];
+    const field = (title: string, input: HTMLElement) => h("div", { class: "field" }, h("label", { for: input.id }, title), input);
+    const form = h("form", {}, field("Joint", joint), field("Fault", fault), field("For how long, s", lasts), h("button", {}, icon("warning"), "Simulate it"));
+    form.onsubmit = (event) => {
+      event.preventDefault();
+      const request = { type: "servo_bus.InjectFault", fault: fault.value, joint: joint.value, lasts: Number(lasts.value) };
+      robot.link.ask(request).then(
+        (answer) => setText(says, String(answer)),
+        (error: Error) => setText(says, error.message),
+      );
+    };
+    return form;
+  };
+  box.addEventListener("toggle", () => {
+    if (box.open && box.childElementCount === 1) void fill();
+  });
+  return box;
+}

@@ -6,6 +6,7 @@ import {
   draggedPose,
   fitted,
   formatLength,
+  costPixels,
   gridPixels,
   gridStep,
   niceLength,
@@ -31,6 +32,8 @@ export interface ShownPlace extends Pose {
 /** A grid, and the transform from its frame to that of the map. */
 export interface ShownGrid {
   grid: Grid;
+  /** Whether it lies over maps and is seen through. */
+  isCost: boolean;
   place: Transform;
 }
 
@@ -42,6 +45,11 @@ export interface Scene {
   trail: readonly Point[];
   places: readonly ShownPlace[];
   grids: readonly ShownGrid[];
+  /** Parts of the map, hatched. */
+  areas: readonly { corners: readonly Point[]; colour: string }[];
+  labels: readonly (Point & { text: string })[];
+  /** Closed lines around what is only known since the world is simulated. */
+  outlines: readonly (readonly Point[])[];
   paths: readonly (readonly Point[])[];
   scans: readonly (readonly Point[])[];
   goal: Pose | null;
@@ -62,6 +70,7 @@ const STEP = 60; // [px] by an arrow key
 const ROBOT = 13; // [px] from the middle of the robot to its nose
 const PLACE = 9; // [px] half the size of a place
 const ARROW = 36; // [px]
+const HATCH = 10; // [px] between two lines
 const FONT = "13px system-ui, sans-serif";
 const KEYS: Record<string, readonly [right: number, down: number]> = {
   ArrowLeft: [STEP, 0],
@@ -74,7 +83,19 @@ export class MapCanvas extends HTMLElement {
   /** Called when a drag with a tool has ended. */
   onDrag: (drag: Drag) => void = () => undefined;
 
-  #scene: Scene = { robot: null, isOld: false, trail: [], places: [], grids: [], paths: [], scans: [], goal: null };
+  #scene: Scene = {
+    robot: null,
+    isOld: false,
+    trail: [],
+    places: [],
+    grids: [],
+    areas: [],
+    labels: [],
+    outlines: [],
+    paths: [],
+    scans: [],
+    goal: null,
+  };
   #view: View = fitted([], 1, 1);
   #isMovedByHand = false;
   #tool: Tool = "move";
@@ -288,8 +309,10 @@ export class MapCanvas extends HTMLElement {
     const pen = new Pen(context, this.#view, ratio, colour);
     const scene = this.#scene;
     pen.clear();
-    for (const each of scene.grids) pen.grid(each, this.#pictureOf(each.grid, colour));
+    for (const each of scene.grids) pen.grid(each, this.#pictureOf(each, colour));
     pen.lines();
+    for (const { corners, colour } of scene.areas) pen.hatch(corners, colour);
+    for (const outline of scene.outlines) pen.stroke([...outline, outline[0]!], "faint", 1);
     pen.stroke(scene.trail, "faint", 2, [2, 4]);
     for (const path of scene.paths) pen.stroke(path, "good", 3);
     for (const scan of scene.scans) pen.dots(scan);
@@ -297,17 +320,20 @@ export class MapCanvas extends HTMLElement {
     if (scene.goal) pen.arrow(scene.goal, "good", [6, 4]);
     if (scene.robot) pen.robot(scene.robot, scene.isOld);
     for (const { label, ...at } of scene.places) pen.label(at, label, 2.6 * PLACE);
+    for (const { text, ...at } of scene.labels) pen.label(at, text, 0);
     if (this.#measured) pen.measure(this.#measured.from, this.#measured.to);
     if (this.#drag && this.#tool !== "measure") pen.arrow(this.#posed(this.#drag), "good");
     pen.scaleBar();
   }
 
-  #pictureOf(grid: Grid, colour: (name: string) => string): HTMLCanvasElement {
+  #pictureOf({ grid, isCost }: ShownGrid, colour: (name: string) => string): HTMLCanvasElement {
     let picture = this.#pictures.get(grid);
     if (!picture) {
       picture = h("canvas", { width: String(grid.width), height: String(grid.height) });
       const context = picture.getContext("2d")!;
-      const pixels = gridPixels(grid, partsOf(context, colour("free")), partsOf(context, colour("occupied")));
+      const pixels = isCost
+        ? costPixels(grid, partsOf(context, colour("cost")))
+        : gridPixels(grid, partsOf(context, colour("free")), partsOf(context, colour("occupied")));
       context.putImageData(new ImageData(pixels, grid.width, grid.height), 0, 0);
       this.#pictures.set(grid, picture);
     }
@@ -404,6 +430,29 @@ class Pen {
     context.strokeStyle = this.#colour(name);
     context.lineWidth = width;
     context.stroke();
+  }
+
+  /** Fills an area with diagonal lines that stay where they are on the map. */
+  hatch(corners: readonly Point[], colour: string): void {
+    const context = this.#onScreen();
+    const points = corners.map((corner) => toScreen(this.#view, corner));
+    for (const { x, y } of points) context.lineTo(x, y);
+    context.closePath();
+    context.strokeStyle = colour;
+    context.lineWidth = 2;
+    context.stroke();
+    context.save();
+    context.clip();
+    context.beginPath();
+    const start = toScreen(this.#view, { x: 0, y: 0 });
+    const { width, height } = this.#view;
+    for (let x = ((start.x + start.y) % HATCH) - HATCH; x <= width + height; x += HATCH) {
+      context.moveTo(x, 0);
+      context.lineTo(x - height, height);
+    }
+    context.lineWidth = 1.5;
+    context.stroke();
+    context.restore();
   }
 
   dots(points: readonly Point[]): void {

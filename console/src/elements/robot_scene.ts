@@ -6,7 +6,9 @@ import { ColladaLoader } from "three/examples/jsm/loaders/ColladaLoader.js";
 import { OBJLoader } from "three/examples/jsm/loaders/OBJLoader.js";
 import { STLLoader } from "three/examples/jsm/loaders/STLLoader.js";
 import URDFLoader, { type URDFJoint, type URDFRobot } from "urdf-loader";
+import { IDENTITY, type Point, type Transform, type Vector } from "../map";
 import type { JointLimits, RosPose, Shape, Thing } from "../model";
+import { heightOf, placeAt, wallMesh, type World, type WorldLight, type WorldShape } from "../world";
 
 export interface Pose {
   x: number;
@@ -20,8 +22,20 @@ export interface Pose {
 
 const GHOST = new three.MeshStandardMaterial({ color: 0xf0a020, transparent: true, opacity: 0.45, depthWrite: false });
 const THING = new three.MeshStandardMaterial({ color: 0x3a8f5a, transparent: true, opacity: 0.5 });
+const WALL = new three.MeshStandardMaterial({ color: 0x7d8a99, transparent: true, opacity: 0.4, depthWrite: false });
+const FLOOR = new three.MeshBasicMaterial({ color: 0x9aa6b3, transparent: true, opacity: 0.2, depthWrite: false });
+const LINE = new three.LineBasicMaterial({ color: 0x808890, transparent: true, opacity: 0.3 });
+const SEEN = new three.PointsMaterial({ color: 0xd8262c, size: 4, sizeAttenuation: false });
+const HOLE = 0x181818;
+const LAMP = 12; // candela of a lamp of full strength
+const GREY = "#8a94a0"; // of shapes without a colour
+const VEILED = { transparent: true, opacity: 0.75 }; // so that the robot is seen behind it
+const TALL = 0.6; // [m] of walls: a map does not say how high they are
+const AROUND = 2.5; // [m] the least distance from which a robot is seen in its world
+const FAR = 100; // [m]
 const SAME = 1e-3; // [rad, m]
-const VIEWS = { Front: [1, 0, 0.25], Side: [0, 1, 0.25], Top: [0.001, 0, 1], Corner: [1, 1, 0.7] } as const;
+const SQUARE = 0.5; // [m] of the lines on the ground
+const VIEWS = { Front: [1, 0, 0.25], Side: [0, 1, 0.25], Top: [0.001, 0, 1], Corner: [1, 1, 0.7], All: [-0.3, -0.8, 1] } as const;
 export type View = keyof typeof VIEWS;
 
 export class RobotScene {
@@ -31,7 +45,7 @@ export class RobotScene {
   /** Names of meshes that could not be read. */
   readonly missing: string[] = [];
   readonly #scene = new three.Scene();
-  readonly #camera = new three.PerspectiveCamera(45, 1, 0.01, 100);
+  readonly #camera = new three.PerspectiveCamera(45, 1, 0.01, FAR);
   readonly #renderer = new three.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
   readonly #orbit: OrbitControls;
   readonly #handle = new three.Object3D();
@@ -41,6 +55,12 @@ export class RobotScene {
   #robot: URDFRobot | null = null;
   #ghost: URDFRobot | null = null;
   #things: three.Mesh[] = [];
+  readonly #ground = new three.GridHelper(20 * SQUARE, 20, 0x808890, 0x808890);
+  readonly #scans = new Map<string, three.Points>();
+  #world: three.Group | null = null;
+  #shapes: { shape: WorldShape; mesh: three.Mesh }[] = [];
+  #robots = new Map<string, three.Mesh>(); // others in the same world
+  #isFollowed = true; // whether the camera goes with the robot
   #frame = 0;
 
   constructor() {
@@ -50,11 +70,10 @@ export class RobotScene {
     this.#camera.up.set(0, 0, 1);
     const sun = new three.DirectionalLight(0xffffff, 2.2);
     sun.position.set(2, 1.5, 4);
-    const grid = new three.GridHelper(10, 20, 0x808890, 0x808890);
-    grid.rotation.x = Math.PI / 2;
-    (grid.material as three.Material).transparent = true;
-    (grid.material as three.Material).opacity = 0.35;
-    this.#scene.add(new three.HemisphereLight(0xffffff, 0x8a8f98, 1.6), sun, grid, this.#handle);
+    this.#ground.rotation.x = Math.PI / 2;
+    (this.#ground.material as three.Material).transparent = true;
+    (this.#ground.material as three.Material).opacity = 0.35;
+    this.#scene.add(new three.HemisphereLight(0xffffff, 0x8a8f98, 1.6), sun, this.#ground, this.#handle);
     this.#orbit = new OrbitControls(this.#camera, this.#renderer.domElement);
     this.#orbit.addEventListener("change", () => this.#draw());
     this.#gizmo = new TransformControls(this.#camera, this.#renderer.domElement);
@@ -129,12 +148,90 @@ export class RobotScene {
     this.#draw();
   }
 
-  /** Puts the body where the robot is: x, y [m], heading [rad]. */
-  place(x: number, y: number, heading: number): void {
-    for (const body of [this.#robot, this.#ghost]) {
-      body?.position.set(x, y, 0);
-      body?.rotation.set(0, 0, heading);
+  /** The link that is the root of the body. */
+  get root(): string {
+    return this.#robot?.urdfName ?? "";
+  }
+
+  /** Puts the body where the robot is in its world; the camera goes with it, unless it looks at the whole world. */
+  place({ translation, rotation }: Transform): void {
+    if (!this.#robot) return;
+    const way = new three.Vector3(translation.x, translation.y, translation.z).sub(this.#robot.position);
+    const turn = new three.Quaternion(rotation.x, rotation.y, rotation.z, rotation.w);
+    if (way.lengthSq() === 0 && turn.equals(this.#robot.quaternion)) return; // it stands: there is nothing to draw
+    for (const body of [this.#robot, this.#ghost!]) {
+      body.position.add(way);
+      body.quaternion.copy(turn);
     }
+    const { x, y } = this.#robot.position;
+    this.#ground.position.set(SQUARE * Math.round(x / SQUARE), SQUARE * Math.round(y / SQUARE), 0);
+    if (this.#isFollowed && way.lengthSq() > 0) {
+      this.#camera.position.add(way);
+      this.#orbit.target.add(way);
+      this.#orbit.update();
+    }
+    this.#draw();
+  }
+
+  /** Shows the world around the robot, whose frame is that of the scene; without one, the robot is at its origin. */
+  setWorld(world: World | null): void {
+    this.#world?.traverse((object) => "geometry" in object && (object.geometry as three.BufferGeometry).dispose());
+    this.#world?.removeFromParent();
+    for (const topic of this.#scans.keys()) this.setScan(topic, []);
+    this.#shapes = (world?.shapes ?? []).map((shape) => ({ shape, mesh: standing(shape) }));
+    this.#robots = new Map((world?.robots ?? []).map((robot) => [robot.name, standing(robot)]));
+    const meshes = [...this.#shapes.map(({ mesh }) => mesh), ...this.#robots.values()];
+    this.#world = world && new three.Group().add(...wallsOf(world), ...meshes, ...world.lights.map(shining), ...world.holes.map(missing));
+    if (this.#world) this.#scene.add(this.#world);
+    else this.place(IDENTITY);
+    this.#ground.visible = !world?.walls; // a floor has lines of its own
+    this.#camera.far = Math.max(FAR, 4 * this.#extent().radius);
+    this.#camera.updateProjectionMatrix();
+    this.look("Corner");
+  }
+
+  /** Puts what moves in the world where it is at a robot time [s]. */
+  moveShapes(time: number): void {
+    for (const { shape, mesh } of this.#shapes) {
+      if (shape.path.length === 0) continue;
+      const { x, y } = placeAt(shape, time);
+      mesh.position.set(x, y, mesh.position.z);
+      this.#draw();
+    }
+  }
+
+  /** Puts things of the world, by name, where the robot has pushed them: the pose of the middle of each. */
+  pushShapes(places: ReadonlyMap<string, Transform>): void {
+    for (const { shape, mesh } of this.#shapes) {
+      const place = places.get(shape.name);
+      if (!place) continue;
+      const { translation: at, rotation } = place;
+      mesh.position.set(at.x, at.y, at.z);
+      mesh.quaternion.set(rotation.x, rotation.y, rotation.z, rotation.w);
+      this.#draw();
+    }
+  }
+
+  /** Puts other robots where they are, by name. */
+  moveRobots(places: ReadonlyMap<string, Point>): void {
+    for (const [name, { x, y }] of places) {
+      const mesh = this.#robots.get(name);
+      mesh?.position.set(x, y, mesh.position.z);
+    }
+    this.#draw();
+  }
+
+  /** Shows what a laser sees, in the frame of the world; no points take it away. */
+  setScan(topic: string, points: readonly Vector[]): void {
+    let scan = this.#scans.get(topic);
+    if (!scan) {
+      scan = new three.Points(new three.BufferGeometry(), SEEN);
+      scan.frustumCulled = false;
+      this.#scans.set(topic, scan);
+      this.#scene.add(scan);
+    }
+    scan.geometry.dispose();
+    scan.geometry = new three.BufferGeometry().setFromPoints(points.map(({ x, y, z }) => new three.Vector3(x, y, z)));
     this.#draw();
   }
 
@@ -208,15 +305,17 @@ export class RobotScene {
     this.#draw();
   }
 
-  /** Looks at the whole robot from a side. */
+  /** Looks at the whole robot from a side of it, and goes with it; or at all that there is, and stays. */
   look(view: View): void {
     if (!this.#robot) return;
-    const box = new three.Box3().setFromObject(this.#robot);
-    if (box.isEmpty()) box.set(new three.Vector3(-0.5, -0.5, 0), new three.Vector3(0.5, 0.5, 1));
-    const ball = box.getBoundingSphere(new three.Sphere());
-    const distance = (1.25 * ball.radius) / Math.sin((this.#camera.fov * Math.PI) / 360);
-    const [x, y, z] = VIEWS[view];
-    this.#camera.position.copy(ball.center).add(new three.Vector3(x, y, z).normalize().multiplyScalar(distance));
+    this.#isFollowed = view !== "All";
+    const direction = new three.Vector3(...VIEWS[view]);
+    if (this.#isFollowed) direction.applyQuaternion(this.#robot.quaternion);
+    const ball = this.#isFollowed ? ballAround(this.#robot) : this.#extent();
+    const half = Math.tan((this.#camera.fov * Math.PI) / 360) * Math.min(1, this.#camera.aspect); // of the narrower side
+    const distance = ((this.#isFollowed ? 1.25 : 0.95) * ball.radius) / Math.sin(Math.atan(half));
+    const away = direction.normalize().multiplyScalar(this.#world ? Math.max(AROUND, distance) : distance);
+    this.#camera.position.copy(ball.center).add(away);
     this.#orbit.target.copy(ball.center);
     this.#orbit.update();
     this.#draw();
@@ -236,6 +335,10 @@ export class RobotScene {
     this.#orbit.dispose();
     this.#renderer.dispose();
     this.#renderer.forceContextLoss();
+  }
+
+  #extent(): three.Sphere {
+    return ballAround(this.#world ?? this.#robot!);
   }
 
   #handlePose(): Pose {
@@ -276,6 +379,78 @@ export class RobotScene {
   }
 }
 
+/** Returns the ball around what an object shows; around the origin if it shows nothing. */
+function ballAround(object: three.Object3D): three.Sphere {
+  const box = new three.Box3().setFromObject(object);
+  if (box.isEmpty()) box.set(new three.Vector3(-0.5, -0.5, 0), new three.Vector3(0.5, 0.5, 1));
+  return box.getBoundingSphere(new three.Sphere());
+}
+
+/** Returns the walls of a world and the floor between them: one object each, however large the map is. */
+function wallsOf({ walls: grid }: World): three.Object3D[] {
+  if (!grid) return [];
+  const { positions, normals, indices } = wallMesh(grid, TALL);
+  const geometry = new three.BufferGeometry();
+  geometry.setAttribute("position", new three.BufferAttribute(positions, 3));
+  geometry.setAttribute("normal", new three.BufferAttribute(normals, 3));
+  geometry.setIndex(new three.BufferAttribute(indices, 1));
+  const [right, up] = [grid.width * grid.resolution, grid.height * grid.resolution];
+  const floor = new three.PlaneGeometry(right, up).translate(right / 2, up / 2, -SAME);
+  const objects = [new three.Mesh(geometry, WALL), new three.Mesh(floor, FLOOR), linesOn(right, up)];
+  const { translation, rotation } = grid.origin;
+  for (const object of objects) object.applyMatrix4(matrixOf({ position: translation, orientation: rotation }));
+  return objects;
+}
+
+/** Returns the lines of a floor of a size [m]. */
+function linesOn(right: number, up: number): three.LineSegments {
+  const ends: three.Vector3[] = [];
+  for (let x = 0; x <= right; x += SQUARE) ends.push(new three.Vector3(x, 0, 0), new three.Vector3(x, up, 0));
+  for (let y = 0; y <= up; y += SQUARE) ends.push(new three.Vector3(0, y, 0), new three.Vector3(right, y, 0));
+  return new three.LineSegments(new three.BufferGeometry().setFromPoints(ends), LINE);
+}
+
+/** Returns a thing of a world, where it stands; its origin is at half of its height. */
+function standing(shape: WorldShape): three.Mesh {
+  const { kind, size, x, y, z, heading, colour } = shape;
+  const geometry = kind === "mesh" ? hullGeometry(shape) : geometryOf({ kind, size })!;
+  const mesh = new three.Mesh(geometry, new three.MeshStandardMaterial({ color: knownColour(colour), ...VEILED }));
+  mesh.position.set(x, y, z + heightOf(shape) / 2);
+  mesh.rotation.z = heading;
+  return mesh;
+}
+
+/** Returns the convex parts of a mesh, around the middle of its height. */
+function hullGeometry(shape: WorldShape): three.BufferGeometry {
+  const places = shape.hulls.flatMap(({ corners, triangles }) => triangles.flatMap((at) => corners.slice(3 * at, 3 * at + 3)));
+  const geometry = new three.BufferGeometry().setAttribute("position", new three.Float32BufferAttribute(places, 3));
+  geometry.translate(0, 0, -heightOf(shape) / 2).computeVertexNormals();
+  return geometry;
+}
+
+/** Returns a hole in the ground, as a dark area just above it. */
+function missing(corners: readonly Point[]): three.Mesh {
+  const outline = new three.Shape(corners.map(({ x, y }) => new three.Vector2(x, y)));
+  const mesh = new three.Mesh(new three.ShapeGeometry(outline), new three.MeshBasicMaterial({ color: HOLE, side: three.DoubleSide }));
+  mesh.position.z = 2e-3;
+  return mesh;
+}
+
+/** Returns the lamp of a world. */
+function shining({ x, y, z, colour, strength }: WorldLight): three.PointLight {
+  const lamp = new three.PointLight(knownColour(colour || "white"), LAMP * strength);
+  lamp.position.set(x, y, z);
+  return lamp;
+}
+
+/** Returns a colour as numbers, however it is written: a context knows them all, and ignores what is none. */
+function knownColour(colour: string): string {
+  const context = document.createElement("canvas").getContext("2d")!;
+  context.fillStyle = GREY;
+  context.fillStyle = colour;
+  return String(context.fillStyle);
+}
+
 /** Shows the meshes that hang on one of these joints, and hides the others: the ghost shows what is elsewhere. */
 function showBelow(object: three.Object3D, joints: ReadonlySet<string>, isBelow: boolean): void {
   const below = isBelow || ("isURDFJoint" in object && joints.has((object as URDFJoint).urdfName));
@@ -299,7 +474,7 @@ function matrixOf({ position, orientation }: RosPose): three.Matrix4 {
 }
 
 /** Returns what is drawn of a shape; planes, meshes and octrees are left out. */
-function geometryOf({ kind, size }: Shape): three.BufferGeometry | null {
+function geometryOf({ kind, size }: Pick<Shape, "kind" | "size">): three.BufferGeometry | null {
   const [a = 0, b = 0, c = 0] = size;
   if (kind === "box") return new three.BoxGeometry(a, b, c);
   if (kind === "sphere") return new three.SphereGeometry(a, 24, 16);

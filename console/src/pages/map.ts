@@ -13,17 +13,24 @@ import {
   poseMessage,
   poseOf,
   readGrid,
+  readMarkers,
   readPath,
   readScan,
   readTransform,
+  readTransforms,
   Trail,
   type Grid,
+  type Markers,
+  type Point,
   type Pose,
+  type Transform,
   type Vector,
 } from "../map";
 import type { Page, Robot } from "../page";
+import { remember, wasOn } from "../remembered";
 import { isMessage, type Json, type Message, type Rosbridge } from "../rosbridge";
 import { Trip, type TripState } from "../trip";
+import { outlineOf, readWorld, type World } from "../world";
 import "./map.css";
 
 const ODOMETRY = 100; // [ms] between two messages
@@ -32,6 +39,7 @@ const TICK = 500;
 const OLD = 2_000; // [ms] after which a position is called old
 const BASES = ["base_footprint", "base_link"]; // of robots that publish no odometry
 const NAVIGATE = "nav2_msgs/action/NavigateToPose";
+const STATUS = "action_msgs/msg/GoalStatusArray";
 const INITIAL = "/initialpose";
 const SPREAD: Record<number, number> = { 0: 0.25, 7: 0.25, 35: 0.07 }; // of a pose shown by hand [m², m², rad²]
 const NUMBER = { type: "number", step: "any", required: "", value: "0" };
@@ -57,7 +65,11 @@ interface Layer {
   words: string;
   /** [ms] between two messages */
   throttle: number;
-  read(message: Message): Drawn | null;
+  /** What the topic is called, if only such ones are drawn. */
+  only?: RegExp;
+  /** The name under which it is remembered whether it is shown. */
+  remembered?: string;
+  read(message: Message, topic: string): Drawn | null;
 }
 
 /** Topics that are drawn, by type. */
@@ -75,14 +87,30 @@ const LAYERS: Record<string, Layer> = {
   OccupancyGrid: {
     words: "Obstacles",
     throttle: 1_000,
-    read: (message) => {
+    read: (message, topic) => {
       const grid = readGrid(message);
-      return grid && { is: "grid", frame: grid.frame, grid };
+      return grid && { is: "grid", frame: grid.frame, grid, isCost: /cost/.test(topic) };
     },
+  },
+  MarkerArray: {
+    words: "Zones: hatched, people: circles",
+    throttle: 200,
+    only: /zone|people/,
+    read: (message) => ({ is: "markers", ...readMarkers(message) }),
+  },
+  World: {
+    words: "World: thin outlines",
+    throttle: 1_000,
+    remembered: "map.world",
+    read: (message) => ({ is: "world", frame: "map", world: readWorld(message) }),
   },
 };
 
-type Drawn = { is: "path" | "scan"; frame: string; points: Vector[] } | { is: "grid"; frame: string; grid: Grid };
+type Drawn =
+  | { is: "path" | "scan"; frame: string; points: Vector[] }
+  | { is: "grid"; frame: string; grid: Grid; isCost: boolean }
+  | ({ is: "markers" } & Markers)
+  | { is: "world"; frame: string; world: World };
 
 const trips = new WeakMap<Rosbridge, Trip>();
 
@@ -124,6 +152,7 @@ class MapView {
   #fixed = "map";
   #pose: Pose | null = null;
   #seenAt = -Infinity; // when the position came [ms]
+  #stamp = 0; // of the newest transform [s]
   #navigator: Port | null = null;
   #isDescribed = false;
   #docks: ReadonlySet<string> = new Set();
@@ -251,6 +280,7 @@ class MapView {
       return found.map((port) => ({ port, isDeclared: goals.includes(port.name) }));
     });
     this.#navigator = (servers.find(({ isDeclared }) => isDeclared) ?? servers[0])?.port ?? null;
+    if (this.#navigator) this.#watchGoals(this.#navigator.topic);
     const docks = components.flatMap(({ capabilities }) => (capabilities.Charges ?? []).map(({ place }) => place));
     this.#docks = new Set(docks.filter(isMessage).map(({ name }) => String(name)));
     const drives = components.flatMap(({ ports, capabilities }) =>
@@ -260,6 +290,14 @@ class MapView {
     this.#isDescribed = components.length > 0;
     this.#showTrip(this.#trip.state.value);
     this.#tick();
+  }
+
+  /** Learns which goals run: one that was sent before the page was loaded can be canceled all the same. */
+  #watchGoals(action: string): void {
+    const topic = `${action}/_action/status`;
+    if (this.#followed.has(topic)) return;
+    const listener = (message: Message) => this.#trip.learn(action, message);
+    this.#followed.set(topic, this.#robot.link.subscribe(topic, listener, { type: STATUS }));
   }
 
   #learnMissions(missions: Json): void {
@@ -302,51 +340,52 @@ class MapView {
     const { link } = this.#robot;
     const kind = type.split("/").at(-1)!;
     if (kind === "TFMessage") {
-      this.#followed.set(topic, link.subscribe(topic, (message) => this.#onTransforms(message), { type }));
+      this.#followed.set(topic, link.subscribe(topic, (message) => this.#onTransforms(message, topic), { type }));
     } else if (kind === "Odometry") {
       const listener = (message: Message) => this.#onOdometry(topic, message);
       this.#followed.set(topic, link.subscribe(topic, listener, { type, throttle: ODOMETRY }));
-    } else if (LAYERS[kind]) {
+    } else if (LAYERS[kind]?.only?.test(topic) ?? LAYERS[kind]) {
       this.#addLayer(topic, type, LAYERS[kind]);
     }
   }
 
-  #addLayer(topic: string, type: string, { words, throttle, read }: Layer): void {
+  #addLayer(topic: string, type: string, { words, throttle, read, remembered }: Layer): void {
     const listen = () =>
       this.#robot.link.subscribe(
         topic,
         (message) => {
-          this.#drawn.set(topic, read(message));
+          this.#drawn.set(topic, read(message, topic));
           this.#draw();
         },
         { type, throttle },
       );
-    let isShown = true;
-    const toggle = button([icon("check"), topic, h("small", { class: "label" }, words)], () => {
-      isShown = !isShown;
+    let isShown = !remembered || wasOn(remembered);
+    const show = () => {
       this.#followed.get(topic)?.();
       this.#followed.set(topic, isShown ? listen() : () => undefined);
       this.#drawn.delete(topic);
       toggle.setAttribute("aria-pressed", String(isShown));
       toggle.firstChild?.replaceWith(icon(isShown ? "check" : "dot"));
       this.#draw();
+    };
+    const toggle = button([icon("check"), topic, h("small", { class: "label" }, /cost/.test(topic) ? "Costs: orange" : words)], () => {
+      isShown = !isShown;
+      if (remembered) remember(remembered, String(isShown));
+      show();
     });
-    toggle.setAttribute("aria-pressed", "true");
+    show();
     this.#layers.append(h("li", {}, toggle));
     this.#layersCard.hidden = false;
-    this.#followed.set(topic, listen());
   }
 
   // Where the robot is
 
-  #onTransforms({ transforms }: Message): void {
+  #onTransforms(message: Message, topic: string): void {
     const base = this.#baseFrame();
     const above = this.#frames.above(base);
-    for (const stamped of Array.isArray(transforms) ? transforms.filter(isMessage) : []) {
-      const transform = readTransform(stamped.transform);
-      const child = plain(String(stamped.child_frame_id));
-      if (!transform) continue;
-      this.#frames.set(frameOf(stamped), child, transform);
+    for (const { parent, child, transform, stamp } of readTransforms(message)) {
+      if (!topic.endsWith("tf_static")) this.#stamp = stamp;
+      this.#frames.set(parent, child, transform);
       this.#published.add(child);
       if (above.has(child)) this.#seenAt = performance.now();
     }
@@ -403,12 +442,23 @@ class MapView {
     const lines = (is: "path" | "scan") =>
       drawn.flatMap(({ each, place }) => (each.is === is ? [each.points.map((point) => applied(place, point))] : []));
     const { pose, frame } = this.#trip.state.value;
+    const on = (place: Transform, points: readonly Point[]) => points.map(({ x, y }) => applied(place, { x, y, z: 0 }));
+    const markers = drawn.flatMap(({ each, place }) => (each.is === "markers" ? [{ each, place }] : []));
     this.#canvas.show({
       robot: this.#pose,
       isOld: this.#isOld(),
       trail: this.#trail.points,
       places: this.#placesAreOnMap() ? this.#robot.config.places.map((place) => this.#shownPlace(place)) : [],
-      grids: drawn.flatMap(({ each, place }) => (each.is === "grid" ? [{ grid: each.grid, place }] : [])),
+      grids: drawn
+        .flatMap(({ each, place }) => (each.is === "grid" ? [{ grid: each.grid, isCost: each.isCost, place }] : []))
+        .sort((one, other) => Number(one.isCost) - Number(other.isCost)), // costs lie over the map
+      areas: markers.flatMap(({ each, place }) =>
+        each.areas.map(({ corners, colour }) => ({ corners: on(place, corners), colour })),
+      ),
+      labels: markers.flatMap(({ each, place }) => each.labels.map(({ at, text }) => ({ text, ...applied(place, at) }))),
+      outlines: drawn.flatMap(({ each, place }) =>
+        each.is === "world" ? each.world.shapes.map((shape) => on(place, outlineOf(shape, each.world.epoch + this.#stamp))) : [],
+      ),
       paths: lines("path"),
       scans: lines("scan"),
       goal: frame === this.#fixed ? pose : null,

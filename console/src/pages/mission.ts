@@ -1,7 +1,21 @@
 /** Mission: what the robot is doing and why, live; start, pause, resume and cancel. */
 import { h, emptyCard, icon, setText, type Icon } from "../dom";
 import { formatName } from "../format";
-import { ACTIVE, activeNode, isSeen, shownValue, statusOf, titleOf, type Drawn, type Listed, type Seen, type Status } from "../mission";
+import {
+  ACTIVE,
+  activeNode,
+  isSeen,
+  shownValue,
+  statusOf,
+  testedText,
+  titleOf,
+  untried,
+  type Drawn,
+  type Listed,
+  type Seen,
+  type Status,
+  type Tested,
+} from "../mission";
 import type { Page, Robot } from "../page";
 import { isMessage, type Json } from "../rosbridge";
 import "./mission.css";
@@ -65,9 +79,11 @@ class MissionView {
   #isChosenByHand = false;
   #look: () => void = () => undefined;
   #seen: Seen | null = null;
+  #tested: Tested | null = null;
   #drawn = "";
   #rows = new Map<Drawn, HTMLElement>();
   #folded = new Set<string>();
+  #untried = new Map<number, string[]>();
   #headOf = "";
 
   constructor(robot: Robot) {
@@ -112,11 +128,21 @@ class MissionView {
     this.#drawn = "";
     this.#tree.replaceChildren(h("p", { class: "label" }, "It has not run yet since the robot came up."));
     this.#data.replaceChildren(h("h2", {}, "Data"), h("p", { class: "label" }, "Nothing yet"));
+    this.#tested = null;
+    void this.#learnTested(name);
     this.#look = this.#robot.link.watch(`mission/LookAtAll/mission/${name}`, (answer) => this.#show(answer), LOOK);
     for (const button of this.#list.children) {
       button.setAttribute("aria-pressed", String(button.firstChild?.textContent === formatName(name)));
     }
     this.#showHead();
+  }
+
+  async #learnTested(name: string): Promise<void> {
+    const values = await this.#robot.link.call("/console/tested", { mission: name }).catch(() => null);
+    if (name !== this.#chosen || !isMessage(values) || !isMessage(values.answer)) return;
+    this.#tested = values.answer as unknown as Tested;
+    this.#drawn = "";
+    if (this.#seen) this.#show(this.#seen as unknown as Json);
   }
 
   // Control
@@ -187,8 +213,11 @@ class MissionView {
     if (picture !== this.#drawn) {
       this.#drawn = picture;
       this.#rows.clear();
+      const tested = this.#tested;
+      this.#untried = tested && tested.count === seen.picture.count ? untried(tested) : new Map();
       const roots = [seen.picture.main, ...seen.picture.interrupts].map((root, turn) => this.#row(root, String(turn)));
       this.#tree.replaceChildren(h("ul", { role: "tree", "aria-label": "Steps of the mission" }, ...roots));
+      if (tested) this.#tree.append(h("p", { class: "label tested" }, testedText(tested, seen.picture)));
     }
     this.#paint();
     this.#showData();
@@ -204,6 +233,11 @@ class MissionView {
     words.append(what);
     if (node.is_start) words.append(h("span", { class: "note" }, "start"));
     words.append(...node.notes.map((note) => h("span", { class: "note" }, note)));
+    const untried = this.#untried.get(node.number ?? node.children[0]?.number ?? -1);
+    const isReaction = node.number === null && node.children.length > 0; // its own row says it
+    if (untried && !isReaction) {
+      words.append(h("span", { class: "note untried" }, icon("warning"), ` not tested: ${untried.join(", ")}`));
+    }
     row.append(mark, words, h("span", { class: "node-status" }));
     const item = h("li", { role: "treeitem", "data-form": node.number === null ? "interrupt" : node.form }, row);
     this.#rows.set(node, item);

@@ -8,6 +8,7 @@ import type { Page, Robot } from "../page";
 import { Sender, tidy } from "../parameters";
 import { isMessage, type Goal, type Json, type Message } from "../rosbridge";
 import { quaternionOf } from "../forms";
+import { Surroundings } from "../surroundings";
 import "./model.css";
 
 const LOOK = 50; // [ms] between two positions of joints
@@ -61,6 +62,7 @@ class ModelView {
   readonly #says = h("p", { class: "says", role: "status" });
   readonly #missing = h("p", { class: "label", role: "status" });
   readonly #arms = h("div", { class: "model-arms" });
+  readonly #surroundings: Surroundings;
   readonly #closers: (() => void)[] = [];
   #movers: Mover[] = [];
   #described = "";
@@ -71,6 +73,7 @@ class ModelView {
     this.#robot = robot;
     this.#scene = scene;
     this.#sliders = scene.load(urdf, () => this.#showMissing()).map(sliderOf);
+    this.#surroundings = new Surroundings(robot.link, scene);
     const stage = h("section", { class: "card stage", "aria-label": "The robot in 3D" }, scene.element, this.#views(), this.#missing);
     this.element.append(stage, h("div", { class: "model-side" }, this.#arms, this.#joints(), this.#links()));
     this.#closers.push(
@@ -83,6 +86,7 @@ class ModelView {
 
   close(): void {
     this.#dragged?.close();
+    this.#surroundings.close();
     this.#closers.forEach((close) => close());
     this.#scene.close();
   }
@@ -101,7 +105,7 @@ class ModelView {
     };
     const views = (["Corner", "Front", "Side", "Top"] as View[]).map((view) => button(view, () => this.#scene.look(view)));
     const zooms = [button("+", () => this.#scene.zoom(1.25), "Closer"), button("\u2212", () => this.#scene.zoom(0.8), "Further away")];
-    return h("div", { class: "row views" }, ...views, ...zooms);
+    return h("div", { class: "row views" }, ...views, ...zooms, this.#surroundings.element);
   }
 
   #learn(components: Component[]): void {
@@ -112,6 +116,7 @@ class ModelView {
     this.#moves.disabled = this.#movers.length === 0;
     const arms = armsOf(components).map((arm) => this.#armCard(arm));
     this.#arms.replaceChildren(...arms);
+    this.#surroundings.learn(components);
   }
 
   #moved(state: Message): void {

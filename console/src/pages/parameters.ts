@@ -2,7 +2,7 @@
 import { emptyCard, h, icon, setText } from "../dom";
 import { formatName } from "../format";
 import type { Page, Robot } from "../page";
-import { parameterOf, parsed, Sender, settingOf, slideOf, tidy, valueOf, type Setting, type Value } from "../parameters";
+import { limitsOf, parameterOf, parsed, Sender, settingOf, slideOf, tidy, valueOf, type Setting, type Value } from "../parameters";
 import { isMessage, type Json, type Message } from "../rosbridge";
 import "./parameters.css";
 
@@ -231,7 +231,7 @@ class Row {
     });
     const label = h("label", { for: this.#control.id }, formatName(setting.name.replaceAll(".", " ")));
     const title = h("div", {}, label, this.#mark);
-    const about = h("p", { class: "label" }, setting.about);
+    const about = h("p", { class: "label" }, setting.about, h("small", {}, ` ${limitsOf(setting)}`));
     this.element = h("div", { class: "parameter" }, title, this.#control.element, about, this.#default, this.#note);
     this.#default.onclick = () => {
       if (this.#inManifest !== null) changed(this.#value, this.#inManifest);
@@ -323,8 +323,6 @@ function controlOf(setting: Setting, value: Value, changed: (next: { value: Valu
       input.value = moved.value;
       changed({ value: Number(moved.value) });
     };
-    const limits = `${setting.least ?? ""} to ${setting.most ?? ""}`.trim();
-    if (setting.least !== null && setting.most !== null) slider.title = `${limits} ${setting.unit}`;
     parts.unshift(slider);
   }
   const show = (next: Value) => {

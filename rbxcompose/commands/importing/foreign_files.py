@@ -17,7 +17,7 @@ from rbxcompose.manifest import validate
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.reader import read_source, read_text
 from rbxcompose.manifest.scalars import number_trouble, plain_value
-from rbxcompose.manifest.tree import KEY, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import KEY, Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.walk import TAG
 
 PYTHON_OBJECT = kind("RBX2292", Severity.WARNING)
@@ -198,12 +198,15 @@ class ForeignMap:
         """Add a finding."""
         self.report.add(finding)
 
+    def rest(self) -> dict[str, Entry]:
+        """Return the entries that nobody has asked for."""
+        return {key: entry for key, entry in self.node.entries.items() if key not in self._asked}
+
     def report_unknown_keys(self) -> None:
         """Add a finding for each key that nobody has asked for."""
-        for key, entry in self.node.entries.items():
-            if key not in self._asked:
-                message = f"unknown key '{plain(key, 60)}' in {self.what}"
-                self.add(validate.UNKNOWN_KEY.misspelt(entry.key.span, message, key, self._asked, validate.KEYS))
+        for key, entry in self.rest().items():
+            message = f"unknown key '{plain(key, 60)}' in {self.what}"
+            self.add(validate.UNKNOWN_KEY.misspelt(entry.key.span, message, key, self._asked, validate.KEYS))
 
     def _ask(self, key: str) -> TreeNode | None:
         self._asked[key] = None

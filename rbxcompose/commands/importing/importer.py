@@ -13,6 +13,7 @@ from rbxcompose.commands.importing.foreign_files import ForeignFile
 NOT_CARRIED_OVER = kind("RBX2230", Severity.WARNING)
 OTHER_PROGRAM = kind("RBX2231")
 DISAGREES = kind("RBX2232")
+RENAMED_TOPIC = kind("RBX2294", Severity.WARNING)
 
 NOTHING_LEFT = kind("RBX2238")
 CLOCK = "'bus: {clock: external}' makes robot time follow '/clock'"  # instead of `use_sim_time`

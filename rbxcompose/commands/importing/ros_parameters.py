@@ -1,5 +1,6 @@
 """Files of ROS parameters, and their values as values of a manifest."""
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import PurePath
 
@@ -19,6 +20,16 @@ _DUMPED = "dictitems"  # what Python's classes of maps are written as
 _GROUPS = "groups"
 _OF_A_GROUP = frozenset({"id", "name", "parameters", "parent", "state", "type"})
 ALL_NODES = "/**"
+_TOPIC = re.compile(r"/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*")
+
+
+def topic_name(topic: str) -> str:
+    """Return a topic as a manifest may have it: the same one, or that which is most like it."""
+    if _TOPIC.fullmatch(topic):
+        return topic
+    parts = (re.sub(r"^[0-9_]+|[^a-z0-9_]+", "_", part.lower()).strip("_") for part in topic.split("/"))
+    slash = "/" if topic.startswith("/") else ""
+    return f"{slash}{'/'.join(part for part in parts if part) or 'topic'}"
 
 
 def value_of(node: TreeNode) -> Given[ParameterData] | None:

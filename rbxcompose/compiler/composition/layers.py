@@ -225,6 +225,13 @@ def chosen_profiles(
             documents.report.add(NOTHING_TO_CHANGE.misspelt(span, message, name, named, "profiles"))
 
 
+def profile_keys(root: MappingNode) -> dict[str, frozenset[str]]:
+    """Return the names of the sections that each profile in a robot's file changes."""
+    there = root.get(profiles.name)
+    named = there.entries if isinstance(there, MappingNode) else {}
+    return {name: frozenset(one.value.entries) for name, one in named.items() if isinstance(one.value, MappingNode)}
+
+
 def profile_spans(root: MappingNode) -> dict[str, Span]:
     """Return the span of each profile in a robot's file, from its name to its end."""
     there = root.get(profiles.name)

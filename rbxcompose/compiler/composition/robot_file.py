@@ -10,7 +10,7 @@ from rbxcompose.base.config import COMPONENT, Secret
 from rbxcompose.base.findings import Finding, Related, Report, Severity, Span, kind
 from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.compiler.composition.includes import included_parts
-from rbxcompose.compiler.composition.layers import Chosen, Composed, compose_robot, profile_spans
+from rbxcompose.compiler.composition.layers import Chosen, Composed, compose_robot, profile_keys, profile_spans
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.composition.scopes import fill_scopes
 from rbxcompose.compiler.doubts import has_a_section_twice, without_half_entries
@@ -196,7 +196,7 @@ def load_robot(
     if manifest is not None:
         named = (find(overlay) for overlay in overlays)
         shown = tuple(shown_name(item) for item in named if not isinstance(item, Finding))
-        manifest = replace(manifest, profiles=profile_spans(root), overlays=shown)
+        manifest = replace(manifest, profiles=profile_spans(root), profile_keys=profile_keys(root), overlays=shown)
     if not (report.has_errors or profiles):  # a misspelt name may be the one that is not read; a profile may replace it
         for node in (root, *composed.parts.roots):
             report.extend(unread_arguments(node))

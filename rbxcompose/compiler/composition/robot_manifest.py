@@ -215,6 +215,7 @@ class RobotManifest:
     contents: Contents
     parts: Mapping[str, IncludedPart] = field(default_factory=dict)
     profiles: Mapping[str, Span] = field(default_factory=dict)  # from the name to the end of what it changes
+    profile_keys: Mapping[str, frozenset[str]] = field(default_factory=dict)  # the sections that each changes
     include: MappingNode = field(default_factory=MappingNode)  # composed; the parts that it names are already in `root`
     history: History = field(default_factory=History)
     overlays: tuple[str, ...] = ()  # the files of `-f`, by their names in findings

@@ -1,7 +1,7 @@
 """From the manifest to the robot: sections become components, ports become ends of wires, actions become skills."""
 
 from bisect import bisect_left, insort
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import field, replace
 
 from rbxcompose.base.config import Config, is_live, key_of, leaves
@@ -96,6 +96,7 @@ def _program(
 
 
 MISSION = "mission"
+RUN_MISSION = "rbxcompose_msgs/action/RunMission"
 CHANGE = "rbxcompose_parameters/srv/ChangeParameters"  # of a setting, by a mission
 
 
@@ -214,6 +215,7 @@ def mission_component(robot: Robot) -> RobotComponent:
         "topics": {name: topic for name, topic in robot.topics.items() if name in published},
         "services": {name: service for name, service in robot.services.items() if name in called},
         "settings": {name: types for name, types in robot.settings.items() if f"{name}/change_parameters" in called},
+        "for_others": any(end.type_name == RUN_MISSION for one in robot.components.values() for end in one.ends),
     }
     return _own(manifest, MISSION, config)
 
@@ -227,6 +229,8 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
     """Return the component that was requested; `given` are topics that others assign to its ports."""
     cls, options = component_type(wanted.type_name), wanted.options
     config = wanted.config if isinstance(wanted.config, Config) else cls.config_type()(**wanted.config)
+    if defaults := {name: value for name, value in _defaults(manifest.contents) if _lacks(config, name)}:
+        config = config.model_copy(update=defaults)
     ends = ends_of(wanted.name, cls, config, manifest.bus.namespace or "", {**options.connect, **given})
     process = options.process or manifest.process or cls.process
     log = LOG_LEVELS[options.log]
@@ -251,6 +255,15 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
     live = (name for name, one in leaves(config) if is_live(one)) if manifest.has_bounds else ()
     bounds = {name: bounds for name in live if (bounds := manifest.bounds_at(made.place(key_of(config, name))))}
     return replace(made, bounds=bounds) if bounds else made
+
+
+def _defaults(contents: Contents) -> Iterator[tuple[str, object]]:
+    for section in sections_in_use(ROBOT):
+        yield from section.defaults(contents).items()
+
+
+def _lacks(config: Config, name: str) -> bool:
+    return name in type(config).model_fields and name not in config.model_fields_set
 
 
 def values_of(manifest: RobotManifest, components: Mapping[str, RobotComponent]) -> dict[str, ValueSource]:

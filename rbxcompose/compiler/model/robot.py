@@ -275,7 +275,7 @@ class Robot:
 def places_of(manifest: RobotManifest) -> Mapping[str, Place]:
     """Return the places, also those that could not be read."""
     contents = manifest.contents
-    if PLACE not in contents.open_kinds and not contents.stray:
+    if PLACE not in contents.open_kinds and not contents.stray and not contents.is_unread(PLACE):
         return manifest.places
     return OpenNames(manifest.places, lambda name: contents.may_have(PLACE, name), unknown_place)
 

@@ -6,7 +6,7 @@
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,8 @@ from rbxcompose.compiler.schema.robot import document, or_empty, overlay_schema,
 from rbxcompose.compiler.schema.scalars import DEFINITIONS, SHARED, Schema
 from rbxcompose.compiler.schema.settle import opened, schemas_of
 from rbxcompose.manifest import system_file, test_file
+from rbxcompose.manifest.documents import ManifestHeader
+from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT, SYSTEM, TEST
 from rbxcompose.missions.program.program import Skill
 from rbxcompose.sdk import registry
@@ -76,21 +78,35 @@ def _step(time: Schema) -> Schema:
     return {"type": ["string", "object"], "minLength": 1, **mapping, "description": _ABOUT[STEP]}
 
 
-MAKERS: Mapping[str, Callable[[Iterable[str]], Schema]] = {
-    "Robot": robot_schema,
-    "Part": part_schema,
-    "Overlay": overlay_schema,
-    "Mission": mission_schema,
-    "Test": trial_schema,
-    "System": system_schema,
-}
-"""Makes the schema of a kind from the names of component types."""
+def own_schema(kind: str, model: type[ManifestHeader], types: Iterable[str]) -> Schema:
+    """Return the schema of a kind of manifest that a section has for itself; it is the same for all types."""
+    schemas, definitions = schemas_of({kind: model})
+    properties = opened(schemas[kind], definitions)["properties"]
+    own = {name: schema for name, schema in properties.items() if name not in ManifestHeader.model_fields}
+    return document(kind, model, own, definitions)
+
+
+@cache
+def makers() -> Mapping[str, Callable[[Iterable[str]], Schema]]:
+    """Return for each kind of manifest what makes its schema from the names of component types."""
+    own = {
+        kind: partial(own_schema, kind, model) for section in sections() for kind, model in section.documents.items()
+    }
+    return {
+        "Robot": robot_schema,
+        "Part": part_schema,
+        "Overlay": overlay_schema,
+        "Mission": mission_schema,
+        "Test": trial_schema,
+        "System": system_schema,
+        **own,
+    }
 
 
 @cache
 def installed_schema(kind: str) -> Schema:
     """Return the schema of a kind of manifest with all installed component types; it must not be modified."""
-    return MAKERS[kind](registry.usable_names())
+    return makers()[kind](registry.usable_names())
 
 
 def schema_for(kind: str, skills: Mapping[str, Skill]) -> Schema:
@@ -118,7 +134,7 @@ def files() -> dict[str, str]:
     Those of parts and overlays refer to the definitions in that of robots, which is beside them.
     """
     shipped = sorted(registry.PLUGINS.shipped)
-    schemas = {kind: make(shipped) for kind, make in MAKERS.items()}
+    schemas = {kind: make(shipped) for kind, make in makers().items()}
     for kind in (PART, OVERLAY):
         schemas[kind] = _beside(schemas[kind], schemas[ROBOT][SHARED])
     return {_file(kind): as_text(schema) for kind, schema in schemas.items()}

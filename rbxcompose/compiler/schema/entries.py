@@ -20,8 +20,12 @@ _EXAMPLE = "Example:"
 
 
 def component_schemas(types: Iterable[str]) -> tuple[Schema, dict[str, Schema]]:
-    """Return the schema of one entry of `components`, and the definitions that it needs: one for each type."""
-    classes = {name: component_type(name) for name in sorted(types)}
+    """Return the schema of one entry of `components`, and the definitions that it needs: one for each type.
+
+    What sections run by themselves is known by its type only: `check` warns of it anyway.
+    """
+    known = {name: component_type(name) for name in sorted(types)}
+    classes = {name: cls for name, cls in known.items() if not cls.made_by}
     wanted: dict[str, Any] = {name: cls.config_type() for name, cls in classes.items()}
     schemas, definitions = schemas_of({**wanted, "": ComponentOptions})
     options = opened(schemas.pop(""), definitions)["properties"]
@@ -35,7 +39,7 @@ def component_schemas(types: Iterable[str]) -> tuple[Schema, dict[str, Schema]]:
             "additionalProperties": False,
             "examples": examples_of(classes[name]),
         }
-    definitions[TYPE] = _word(classes)
+    definitions[TYPE] = _word(known)
     word = {"anyOf": [{"$ref": f"{DEFINITIONS}{TYPE}"}], "description": "What runs: the name of a component type."}
     about = "What runs under this name: its `type`, and the configuration of that type."
     return {"description": about, **_entry(COMPONENT, word, classes, options)}, definitions
@@ -70,8 +74,8 @@ def _word(classes: Mapping[str, type[Any]]) -> Schema:
 
 
 def _about(cls: type[Any]) -> str:
-    """Return the description of a type: its docstring up to the example, as one paragraph."""
-    return " ".join((inspect.getdoc(cls) or "").partition(_EXAMPLE)[0].split())
+    """Return the description of a type: the first paragraph of its docstring; the reference has the rest."""
+    return " ".join((inspect.getdoc(cls) or "").partition("\n\n")[0].split())
 
 
 def examples_of(cls: type[Any]) -> list[object]:

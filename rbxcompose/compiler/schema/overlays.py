@@ -13,7 +13,6 @@ from rbxcompose.compiler.schema.scalars import DEFINITIONS, Schema, quantities
 from rbxcompose.compiler.sections.components import components
 from rbxcompose.manifest.registry import sections as all_sections
 from rbxcompose.manifest.section import OPTIONS
-from rbxcompose.sdk.registry import component_type
 
 WHOLE = "whole_"  # prefix of a definition that allows neither to remove keys nor to omit required ones
 SECTION = "section_"  # prefix of the definition of a section
@@ -47,8 +46,7 @@ def laid_over(definitions: Mapping[str, Schema]) -> dict[str, Schema]:
 def _untyped(definitions: Mapping[str, Schema]) -> Schema:
     """Return the descriptions of the keys of a component that does not repeat its type, one that users list."""
     about: dict[str, list[str]] = {}
-    types = [name.removeprefix(COMPONENT) for name in definitions if name.startswith(COMPONENT)]
-    for name in (type_ for type_ in types if not component_type(type_).made_by):
+    for name in (name.removeprefix(COMPONENT) for name in definitions if name.startswith(COMPONENT)):
         for key, schema in definitions[f"{COMPONENT}{name}"]["properties"].items():
             if key not in (TYPE, *OPTIONS) and "description" in schema:  # a group of fields may have none
                 about.setdefault(key, []).append(f"Of `{name}`: {schema['description']}")

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 from pydantic import Field
 
@@ -59,8 +59,9 @@ def missions(reading: Reading[MissionModel]) -> dict[str, MissionEntry]:
             with:
               rounds: 3
     """
+    brought = cast("dict[str, MissionEntry]", reading.contents.brought(MISSION))
     found = ((name, _mission(reading, name, entry)) for name, entry in reading.named())
-    return {name: mission_entry for name, mission_entry in found if mission_entry is not None}
+    return brought | {name: mission_entry for name, mission_entry in found if mission_entry is not None}
 
 
 def _mission(reading: Reading[MissionModel], name: str, entry: Entry) -> MissionEntry | None:

@@ -18,7 +18,7 @@ def ports_of(plan: Plan) -> set[int]:
 def with_free_ports(plan: Plan, taken: Collection[int]) -> Plan:
     """Return a plan whose pages have their own ports, or the next ones that no robot before it has."""
     moved = {instance.name: {page.port.field: next_port(page.port.value, taken)} for instance, page in _pages(plan)}
-    return _changed(plan, moved)
+    return with_changes(plan, moved)
 
 
 def with_fleet(system: System, robot: PlacedRobot, host: str, plan: Plan) -> Plan:
@@ -35,7 +35,7 @@ def with_fleet(system: System, robot: PlacedRobot, host: str, plan: Plan) -> Pla
                 fleet[other.name] = f"{address}:{page.port.value}"
     if len(system.robots) == 1:
         return plan
-    return _changed(plan, {instance.name: {page.fleet.field: fleet} for instance, page in _pages(plan)})
+    return with_changes(plan, {instance.name: {page.fleet.field: fleet} for instance, page in _pages(plan)})
 
 
 def _pages(plan: Plan) -> Iterator[tuple[Instance, ServesPage]]:
@@ -44,7 +44,7 @@ def _pages(plan: Plan) -> Iterator[tuple[Instance, ServesPage]]:
             yield instance, page
 
 
-def _changed(plan: Plan, changes: Mapping[str, Mapping[str, Any]]) -> Plan:
+def with_changes(plan: Plan, changes: Mapping[str, Mapping[str, Any]]) -> Plan:
     """Return a plan in which some instances have other values in their configuration."""
     if not changes:
         return plan

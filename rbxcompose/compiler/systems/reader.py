@@ -1,6 +1,7 @@
 """Compiles a system: reads its file, compiles its robots, places their components, and checks the whole."""
 
 import hashlib
+import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Span, kind
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.composition.layers import chosen_profiles
-from rbxcompose.compiler.composition.overlay import compose, settled
+from rbxcompose.compiler.composition.overlay import SET, compose, settled
 from rbxcompose.compiler.model.robot import NOTHING, Outside, Robot, RobotComponent
 from rbxcompose.compiler.model.robot import resolve as absolute
 from rbxcompose.compiler.model.skills import served_skills
@@ -29,6 +30,7 @@ from rbxcompose.compiler.systems.model import (
     next_port,
     place,
 )
+from rbxcompose.compiler.systems.neighbours import PLACE_IN_WORLD, ROBOTS_IN_WORLD, with_others
 from rbxcompose.compiler.systems.rules import UNKNOWN_HOST, system_findings
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.files import PREFIX, PROFILE, find, resolve, shown_name
@@ -109,6 +111,7 @@ def compile_system(
     if "links" in root:
         out.links = validate(LINKS["links"], root.entries["links"].value, ("links",), out.report) or {}
     members = list(_members(sections["robots"], out))
+    members = in_one_world(members, out, real=real)
     seen: dict[str, _Member] = {}
     for member in members:
         if (other := seen.setdefault(member.name, member)) is not member:
@@ -120,6 +123,7 @@ def compile_system(
     for member in members:
         if (robot := _placed_robot(member, out, compiling)) is not None:
             out.robots[member.name] = robot
+    with_others(out.robots)
     if len(out.robots) == len(members):
         out.report.extend(system_findings(out))
     return out
@@ -132,6 +136,31 @@ class _Member:
     name: str
     entry: str
     model: SystemRobotModel
+    world: str = ""  # what `--set world=` gives it; empty if it is not in the system's world
+
+
+def in_one_world(members: Sequence[_Member], out: System, *, real: bool) -> list[_Member]:
+    """Return the robots of a system, those with a `spawn` in its world, where they tell each other where they are."""
+    there = [member.name for member in members if member.model.spawn]
+    file = _text(out.root, "world")
+    for entry in dict.fromkeys(member.entry for member in members if member.model.spawn and not file):
+        span = value_span(out.root, ("robots", entry, "spawn"))
+        out.report.add(MISSING_KEY.at(span, "a robot with a 'spawn' needs a 'world' of the system"))
+    if real or not file:
+        return list(members)
+    path = resolve(file, out.path or Path(), value_span(out.root, ("world",)))
+    if isinstance(path, Finding):
+        out.report.add(path)
+        return list(members)
+    return [_put_there(member, str(path), there) if member.model.spawn else member for member in members]
+
+
+def _put_there(member: _Member, file: str, robots: Sequence[str]) -> _Member:
+    spawn, name = member.model.spawn[0], member.name
+    world = json.dumps({"file": file, "spawn": spawn, "robot": name, "robots": robots})
+    topic = ROBOTS_IN_WORLD if name == robots[0] else PLACE_IN_WORLD
+    share = (*member.model.share, topic) if len(robots) > 1 else member.model.share
+    return replace(member, model=member.model.model_copy(update={"share": share}), world=world)
 
 
 def _members(robots: Mapping[str, SystemRobotModel], out: System) -> Iterator[_Member]:
@@ -149,6 +178,7 @@ def _members(robots: Mapping[str, SystemRobotModel], out: System) -> Iterator[_M
         for number in range(model.instances):
             own = {
                 "on": turned(model.on, number) if model.on else None,
+                "spawn": model.spawn and (model.spawn[number % len(model.spawn)],),
                 "place": {key: turned(called, number) for key, called in model.place.items()},
                 "link_port": model.link_port + number if model.link_port else None,
                 "share_port": model.share_port + number if model.share_port else None,
@@ -195,8 +225,8 @@ class _Compiling:
     environment: Mapping[str, str]
     real: bool
     outside: Outside = NOTHING
-    done: dict[tuple[str, str | None], Compilation] = field(default_factory=dict)
-    alone: dict[tuple[str, str | None], Robot | None] = field(default_factory=dict)
+    done: dict[tuple[str, str | None, str], Compilation] = field(default_factory=dict)
+    alone: dict[tuple[str, str | None, str], Robot | None] = field(default_factory=dict)
 
     def given(self, member: _Member) -> Outside:
         """Return what a robot shares; one that others may call is compiled for that, without what they share."""
@@ -204,9 +234,10 @@ class _Compiling:
         file = self._file(member.entry, model) if model.callers else None
         if not isinstance(file, str):
             return Outside(frozenset(shared_name(member.name, text) for text in model.share))
-        if (file, model.profile) not in self.alone:
-            self.alone[file, model.profile] = self._compile(file, model.profile, NOTHING).robot
-        robot = self.alone[file, model.profile]
+        key = file, model.profile, member.world
+        if key not in self.alone:
+            self.alone[key] = self._compile(*key, NOTHING).robot
+        robot = self.alone[key]
         space = robot.manifest.bus.namespace or "" if robot else ""
         names = {absolute(text, space): shared_name(member.name, text) for text in model.share}
         return served_outside(robot.components if robot else {}, member.name, names)
@@ -217,33 +248,43 @@ class _Compiling:
         file = model.robot if model.robot.startswith(PREFIX) else resolve(model.robot, self.out.path or Path(), span)
         return file if isinstance(file, str | Finding) else shown_name(file)
 
-    def _compile(self, file: str, profile: str | None, outside: Outside) -> Compilation:
-        profiles = [profile] if profile else []
-        return compile_robot(file, profiles=profiles, real=self.real, environment=self.environment, outside=outside)
+    def _compile(self, file: str, profile: str | None, world: str, outside: Outside) -> Compilation:
+        return compile_robot(
+            file,
+            profiles=[profile] if profile else [],
+            sets=[f"world={world}"] if world else [],
+            real=self.real,
+            environment=self.environment,
+            outside=outside,
+        )
 
-    def robot(self, entry: str, model: SystemRobotModel) -> Compilation | None:
-        """Return the robot of an entry; None after a finding that there is no such file."""
+    def robot(self, member: _Member) -> Compilation | None:
+        """Return a robot; None after a finding that there is no such file."""
+        model, entry = member.model, member.entry
         out, span = self.out, value_span(self.out.root, ("robots", entry, "robot"))
         shown = self._file(entry, model)
         if isinstance(shown, Finding):
             out.report.add(shown)
             return None
-        if (shown, model.profile) not in self.done:
-            at_profile = value_span(out.root, ("robots", entry, "profile"))
-            self.done[shown, model.profile] = self._compiled(shown, model.profile, at_profile)
-        compilation = self.done[shown, model.profile]
+        key = shown, model.profile, member.world
+        if key not in self.done:
+            places = {PROFILE: ("profile",), SET: ("spawn",)}
+            places_there = {file: value_span(out.root, ("robots", entry, *keys)) for file, keys in places.items()}
+            self.done[key] = self._compiled(*key, places_there)
+        compilation = self.done[key]
         if compilation.plan is None:
             message = f"the robot '{shown}' has errors, so the system cannot run it"
             out.report.add(BROKEN_ROBOT.at(span, message, help="see the findings of the robot"))
         return compilation
 
-    def _compiled(self, shown: str, profile: str | None, at_profile: Span) -> Compilation:
-        compilation = self._compile(shown, profile, self.outside)
+    def _compiled(self, shown: str, profile: str | None, world: str, places: Mapping[str, Span]) -> Compilation:
+        """Return a robot; what is wrong with what the system gives it is a finding at one of the `places`."""
+        compilation = self._compile(shown, profile, world, self.outside)
         self.out.sources.update(compilation.sources)
         known = {(one.code, one.span, one.message) for one in self.out.report}
         for finding in compilation.report:
-            if finding.span is not None and finding.span.file == PROFILE:
-                finding = replace(finding, span=at_profile)
+            if finding.span is not None and finding.span.file in places:
+                finding = replace(finding, span=places[finding.span.file])
             if (finding.code, finding.span, finding.message) not in known:
                 self.out.report.add(finding)
         return compilation
@@ -252,7 +293,7 @@ class _Compiling:
 def _placed_robot(member: _Member, out: System, compiling: _Compiling) -> PlacedRobot | None:
     """Return a robot with its placement; None after findings."""
     name, entry, model = member.name, member.entry, member.model
-    compilation = compiling.robot(entry, model)
+    compilation = compiling.robot(member)
     robot, plan = (compilation.robot, compilation.plan) if compilation else (None, None)
     if compilation is None or robot is None or plan is None:
         return None

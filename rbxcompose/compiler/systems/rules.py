@@ -9,6 +9,7 @@ from rbxcompose.compiler.systems import exchange
 from rbxcompose.compiler.systems.certificates import MUTUAL, NO_SECURITY
 from rbxcompose.compiler.systems.cut_link import slow_stops
 from rbxcompose.compiler.systems.model import PlacedRobot, System
+from rbxcompose.compiler.systems.neighbours import overlapping_starts
 from rbxcompose.compiler.systems.share import hosts_of, listens
 from rbxcompose.compiler.systems.traffic import Crossing, TopicEnd
 from rbxcompose.manifest.tree import key_span, value_span
@@ -152,6 +153,7 @@ def system_findings(system: System) -> Iterator[Finding]:
             yield from _commands(system, robot, crossing)
             yield from _bulk(system, robot, crossing)
     yield from _ports(system)
+    yield from overlapping_starts(system)
     yield from share_findings(system)
     for name in system.links:
         yield from _link(system, name)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rbxcompose.base.files import replace_file
-from rbxcompose.base.geometry import Quaternion, Transform3, quaternion_from_rpy
+from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
 from rbxcompose.base.units import LENGTH, RATIO
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
 from rbxcompose.domains.arms.motion import hand_task as hand_tasks
@@ -95,8 +95,8 @@ class PicksAndPlaces:
     """What picking and placing need of an arm, by the ports of its component."""
 
     bound: dict[str, Any]
-    uprights: dict[str, Quaternion]
-    """How objects stood in the root's frame when they were picked."""
+    picked: dict[str, hand_tasks.PickedObject]
+    """How objects were picked, by name."""
     gripping: SentGoal
     works: ArmWorks
     measured: dict[str, tuple[float, float]]

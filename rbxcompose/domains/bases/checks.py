@@ -14,13 +14,14 @@ from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import OTHER_TYPE, Drive, MessageFlow, is_written, period_of, setting_span
 from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent
+from rbxcompose.domains.bases.safety import lead_of, speed_within
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.missions.analysis.effects import published
 from rbxcompose.missions.analysis.facts import number_of
 from rbxcompose.missions.program.machines import TemplateShape, WrittenValue
 from rbxcompose.msgs.geometry_msgs import Twist
-from rbxcompose.sdk.capabilities import Drives, RollsOn, Setting, WritesFrame
+from rbxcompose.sdk.capabilities import Drives, RollsOn, SeesEdges, Setting, WritesFrame
 from rbxcompose.sdk.ports import Looks
 
 TOLERANCE = 0.02  # of a length, within which two count as the same
@@ -199,6 +200,32 @@ def late_brake(robot: Robot) -> Iterator[Finding]:
                 if allowed.field
                 else OTHER_TYPE,
             )
+
+
+@check("RBX3516", Severity.WARNING)
+def past_the_edge(robot: Robot) -> Iterator[Finding]:
+    """A base is too fast to stop at the edges that it sees."""
+    for sensors, sees in robot.declared(SeesEdges):
+        for base, drives in robot.declared(Drives):
+            apart = drives.wheel_distance or next((rolls.wheel_distance for rolls in base.declared(RollsOn)), None)
+            if not (apart and drives.max_speed and drives.acceleration):
+                continue
+            lead = lead_of(sees.points.value.values(), apart.value)
+            most = speed_within(lead, drives.acceleration.value)
+            if drives.max_speed.value > most:
+                cures = ["move the sensors forwards"]
+                if drives.acceleration.field:
+                    cures.append(f"brake harder by '{drives.acceleration.field}'")
+                if most >= 0.01:
+                    cures.append(f"drive at {format_quantity(math.floor(100 * most) / 100, SPEED)} at most")
+                yield past_the_edge.at(
+                    setting_span(robot, (base, drives.max_speed.field)),
+                    f"'{base.name}' cannot stop in time at an edge that '{sensors.name}' sees: "
+                    f"its wheels are {max(round(100 * lead), 0)} cm behind",
+                    label=f"up to {format_quantity(drives.max_speed.value, SPEED)}",
+                    help=", or ".join(cures),
+                    related=[Related(setting_span(robot, (sensors, sees.points.field)), "the sensors")],
+                )
 
 
 @check("RBX2282", Severity.WARNING, closed=(WIRING,))

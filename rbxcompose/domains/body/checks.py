@@ -25,7 +25,8 @@ def frame_of_body(robot: Robot) -> Iterator[Finding]:
     if description is None or not description.body.links:
         return
     shape = description.body
-    placed = {frame for _, item in robot.declared(WritesFrame) for frame in (item.parent.value, item.child.value)}
+    written = [item for _, item in robot.declared(WritesFrame)]
+    placed = {item.child.value for item in written} | {item.parent.value for item in written if not item.needs_parent}
     placed |= {description.virtual.frame} if description.virtual else set()  # RBX2352
     for component in robot.components.values():
         for frame in component.declared(WritesFrame) if component.declared(Drives) else ():

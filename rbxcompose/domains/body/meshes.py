@@ -39,15 +39,15 @@ class MissingLibraryError(Exception):
         self.finding = finding
 
 
-def need(what: str, *names: str) -> None:
-    """Require modules for `what`, a plural.
+def need(what: str, *names: str, extra: str = "picture") -> None:
+    """Require modules for `what`, a plural, which an extra of rbxcompose brings.
 
     Raises:
         MissingLibraryError: if one is not installed.
     """
     if missing := [name for name in names if find_spec(name) is None]:
         message = f"{what} need {' and '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} not installed"
-        raise MissingLibraryError(NOT_DRAWN.at(None, message, help="pip install 'rbxcompose[picture]'"))
+        raise MissingLibraryError(NOT_DRAWN.at(None, message, help=f"pip install 'rbxcompose[{extra}]'"))
 
 
 Trimesh = Any  # of an extra, which may be missing

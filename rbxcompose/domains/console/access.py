@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.files import replace_file
+from rbxcompose.base.files import replace_file, state_folder
 
 LOCAL_NAMES = ("127.0.0.1", "localhost", "[::1]")  # of this machine
 _SECRET_BYTES = 32
@@ -56,6 +56,7 @@ _SERVICES = {
     "/console/stop": Role.VIEW,  # whoever sees that something goes wrong
     "/console/ask": Role.VIEW,  # the request decides
     "/console/log": Role.VIEW,
+    "/console/tested": Role.VIEW,
     "/console/save": Role.CONFIGURE,
     "/rosapi/set_param": Role.CONFIGURE,
     "/rosapi/delete_param": Role.CONFIGURE,
@@ -89,8 +90,7 @@ def needed(frame: Mapping[str, Any], guarded: Mapping[str, Role]) -> Role:
 
 def secret_path() -> Path:
     """Return the file of which the tokens of this user's robots are made."""
-    home = os.environ.get("XDG_STATE_HOME") or Path("~/.local/state").expanduser()
-    return Path(home) / "rbxcompose" / "console_secret"
+    return state_folder() / "console_secret"
 
 
 def own_secret() -> bytes:

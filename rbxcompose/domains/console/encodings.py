@@ -93,11 +93,13 @@ def from_png(data: object, largest: int) -> str:
         raise WrongEncodingError("'data' is a picture in base64")
     try:
         picture = Image.open(BytesIO(b64decode(data, validate=True)), formats=("PNG",))
-        if picture.width * picture.height * 3 > largest:
-            raise WrongEncodingError(f"a frame has at most {largest // 2**20} MiB")
-        return picture.convert("RGB").tobytes().rstrip(b"\n").decode()
+        is_huge = picture.width * picture.height * 3 > largest
+        frame = "" if is_huge else picture.convert("RGB").tobytes().rstrip(b"\n").decode()
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise WrongEncodingError("'data' is no picture with a frame in it") from error
+    if is_huge:
+        raise WrongEncodingError(f"a frame has at most {largest // 2**20} MiB")
+    return frame
 
 
 def as_cbor(topic: str, message: Message) -> bytes:

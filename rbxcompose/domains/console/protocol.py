@@ -40,20 +40,20 @@ from rbxcompose.sdk.bound import Ended, Outcome
 LARGEST = 8 * 1024 * 1024  # [characters] of a frame
 MOST_PER_SECOND = 200  # frames of a client
 MOST_SUBSCRIPTIONS = 200  # of a client; as many topics may it advertise, and as many calls may be open
+MOST_ACTIONS = 20  # that a client serves; each is eight ends on the bus
 MOST_FRAMES = 1000  # statuses and answers that wait for a client, which is then given up
 LONGEST_QUEUE = 1000  # messages of a topic that wait for a client
 DEPTH = 10  # messages of a topic that wait for a client that wants no queue, but reads slowly
 STOP: Mapping[str, str] = {"type": "robot.StopRobot"}
 RELEASE: Mapping[str, str] = {"type": "robot.ReleaseRobot"}
 LONGEST_NAME = 64  # characters of the name of who drives
+ROUNDING = 1e-9  # of a period
 LOOK = 0.2  # [s] between two looks at the robot itself, unless its clients want fewer
 PATIENCE = 10.0  # [s] for an answer, if a client does not say
 LONGEST_PATIENCE = 60.0  # [s]
 
 _STATUSES = {Outcome.SUCCEEDED: 4, Outcome.CANCELED: 5, Outcome.ABORTED: 6}  # of action_msgs/GoalStatus
 LEVELS = ("info", "warning", "error", "none")
-LATER = re.compile(r"(un)?advertise_action|action_(feedback|result)")
-"""Operations of the protocol that are not served yet."""
 
 WINDOWS = "/console/windows/"
 DRIVE_WINDOW = f"{WINDOWS}drive"  # who holds the drive lease
@@ -62,6 +62,7 @@ _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"\w+(/(msg|srv|action))?/\w+", re.ASCII)
 _SETTING = re.compile(r"[A-Za-z_]\w*(\.\w+)*", re.ASCII)
 _LONGEST_ROS_NAME = 247
+_CANCELS = "/_action/cancel_goal"  # the end of the name of the service that cancels goals of an action
 _SHOWN = 60  # characters of what a client sent, in a status
 
 
@@ -140,6 +141,39 @@ class ServiceAnswer:
 
 
 @dataclass(frozen=True, slots=True)
+class ServeAction:
+    """Serve an action, and pass each goal to `Bridge.goal_came`, and its cancelation to `Bridge.goal_unwanted`."""
+
+    action: str
+    type: type[Action[Any, Any, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class UnserveAction:
+    """No client serves this any more."""
+
+    action: str
+
+
+@dataclass(frozen=True, slots=True)
+class GoalFeedback:
+    """Feed back on a goal that a client carries out."""
+
+    number: int
+    feedback: Message
+
+
+@dataclass(frozen=True, slots=True)
+class GoalEnd:
+    """End a goal that a client carries out; without a result, by a zero one."""
+
+    number: int
+    outcome: Outcome
+    result: Message | None
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class SendGoal:
     """Send a goal to an action; pass what comes back to `Bridge.fed_back`, and its end to `Bridge.ended`."""
 
@@ -186,6 +220,14 @@ class TailLog:
 
 
 @dataclass(frozen=True, slots=True)
+class ReadTested:
+    """Read what tests have tried of a mission, and pass it to `Bridge.robot_answered`."""
+
+    number: int
+    mission: str
+
+
+@dataclass(frozen=True, slots=True)
 class Watch:
     """Repeat a query of the robot every `period` [s], in place of an earlier period; pass answers to `Bridge.seen`."""
 
@@ -211,11 +253,16 @@ BusRequest = (
     | Serve
     | Unserve
     | ServiceAnswer
+    | ServeAction
+    | UnserveAction
+    | GoalFeedback
+    | GoalEnd
     | SendGoal
     | CancelGoal
     | AskRobot
     | SaveSettings
     | TailLog
+    | ReadTested
     | Watch
     | Unwatch
 )
@@ -290,13 +337,17 @@ class _Stream:
 
         While others wait, it will look anyway.
         """
+        if not self.wants(now):
+            return False
         if self._throttle and not self._queue:
-            if now < self._due:
-                return False
             self._pass(now)
         was_empty = not self._waiting
         self._waiting.append(message)
         return was_empty
+
+    def wants(self, now: float) -> bool:
+        """Return whether a message that comes now is not too early."""
+        return not self._throttle or self._queue > 0 or now >= self._due
 
     def take(self, now: float) -> str | bytes | None:
         """Return the next frame if it is due."""
@@ -318,9 +369,14 @@ class _Stream:
         return max(0.0, self._due - now) if self._throttle and self._queue else 0.0
 
     def _pass(self, now: float) -> None:
-        """Let one message through; the next instants form a grid, so that a rate is kept on average."""
-        is_on_grid = now - self._due < self._throttle
-        self._due = (self._due if is_on_grid else now) + self._throttle
+        """Let one message through.
+
+        The next instants form a grid, so that a rate is kept on average. It is the same one for all clients: what many
+        want at one rate is decoded, encoded and sent for all of them together.
+        """
+        grid = math.floor(now / self._throttle + ROUNDING) + 1
+        early = grid * self._throttle - now < self._throttle / 2
+        self._due = (grid + early) * self._throttle
 
 
 class _Client:
@@ -383,8 +439,19 @@ class _Served:
     """A service that a client serves, and the requests that it has not answered."""
 
     client: int
+    name: str  # by which the client knows it
     type: type[Service[Any, Any]]
     open: set[int] = field(default_factory=set)
+
+
+@dataclass(slots=True)
+class _ServedAction:
+    """An action that a client serves, and the number of the goal that it carries out."""
+
+    client: int
+    name: str  # by which the client knows it
+    type: type[Action[Any, Any, Any]]
+    goal: int | None = None
 
 
 @dataclass(slots=True)
@@ -440,6 +507,7 @@ class Bridge:
         self._advertised: dict[str, _Advertised] = {}
         self._calls: dict[int, _Waiting] = {}
         self._served: dict[str, _Served] = {}
+        self._served_actions: dict[str, _ServedAction] = {}
         self._goals: dict[int, _Goal] = {}
         self._old_statuses: dict[str, dict[object, tuple[int, str]]] = {}  # by name of an action, then of a goal
         self._clients_so_far = self._calls_so_far = 0
@@ -498,6 +566,8 @@ class Bridge:
         self._calls = {call: waiting for call, waiting in self._calls.items() if waiting.client != number}
         for service in [service for service, served in self._served.items() if served.client == number]:
             self._end_serving(service)
+        for action in [action for action, offered in self._served_actions.items() if offered.client == number]:
+            self._end_serving_action(action)
         # Goals go on, as missions do: a phone that sleeps must not leave a robot where it is.
         self.woken.discard(number)
         return self._done()
@@ -532,6 +602,13 @@ class Bridge:
         return len(self._clients[number].frames) > MOST_FRAMES
 
     # What the bus does
+
+    def wants(self, topic: str, now: float) -> bool:
+        """Return whether a message of a topic would reach anyone if it came now; any thread may ask."""
+        listened = self._listened.get(topic)
+        return listened is not None and (
+            listened.is_latched or any(stream.wants(now) for _, stream in listened.streams)
+        )
 
     def arrived(self, topic: str, message: Message, now: float, stamp: int = 0) -> None:
         """Pass a message that came at `stamp` [ns] on to the clients that listen."""
@@ -577,7 +654,27 @@ class Bridge:
         """Pass a request to the client that serves it."""
         served = self._served[service]
         served.open.add(number)
-        frame = {"op": "call_service", "id": f"request:{number}", "service": service, "args": to_json(request)}
+        if len(served.open) > MOST_SUBSCRIPTIONS:
+            served.open.discard(oldest := min(served.open))
+            self._requests.append(ServiceAnswer(oldest, None, "the client that serves it does not answer"))
+        frame = {"op": "call_service", "id": f"request:{number}", "service": served.name, "args": to_json(request)}
+        self._send(self._clients[served.client], frame)
+
+    def goal_came(self, action: str, number: int, goal: Message) -> None:
+        """Pass a goal to the client that serves its action; it replaces an earlier one."""
+        self.goal_unwanted(action)
+        served = self._served_actions[action]
+        served.goal = number
+        self._ask_server(action, "send_action_goal", action_type=served.type.TYPE, args=to_json(goal), feedback=True)
+
+    def goal_unwanted(self, action: str) -> None:
+        """Ask the client that carries out a goal to cancel it."""
+        if self._served_actions[action].goal is not None:
+            self._ask_server(action, "cancel_action_goal")
+
+    def _ask_server(self, action: str, op: str, **fields: object) -> None:
+        served = self._served_actions[action]
+        frame = {"op": op, "id": f"goal:{served.goal}", "action": served.name, **fields}
         self._send(self._clients[served.client], frame)
 
     def fed_back(self, number: int, feedback: Message) -> None:
@@ -646,8 +743,6 @@ class Bridge:
             if op not in _ANSWERED:
                 self._require(client, data)
             operation(self, client, data)
-        elif LATER.fullmatch(op):
-            raise BadFrameError(f"the operation '{op}' is not yet served")
         else:
             raise BadFrameError(f"there is no operation '{_short(op)}'")
 
@@ -666,12 +761,14 @@ class Bridge:
                 self._note(client, f"{data['op']} {_short(name)}")
 
     def _meanings(self, data: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-        """Yield a frame, and what it amounts to if its topic stands for another one, or for an action."""
+        """Yield a frame, and what it amounts to if its topic or service stands for another one, or for an action."""
         yield data
         if data.get("op") in ("publish", "advertise") and isinstance(topic := data.get("topic"), str):
             yield {**data, "topic": self._commanded(absolute(topic))}
             if (parts := self._old_parts(absolute(topic))) is not None:
                 yield {"op": "send_action_goal", "action": parts[1]}
+        if isinstance(service := data.get("service"), str) and service.endswith(_CANCELS):
+            yield {"op": "cancel_action_goal", "action": absolute(service).removesuffix(_CANCELS)}
 
     def _note(self, client: _Client, text: str) -> None:
         if client.noted != text:
@@ -802,13 +899,11 @@ class Bridge:
         return True
 
     def _call_service(self, client: _Client, data: Mapping[str, Any]) -> None:
-        name = data.get("service")
-        if not isinstance(name, str) or not _is_name(name):
-            raise BadFrameError("'service' is the name of a service")
+        name, full = _service_of(data)
         if client.open_calls >= MOST_SUBSCRIPTIONS:
             raise BadFrameError(f"at most {MOST_SUBSCRIPTIONS} calls of a client are open")
         self._calls_so_far += 1
-        number, full, given = self._calls_so_far, absolute(name), data.get("args")
+        number, given = self._calls_so_far, data.get("args")
         self._calls[number] = _Waiting(client.number, data.get("id"), name)
         client.open_calls += 1
         try:
@@ -831,6 +926,8 @@ class Bridge:
 
     def _call(self, number: int, service: str, given: object, data: Mapping[str, Any]) -> None:
         known = self._graph.services().get(service)
+        if service.endswith(_CANCELS) and service.removesuffix(_CANCELS) in self._graph.actions():
+            known = "action_msgs/srv/CancelGoal"  # hidden, as in ROS 2, but pages cancel goals that others sent
         if known is None:
             raise BadFrameError(f"there is no service '{service}'")
         try:
@@ -845,7 +942,7 @@ class Bridge:
     # Services of clients
 
     def _advertise_service(self, client: _Client, data: Mapping[str, Any]) -> None:
-        service, type_ = _service_of(data), data.get("type")
+        (name, service), type_ = _service_of(data), data.get("type")
         if not isinstance(type_, str) or not _TYPE.fullmatch(type_):
             raise BadFrameError("'type' is the name of a type of services")
         if service in self._graph.services() or service in self._served or service in _OWN:
@@ -856,18 +953,18 @@ class Bridge:
             known = registry.service(type_)
         except KeyError as error:
             raise BadFrameError(f"the type '{type_}' is not known here") from error
-        self._served[service] = _Served(client.number, known)
+        self._served[service] = _Served(client.number, name, known)
         self._requests.append(Serve(service, known))
 
     def _unadvertise_service(self, client: _Client, data: Mapping[str, Any]) -> None:
-        service = _service_of(data)
+        service = _service_of(data)[1]
         if (served := self._served.get(service)) is None or served.client != client.number:
             raise BadFrameError(f"'{service}' is not served by this client")
         self._end_serving(service)
 
     def _service_response(self, client: _Client, data: Mapping[str, Any]) -> None:
         """Pass on what a client answers to a request."""
-        service = _service_of(data)
+        service = _service_of(data)[1]
         served = self._served.get(service)
         text = str(data.get("id")).removeprefix("request:")
         number = int(text) if text.isdecimal() else -1
@@ -884,6 +981,59 @@ class Bridge:
         served = self._served.pop(service)
         self._requests += (ServiceAnswer(number, None, "the client that served it has left") for number in served.open)
         self._requests.append(Unserve(service))
+
+    # Actions of clients
+
+    def _advertise_action(self, client: _Client, data: Mapping[str, Any]) -> None:
+        (name, action), type_ = _action_of(data), data.get("type")
+        if not isinstance(type_, str) or not _TYPE.fullmatch(type_):
+            raise BadFrameError("'type' is the name of a type of actions")
+        if action in self._graph.actions() or action in self._served_actions:
+            raise BadFrameError(f"'{action}' is served already")
+        if sum(served.client == client.number for served in self._served_actions.values()) >= MOST_ACTIONS:
+            raise BadFrameError(f"a client serves at most {MOST_ACTIONS} actions")
+        try:
+            known = registry.action(type_)
+        except KeyError as error:
+            raise BadFrameError(f"the type '{type_}' is not known here") from error
+        self._served_actions[action] = _ServedAction(client.number, name, known)
+        self._requests.append(ServeAction(action, known))
+
+    def _unadvertise_action(self, client: _Client, data: Mapping[str, Any]) -> None:
+        action = _action_of(data)[1]
+        if (served := self._served_actions.get(action)) is None or served.client != client.number:
+            raise BadFrameError(f"'{action}' is not served by this client")
+        self._end_serving_action(action)
+
+    def _end_serving_action(self, action: str) -> None:
+        del self._served_actions[action]
+        self._requests.append(UnserveAction(action))  # its goal is lost, and its sender learns that
+
+    def _action_feedback(self, client: _Client, data: Mapping[str, Any]) -> None:
+        served, number = self._carried_out(client, data)
+        feedback = from_json(served.type.Feedback, data.get("values") or {}, self._stamp)
+        self._requests.append(GoalFeedback(number, feedback))
+
+    def _action_result(self, client: _Client, data: Mapping[str, Any]) -> None:
+        """Take how a goal ended: by its `status`, or else by whether there is a `result`."""
+        served, number = self._carried_out(client, data)
+        by_default = _STATUSES[Outcome.ABORTED if data.get("result") is False else Outcome.SUCCEEDED]
+        status, values = data.get("status", by_default), data.get("values")
+        outcome = next((outcome for outcome, known in _STATUSES.items() if known == status), None)
+        if outcome is None:
+            raise BadFrameError("the 'status' of a result is 4 (succeeded), 5 (canceled) or 6 (aborted)")
+        result = from_json(served.type.Result, values, self._stamp) if isinstance(values, dict) else None
+        reason = _short(values) if isinstance(values, str) and values else f"{client.who} gave up"
+        self._requests.append(GoalEnd(number, outcome, result, reason))
+        served.goal = None
+
+    def _carried_out(self, client: _Client, data: Mapping[str, Any]) -> tuple[_ServedAction, int]:
+        action = _action_of(data)[1]
+        served = self._served_actions.get(action)
+        is_own = served is not None and served.client == client.number and served.goal is not None
+        if served is None or served.goal is None or not is_own or data.get("id") != f"goal:{served.goal}":
+            raise BadFrameError(f"there is no open goal of '{action}' of this id")
+        return served, served.goal
 
     # Parameters, by the names that rosapi has for them: `/battery:runtime`, or `/battery/runtime` as in ROS 1
 
@@ -971,13 +1121,11 @@ class Bridge:
     # Actions
 
     def _send_goal(self, client: _Client, data: Mapping[str, Any]) -> None:
-        name = data.get("action")
-        if not isinstance(name, str) or not _is_name(name):
-            raise BadFrameError("'action' is the name of an action")
+        name, action = _action_of(data)
         try:
             self._require(client, data)
             wants_feedback = data.get("feedback") is True
-            goal = _Goal(client.number, data.get("id"), name, absolute(name), is_old=False)
+            goal = _Goal(client.number, data.get("id"), name, action, is_old=False)
             self._begin_goal(client, goal, data.get("args"), wants_feedback=wants_feedback)
         except (BadFrameError, WrongMessageError) as error:
             refused = _Goal(client.number, data.get("id"), name, "", is_old=False)
@@ -1100,6 +1248,11 @@ class Bridge:
         if not isinstance(after, int) or isinstance(after, bool):
             raise WrongMessageError("'after' is a whole number: that of the last answer")
         self._requests.append(TailLog(number, after))
+
+    def _tested_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
+        if not isinstance(mission := given.get("mission"), str):
+            raise WrongMessageError("'mission' is the name of a mission")
+        self._requests.append(ReadTested(number, mission))
 
     def _save_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
         names = given.get("names", [])
@@ -1226,7 +1379,11 @@ _OPERATIONS: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any]], None]] 
     "advertise": Bridge._advertise,
     "fragment": Bridge._fragment,
     "png": Bridge._png,
+    "action_feedback": Bridge._action_feedback,
+    "action_result": Bridge._action_result,
+    "advertise_action": Bridge._advertise_action,
     "advertise_service": Bridge._advertise_service,
+    "unadvertise_action": Bridge._unadvertise_action,
     "unadvertise_service": Bridge._unadvertise_service,
     "service_response": Bridge._service_response,
     "cancel_action_goal": Bridge._cancel_goal,
@@ -1250,6 +1407,7 @@ _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str,
     "/console/release": Bridge._release_service,
     "/console/save": Bridge._save_service,
     "/console/stop": Bridge._stop_service,
+    "/console/tested": Bridge._tested_service,
 }
 """Services of the gateway: what answers, or None if the answer comes later."""
 _PARAMETERS: Mapping[str, tuple[Callable[[Bridge, Mapping[str, Any], int], None], tuple[str, ...]]] = {
@@ -1292,11 +1450,20 @@ def _topic_of(data: Mapping[str, Any]) -> tuple[str, str]:
     return name, absolute(name)
 
 
-def _service_of(data: Mapping[str, Any]) -> str:
+def _service_of(data: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the name of a service as it is written, and its full name."""
     name = data.get("service")
     if not isinstance(name, str) or not _is_name(name):
         raise BadFrameError("'service' is the name of a service")
-    return absolute(name)
+    return name, absolute(name)
+
+
+def _action_of(data: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the name of an action as it is written, and its full name."""
+    name = data.get("action")
+    if not isinstance(name, str) or not _is_name(name):
+        raise BadFrameError("'action' is the name of an action")
+    return name, absolute(name)
 
 
 def _is_name(name: str) -> bool:

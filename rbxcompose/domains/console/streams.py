@@ -6,8 +6,9 @@ import asyncio
 from collections.abc import AsyncGenerator, Callable
 from typing import Any
 
-from rbxcompose.domains.console.video import IMAGES, Picture, WrongPictureError, encoded
+from rbxcompose.domains.console.video import IMAGES, Picture, encoded
 from rbxcompose.msgs import registry
+from rbxcompose.msgs.images import WrongPictureError
 from rbxcompose.msgs.types import Message
 
 MOST_STREAMS = 32  # pictures that differ

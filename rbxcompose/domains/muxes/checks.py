@@ -19,7 +19,7 @@ from rbxcompose.domains.muxes.requests import NONE
 from rbxcompose.domains.muxes.sections.muxes import MuxModel, muxes
 from rbxcompose.domains.muxes.words import HIGHEST, MODE_OF, OWN_NAMES, HoldFirst
 from rbxcompose.missions.analysis.effects import published
-from rbxcompose.sdk.capabilities import Drives, Forwards, Setting
+from rbxcompose.sdk.capabilities import CommandsMotion, Drives, Forwards, Setting
 from rbxcompose.sdk.ports import In, Looks, Out, Qos
 
 _MOST_SHOWN = 8  # inputs that are pointed at
@@ -206,7 +206,7 @@ def mux_source(robot: Robot) -> Iterator[Finding]:
 def missing(robot: Robot, source: str) -> Wrong | None:
     """Return what is wrong with the source of a mux input; None if it exists."""
     component, _, port = source.partition(".")
-    if component not in robot.written:
+    if component not in robot.written | robot.brought:
         message = f"takes from a component that the robot does not have: '{component}'"
         valid = robot.manifest.components
         is_sure = surely_meant(component, set(valid)) is not None
@@ -406,8 +406,9 @@ def no_take_over(robot: Robot) -> Iterator[Finding]:
     """No input can take over from a component that drives."""
     for mux, entry in robot.manifest.contents.of(muxes).items():
         ranks = entry.ranks if entry.profile == "default" else {}
-        driving = {name: rank for name, rank in ranks.items() if entry.inputs[name].source}
-        open_ones = [name for name in ranks if name not in driving]
+        protecting = _protecting(robot, entry)
+        driving = {name: rank for name, rank in ranks.items() if entry.inputs[name].source and name not in protecting}
+        open_ones = [name for name in ranks if name not in driving and name not in protecting]
         if any(rank <= max(driving.values(), default=0) for rank in entry.lock_ranks.values()):
             continue  # reported as RBX3110
         if open_ones and driving and max(ranks[name] for name in open_ones) < min(driving.values()):
@@ -422,13 +423,48 @@ def no_take_over(robot: Robot) -> Iterator[Finding]:
             )
 
 
+@check("RBX3142", Severity.WARNING)
+def past_protection(robot: Robot) -> Iterator[Finding]:
+    """Somebody may command a base while a component protects the robot."""
+    for mux, entry in robot.manifest.contents.of(muxes).items():
+        ranks, protecting = entry.ranks, _protecting(robot, entry)
+        for name in protecting:
+            source = entry.inputs[name].source
+            if not entry.has_priorities:
+                yield past_protection.at(
+                    robot.value("muxes", mux, "inputs", name, "from"),
+                    f"mux '{mux}' lets others through while '{source}' protects the robot: it has no priorities",
+                    help="use the mode 'priority', and give this input the highest one",
+                )
+                continue
+            above = [key for key, rank in ranks.items() if rank > ranks.get(name, rank) and key not in protecting]
+            for key in above:
+                yield past_protection.at(
+                    robot.value("muxes", mux, "inputs", key, "priority"),
+                    f"input '{key}' of mux '{mux}' overrules '{source}', which protects the robot",
+                    help=f"the higher priority wins: give '{name}' one above {max(ranks[other] for other in above)}",
+                    related=[Related(robot.value("muxes", mux, "inputs", name, "priority"), f"input '{name}'")],
+                )
+
+
+def _protecting(robot: Robot, entry: MuxModel) -> list[str]:
+    """Return the inputs of a mux whose source commands only to protect the robot."""
+    found = []
+    for name, mux_input in entry.inputs.items():
+        component = robot.components.get((mux_input.source or "").partition(".")[0])
+        if component and any(commands.protects for commands in component.declared(CommandsMotion)):
+            found.append(name)
+    return found
+
+
 @check("RBX3110", Severity.WARNING)
 def passed_lock(robot: Robot) -> Iterator[Finding]:
     """A lock of a mux does not hold back a component that drives."""
     for mux, entry in robot.manifest.contents.of(muxes).items():
-        ranks = entry.ranks
+        ranks, protecting = entry.ranks, _protecting(robot, entry)
+        driving = {key: rank for key, rank in ranks.items() if entry.inputs[key].source and key not in protecting}
         for name, priority in entry.lock_ranks.items():
-            above = [key for key, rank in ranks.items() if entry.inputs[key].source and rank >= priority]
+            above = [key for key, rank in driving.items() if rank >= priority]
             if above and min(ranks.values()) < priority:  # otherwise it holds back nothing at all
                 yield passed_lock.at(
                     robot.value("muxes", mux, "locks", name, "priority"),

@@ -11,7 +11,7 @@ from rbxcompose.domains.servos.controller import ControllerConfig, controller_ty
 from rbxcompose.domains.servos.joint_drive import JointDrive, JointServo, PositionDrive, ServoJoint, VelocityDrive
 from rbxcompose.domains.servos.joint_states import JointPolicy, ThermalPolicy
 from rbxcompose.domains.servos.limits import MotionLimits
-from rbxcompose.domains.servos.models import ServoModel
+from rbxcompose.domains.servos.models import ServoModel, joint_effort, steepest
 from rbxcompose.domains.servos.servo_cycle import JointMimic, ServoItem
 from rbxcompose.domains.servos.transmission import Calibration, Gear, Measured
 from rbxcompose.domains.servos.twins.fault_script import TwinFault
@@ -143,11 +143,22 @@ class ServoBusConfig(Config):
     """Controllers by name."""
     used: dict[str, JointServoConfig] = {}
     """Servos of which controllers use items, by the names of their actuators; they need not drive joints."""
+    by_physics: bool = False
+    """Whether a physics engine moves simulated servos; with `simulator: physics`, that is the default."""
 
     @property
     def models(self) -> dict[int, str]:
         """Return the names of the servos' models by id."""
         return {servo.id: servo.model for joint in self.joints.values() for servo in joint.servos}
+
+    @property
+    def efforts(self) -> dict[str, float | None]:
+        """Return the most that the servos of each joint exert on it [Nm or N], None if that is not known."""
+        found = dict[str, float | None]()
+        for name, joint in self.joints.items():
+            gear = steepest(joint.calibration) if joint.calibration else joint.ratio
+            found[name] = joint_effort([self.model(servo.model) for servo in joint.servos], gear)
+        return found
 
     @property
     def lone(self) -> dict[int, ServoModel]:

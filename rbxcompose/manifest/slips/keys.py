@@ -9,6 +9,7 @@ from rbxcompose.manifest.foreign_words import CURES, FOREIGN
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.section import ROBOT, misplaced
+from rbxcompose.manifest.shapes import keys_at
 from rbxcompose.manifest.slip_registry import RefusedValue, value_slip
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 
@@ -87,8 +88,13 @@ def word_for_a_map(place: RefusedValue, node: TreeNode) -> Repair[TreeNode] | No
 def section_too_deep(place: RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise its name; an entry with the name of a section is found where the entries are read."""
     key = str(place.path[-1])
-    if not isinstance(node, MappingNode) or key not in {section.name for section in sections(ROBOT)}:
+    section = next((section for section in sections(ROBOT) if section.name == key), None)
+    if not isinstance(node, MappingNode) or section is None:
         return None
+    entry = node.entries[key].value
+    keys = () if section.is_map else keys_at(section.model, ())
+    if keys and isinstance(entry, MappingNode) and entry.entries and not any(name in keys for name in entry.entries):
+        return None  # it only has the name of a section
     left = {name: entry for name, entry in node.entries.items() if name != key}
     if len(place.path) == 1:  # a section that this kind of file cannot have
         help_text = f"'{key}' belongs to the file of the robot: move it there"

@@ -19,8 +19,21 @@ from rbxcompose.missions.execution.ports import EVENTS, ports_for
 from rbxcompose.missions.program.outcomes import IDLE, Result
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of
+from rbxcompose.msgs.rbxcompose_msgs import RunMission
 from rbxcompose.msgs.std_msgs import String
-from rbxcompose.sdk import Capability, Component, Config, Level, Place, Port, Refused, RunsMissions, answers, component
+from rbxcompose.sdk import (
+    Capability,
+    Component,
+    Config,
+    Level,
+    Place,
+    Port,
+    Refused,
+    RunsMissions,
+    ServesAction,
+    answers,
+    component,
+)
 from rbxcompose.sdk.robot_events import MissionOver, MissionWaits
 
 if TYPE_CHECKING:  # a check needs no engine: it is imported when the component is configured
@@ -28,6 +41,8 @@ if TYPE_CHECKING:  # a check needs no engine: it is imported when the component 
     from rbxcompose.missions.execution.mission_run import MissionRun
     from rbxcompose.missions.execution.world import RobotWorld
 
+RUN = "run_mission"
+RATE = 10.0  # [Hz]
 LOOK_AGAIN = 0.1  # [s] between two checks for a pose that has not arrived yet
 NO_INPUTS: Mapping[str, str] = {}
 
@@ -56,6 +71,8 @@ class MissionConfig(Config):
     """The services that missions call, with their ROS types."""
     settings: dict[str, dict[str, Made[Type]]] = {}
     """The types of settings that missions change."""
+    for_others: bool = False
+    """Whether components run missions, by the action `run_mission`."""
 
     @property
     def reads(self) -> frozenset[str]:
@@ -96,11 +113,18 @@ class Mission(Component[MissionConfig]):
 
     made_by = "A robot with missions runs one."
     process = "mission"
+    steps_for_goals = True
+
+    @classmethod
+    def rate_of(cls, config: MissionConfig) -> float:
+        """Return how often it looks at the goal of another component [Hz]."""
+        return RATE if config.for_others else 0.0
 
     @classmethod
     def ports(cls, config: MissionConfig) -> dict[str, Port[Any]]:
         """Return a port for each used value, skill, topic and service, and for the pose if missions read it."""
-        return ports_for(config)
+        runs = {RUN: ServesAction(RunMission, RUN, skill=None).named(RUN)} if config.for_others else {}
+        return ports_for(config) | runs
 
     @classmethod
     def capabilities(cls, config: MissionConfig) -> tuple[Capability, ...]:
@@ -115,12 +139,17 @@ class Mission(Component[MissionConfig]):
     def configure(self) -> None:
         """Start with no values and no missions."""
         from rbxcompose.missions.execution.missions import Broadcast, RunningMissions
+        from rbxcompose.missions.execution.ordered import OrderedMission
         from rbxcompose.missions.execution.topic_skills import Desks
         from rbxcompose.missions.execution.world import Arrivals
 
         self.arrivals, self.desks = Arrivals(self.config.values), Desks(self)
         self.missions = RunningMissions(self.config, self.world, self.story, self.publish)
         self.broadcast = Broadcast(self.config.programs, self.context.window)
+        programs = self.config.programs
+        self.ordered = OrderedMission(
+            lambda name: programs[name].inputs if name in programs else (), self.begin, self.end
+        )
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
         self.kept: dict[str, requests.RunMission] = {}  # requests by people that began missions that still run
         self.shown = ""  # the last reported status
@@ -148,13 +177,15 @@ class Mission(Component[MissionConfig]):
         except Refused as refusal:  # a person has already begun it
             self.warn(f"mission {name} does not start: {refusal}")
 
-    def begin(self, name: str, inputs: Mapping[str, str] = NO_INPUTS, state: str = "") -> MissionRun:
+    def begin(
+        self, name: str, inputs: Mapping[str, str] = NO_INPUTS, state: str = "", lent: frozenset[str] = frozenset()
+    ) -> MissionRun:
         """Begin a mission; while the robot is stopped, hold it until the resume.
 
         Raises:
             Refused: if it cannot run, with the reason.
         """
-        run = self.missions.run(name, inputs, state)
+        run = self.missions.run(name, inputs, state, lent)
         if missing := run.missing():
             self.info(f"mission {name} waits for {', '.join(missing)}")
         if self.context.is_stopped:
@@ -183,6 +214,10 @@ class Mission(Component[MissionConfig]):
     def look_soon(self) -> None:
         """Request a wake at this instant."""
         self.context.wake_at(self.now)
+
+    def step(self, dt: float) -> None:
+        """Run the mission that a component wants."""
+        self.ordered.step(self.bound[RUN].current)
 
     def wake(self) -> None:
         """Do what is due."""
@@ -278,11 +313,15 @@ class Mission(Component[MissionConfig]):
     def cancel(self, request: requests.CancelMission) -> str:
         """End a mission for good."""
         run = self.missions.running(request.mission)
+        self.end(run)
+        return f"mission {run.name} cancelled"
+
+    def end(self, run: MissionRun) -> None:
+        """End a mission that runs."""
         run.abort(self.now)
         if run.end is not None:
             self.finish(run.name, run.end)
         self.broadcast.publish(self.missions)
-        return f"mission {run.name} cancelled"
 
     @answers(requests.PauseMission)
     def pause(self, request: requests.PauseMission) -> str:

@@ -6,7 +6,6 @@ skills) is up to its world.
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 from rbxcompose.base.config import Place
@@ -25,7 +24,7 @@ _CLASSES: Mapping[str, type[Any]] = {cls.__name__: cls for cls in (Place, Pose2,
 _NUMBER = (float, int)
 _POSE = {"x": _NUMBER, "y": _NUMBER, "heading": _NUMBER}
 _FIELDS: Mapping[str, Mapping[str, type | tuple[type, ...]]] = {
-    "Place": {"name": str, **_POSE},
+    "Place": {"name": str, **_POSE},  # its colour is for viewers
     "Pose2": _POSE,
     "HeldNode": {"key": tuple, "text": str},
     "Result": {"success": bool, "message": str, "outcome": str, "values": dict},
@@ -146,7 +145,7 @@ def to_plain(value: Value | NotArrived) -> Any:
     if name not in _CLASSES:
         raise TypeError(f"a mission cannot save a value of the type {name}")
     made: Any = value
-    return {name: {field.name: to_plain(getattr(made, field.name)) for field in fields(made)}}
+    return {name: {field: to_plain(getattr(made, field)) for field in _FIELDS[name]}}
 
 
 def from_plain(plain: Any, levels: int = _LEVELS) -> Any:

@@ -101,7 +101,7 @@ def port_name(beginning: str, topic: str) -> str:
 BACK_WITHIN = 5.0  # [s] in which a missing server must appear
 STOP_WITHIN = 0.5  # [s] in which the stop that cancelled a goal becomes known here
 LOOK_AGAIN = 0.1  # [s] between two polls of what nothing announces
-MESSAGE = "message"  # the field of a result or a response that gives a reason
+REASONS = ("message", "error_msg", "error_string")  # fields of a result or a response that give a reason
 
 WhenDone = Callable[[Result], None]
 
@@ -286,8 +286,8 @@ def _result(skill: Skill, ended: Ended[Any]) -> Result:
 
 def text_in(values: Mapping[str, Value]) -> str:
     """Return the reason in the fields of a result, a response or an end; empty if there is none."""
-    text = values.get(MESSAGE, "")
-    return text if isinstance(text, str) else ""
+    texts = (text for name in REASONS if isinstance(text := values.get(name), str))
+    return next(filter(None, texts), "")
 
 
 class CallErrand(Waiting):

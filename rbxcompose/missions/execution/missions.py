@@ -55,8 +55,12 @@ class RunningMissions:
         """Return the names of the missions that run or are paused."""
         return [run.name for run in self]
 
-    def run(self, name: str, given: Mapping[str, str], start: str = "") -> MissionRun:
+    def run(
+        self, name: str, given: Mapping[str, str], start: str = "", lent: frozenset[str] = frozenset()
+    ) -> MissionRun:
         """Start a mission with these inputs, as text, in the state `start` of its machines if one is named.
+
+        It may use the parts of the robot that are `lent`, though a running mission needs them.
 
         Raises:
             Refused: if there is none, an input does not fit, or a running mission needs the same part of the robot.
@@ -66,7 +70,7 @@ class RunningMissions:
             raise Refused(f"mission {name} is already running")
         inputs = self._inputs(name, program, given)
         linked = link(program, self._equipment.names.missions)
-        if clash := self._clash(linked):
+        if clash := self._clash(linked, lent):
             raise Refused(clash)
         try:
             settings = Settings(start_at=start_at(linked, start) if start else {}, observer=self.observer)
@@ -162,9 +166,9 @@ class RunningMissions:
             raise Refused("; ".join((*(finding.message for finding in findings), "give inputs by '--set NAME=VALUE'")))
         return inputs
 
-    def _clash(self, linked: Program) -> str:
+    def _clash(self, linked: Program, lent: frozenset[str]) -> str:
         """Return why a mission cannot run beside the running ones; empty if it can."""
-        wanted = claims_of(linked, self._equipment.names.skills)
+        wanted = claims_of(linked, self._equipment.names.skills) - lent
         for other in self:
             if common := sorted(wanted & other.claims):
                 return f"{' and '.join(common)} {'is' if len(common) == 1 else 'are'} in use by {other.name}"

@@ -194,9 +194,9 @@ class RobotExchange:
         outside = ZenohTransport(session, inbox.put)
         self._others = Bus(scheduler, clock, domain=EXCHANGE_DOMAIN, transport=outside, log=log)
         for wire in exchange.gives:
-            _carry(Way(own, wire.own, self._others, wire.shared), wire.type, wire.qos)
+            carry(Way(own, wire.own, self._others, wire.shared), wire.type, wire.qos)
         for wire in exchange.takes:
-            _carry(Way(self._others, wire.shared, own, wire.own), wire.type, wire.qos)
+            carry(Way(self._others, wire.shared, own, wire.own), wire.type, wire.qos)
 
     def close(self) -> None:
         """Leave the other robots; the robot's own bus is closed by whoever opened it."""
@@ -214,7 +214,8 @@ def _link(exchange: Exchange) -> RouterLink:
     )
 
 
-def _carry(way: Way, type_: str, qos: str) -> None:
+def carry(way: Way, type_: str, qos: str) -> None:
+    """Carry a topic, a service or an action, as its type says."""
     match type_.split("/")[1]:
         case "srv":
             carry_service(way, registry.service(type_))

@@ -21,7 +21,7 @@ from rbxcompose.bus.services import ServedRequest
 from rbxcompose.bus.wire import queue_depth
 from rbxcompose.compiler.plan.model import Instance
 from rbxcompose.missions.sources import PAUSE
-from rbxcompose.msgs.geometry_msgs import TransformStamped
+from rbxcompose.msgs.poses import transform_of
 from rbxcompose.msgs.stamps import NANOSECONDS, to_nanoseconds
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.msgs.tf2_msgs import TFMessage
@@ -139,7 +139,11 @@ class Frames:
         with self._lock:
             for transform in message.transforms:
                 time = to_nanoseconds(transform.header.stamp) or unstamped
-                parent, child, pose = transform.header.frame_id, transform.child_frame_id, _transform(transform)
+                parent, child, pose = (
+                    transform.header.frame_id,
+                    transform.child_frame_id,
+                    transform_of(transform.transform),
+                )
                 answer = self.tree.set(parent, child, pose, stamp=received, static=static, measured=time)
                 if answer.message:
                     self._log_once(answer)
@@ -154,11 +158,6 @@ class Frames:
             self._log(Level.OK, text)
         else:
             self._log(Level.WARN, f"a transform is refused: {text}")
-
-
-def _transform(message: TransformStamped) -> Transform3:
-    at, turn = message.transform.translation, message.transform.rotation
-    return Transform3((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
 
 
 class Handling(Protocol):

@@ -1,4 +1,4 @@
-"""Write a new robot, mission, part or component, each with a test.
+"""Write a new robot, mission, part or component, each with a test, or a new world.
 
 What it writes has no findings and runs in simulation. At a terminal it asks a few questions; each has a default and an
 option. It never overwrites a file.
@@ -47,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("robot", "a robot that drives, with its mission"),
         ("mission", "one more mission for a robot"),
         ("part", "a part that robots can include"),
+        ("world", "a world for simulated robots, with a map"),
         ("component", "a component type in Python, as a package to install"),
     ):
         subparser = kinds.add_parser(what, help=about, description=f"Write {about}.", allow_abbrev=False)
@@ -122,6 +123,14 @@ def _part(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
     return New(arguments.into, scaffold.part_files(name, about), then)
 
 
+def _world(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
+    name = new_files.read_name(arguments.name, "the world")
+    about = asker.ask(ABOUT, new_files.read_text, scaffold.WORLD_ABOUT, given=arguments.about)
+    path = shown_name(arguments.into / f"worlds/{name}.yaml")
+    then = (f"rbxcompose world picture {path}", f"rbxcompose up ROBOT --world {path}")
+    return New(arguments.into, scaffold.world_files(name, about), then)
+
+
 def _component(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
     name = scaffold.read_component_name(arguments.name)
     folder = shown_name(arguments.into / name)
@@ -153,6 +162,7 @@ _MAKERS: dict[str, Callable[[argparse.Namespace, new_files.Asker], New]] = {
     "robot": _robot,
     "mission": _mission,
     "part": _part,
+    "world": _world,
     "component": _component,
 }
 

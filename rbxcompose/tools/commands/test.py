@@ -10,12 +10,14 @@ import os
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from rbxcompose.base.findings import Report
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, emit, has_colour, misused, write_report
 from rbxcompose.manifest.files import shown_name
+from rbxcompose.missions.view.tested import keep_tested
 from rbxcompose.tools.mission_tests.coverage import Coverage
 from rbxcompose.tools.mission_tests.finding_files import tests_of
 from rbxcompose.tools.mission_tests.reader import TrialReader, WrittenTrial
@@ -32,7 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "paths", nargs="*", type=Path, default=[HERE], metavar="PATH", help="tests, or folders of tests"
     )
     parser.add_argument("--filter", default="", metavar="TEXT", help="only those with this text in their names")
-    parser.add_argument("--coverage", action="store_true", help="show which parts of the missions no test covered")
+    parser.add_argument(
+        "--coverage", action="store_true", help="show what no test covered, here and on the console's page"
+    )
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
     parser.add_argument("-v", "--verbose", action="store_true", help="show the traces of all tests")
     parser.add_argument("--json", action="store_true", help="write JSON")
@@ -49,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     reading, coverage, writer = TrialReader(os.environ), Coverage(), TrialWriter(has_colour(sys.stdout))
     outcomes: list[FileOutcome] = []
     unreadable = Report()
-    for written in (trial for file in files for trial in reading.every(file)):
+    for written in (each for file in files for each in reading.every(file)):
         began = time.perf_counter()
         if arguments.filter not in written.name:
             unreadable.extend(() if written.root else written.report)
@@ -57,7 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
         outcome = _outcome(written, reading, began)
         outcomes.append(outcome)
         if outcome.verdict:
-            coverage.add(outcome.verdict.trial.linked, outcome.verdict.trial.names, outcome.verdict.seen.keys)
+            trial = outcome.verdict.trial
+            coverage.add(trial.linked, trial.names, outcome.verdict.seen.keys, trial.plan.robot)
         if not arguments.json:
             _tell(outcome, writer, arguments.verbose)
     write_report(_findings(reading, outcomes) if outcomes else unreadable, reading.sources)
@@ -93,6 +98,10 @@ def _finish(
 ) -> None:
     if arguments.junit:
         arguments.junit.write_text(junit(outcomes), encoding="utf-8")
+    if arguments.coverage:
+        for robot, missions in coverage.by_robot(time.time()).items():
+            with suppress(OSError):  # such as on a machine that is read only: it is shown here all the same
+                keep_tested(robot, missions)
     if arguments.json:
         emit(json.dumps(as_json(outcomes, coverage), indent=1))
         return

@@ -14,7 +14,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Span
 from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.compiler.schema.documents import MAKERS, schema_for
+from rbxcompose.compiler.schema.documents import makers, schema_for
 from rbxcompose.compiler.schema.guide import Guide
 from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
 from rbxcompose.manifest.yaml_nodes import compose
@@ -270,7 +270,7 @@ class Document:
     def kind(self) -> str:
         """Return the kind of manifest, if it has a schema; an unknown one is treated as a robot."""
         written = kind_of(self.text)
-        return written if written in MAKERS else DEFAULT_KIND
+        return written if written in makers() else DEFAULT_KIND
 
     @property
     def is_mission(self) -> bool:

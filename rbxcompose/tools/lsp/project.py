@@ -14,7 +14,7 @@ from rbxcompose.base.findings import Finding, Report
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.composition.robot_file import read_mission
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.compiler.schema.documents import MAKERS, installed_schema
+from rbxcompose.compiler.schema.documents import installed_schema, makers
 from rbxcompose.manifest.files import ROBOT_FILE, project_of, shown_name
 from rbxcompose.manifest.reader import Texts, read_file
 from rbxcompose.missions.language.reader import read_program
@@ -193,7 +193,7 @@ class Newest:
 
     def prepare(self) -> None:
         """Load what the first answer needs, in the thread."""
-        for kind in MAKERS:
+        for kind in makers():
             self._thread.submit(installed_schema, kind)
 
     def has(self, path: Path) -> bool:

@@ -140,7 +140,7 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
         self.problem = "no planning scene has been received"  # with the scene, or nothing
         self.way: tuple[Vector3, ...] = ()  # of the tip, as last planned [m]
         self.measured: dict[str, tuple[float, float]] = {}  # position and velocity of all joints of the body
-        self.uprights = {}
+        self.picked = {}
         self.remembered: dict[str, dict[str, float]] = {}  # positions of joints [rad or m] by the names given to them
         self.task: AnyTask | None = None
         self.goal: AnyGoal | None = None  # that of the task

@@ -10,8 +10,8 @@ from rbxcompose.base.geometry import Transform3, Vector3
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import TIME
 from rbxcompose.domains.arms.motion.pursuit import Chase, Pursuit, PursuitSettings
-from rbxcompose.domains.arms.motion.scene_messages import pose_message
 from rbxcompose.msgs.geometry_msgs import Point, PointStamped, PoseStamped
+from rbxcompose.msgs.poses import pose_message
 from rbxcompose.msgs.rbxcompose_msgs import FollowPoint, MoveArm
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.std_msgs import Header

@@ -12,9 +12,9 @@ from rbxcompose.base.geometry import Transform3, Vector3
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.arms.motion.scene import SCENE_LIMITS
-from rbxcompose.domains.arms.motion.scene_messages import pose_message, pose_of
 from rbxcompose.domains.arms.motion.sightings import SeenObject, Sighting, Sightings
 from rbxcompose.msgs.moveit_msgs import CollisionObject
+from rbxcompose.msgs.poses import pose_message, pose_of
 from rbxcompose.msgs.rbxcompose_msgs import SceneObjects
 from rbxcompose.msgs.shape_msgs import SolidPrimitive
 from rbxcompose.msgs.stamps import to_nanoseconds

@@ -438,6 +438,18 @@ class Hand:
     """The tip, and all links that it carries."""
 
 
+@dataclass(frozen=True, slots=True)
+class PickedObject:
+    """How an object was picked; lengths are in metres."""
+
+    upright: Quaternion
+    """How it stood in the root's frame."""
+    closed: float
+    """The opening to which the gripper was closed."""
+    width: float
+    """Of the object between the fingers."""
+
+
 class HandSite(ArmSite, Protocol):
     """What picking and placing need of the component beside what a motion needs."""
 
@@ -446,8 +458,8 @@ class HandSite(ArmSite, Protocol):
         """Return the objects of the scene; None while they are unknown."""
 
     @property
-    def uprights(self) -> dict[str, Quaternion]:
-        """Return how objects stood in the root's frame when they were picked; it may be changed."""
+    def picked(self) -> dict[str, PickedObject]:
+        """Return how objects were picked, by name; it may be changed."""
 
     def grip(self, opening: float, ended: Callable[[Gripped], None]) -> None:
         """Open or close the gripper [m]."""
@@ -818,7 +830,8 @@ class PickTask(HandTask):
     def close(self) -> Work:
         """Close the gripper on the object."""
         width = self._way.contact.width
-        grip = yield from self.gripped(width - max(0.0, self._goal.squeeze))
+        self._closed = width - max(0.0, self._goal.squeeze)
+        grip = yield from self.gripped(self._closed)
         if grip.problem:
             return self.fail(GraspReason.GRIPPER_FAILED, grip.problem)
         if grip.opening < width - SLACK:
@@ -832,7 +845,7 @@ class PickTask(HandTask):
         """Let the object move with the tip."""
         self.place_body()
         name, tip = self._one.name, self.hand.links[0]
-        self.site.uprights[name] = self._at.rotation
+        self.site.picked[name] = PickedObject(self._at.rotation, self._closed, self._way.contact.width)
         return self.changed(lambda ended: self.site.attach(name, tip, ended), lambda: self.held is not None)
 
     def lift(self) -> Work:
@@ -903,6 +916,8 @@ class PlaceTask(HandTask):
             return self.fail(MotionReason.UNKNOWN_GOAL, goal.unknown)
         if thing is None:
             return self.fail(GraspReason.NOTHING_HELD, "it holds nothing")
+        if (failure := (yield from self.felt(thing))) is not None:
+            return failure
         if goal.frame and goal.frame not in self.kinematics.body.links:
             return self.fail(MotionReason.UNKNOWN_GOAL, f"there is no link '{goal.frame}'")
         if goal.on and (self.object_named(goal.on) is None or goal.on == thing.name):
@@ -910,13 +925,25 @@ class PlaceTask(HandTask):
         if not all(map(math.isfinite, (*goal.at, goal.tolerance))):
             return self.fail(MotionReason.UNKNOWN_GOAL, "the place is not finite")
         self._one = thing
-        self._upright = self.site.uprights.get(thing.name, (0.0, 0.0, 0.0, 1.0))
+        picked = self.site.picked.get(thing.name)
+        self._upright = picked.upright if picked else (0.0, 0.0, 0.0, 1.0)
         middle = self._place(thing)
         if middle is None:
             words = f"how high '{thing.name}' and '{goal.on}' are is known of boxes, cylinders and spheres only"
             return self.fail(GraspReason.NO_GRASPS, f"{words}: say where, with x, y and z")
         self._middle = middle
         return None
+
+    def felt(self, thing: PlacedObject) -> Work:
+        """Close the gripper as when it picked the object, which it may have lost on the way."""
+        if (picked := self.site.picked.get(thing.name)) is None:
+            return None
+        grip = yield from self.gripped(picked.closed)
+        if grip.problem or grip.opening >= picked.width - SLACK:
+            return self.fail(GraspReason.GRIPPER_FAILED, grip.problem) if grip.problem else None
+        yield from self.changed(lambda ended: self.site.detach(thing.name, ended), lambda: self.held is None)
+        words = f"'{thing.name}' was lost on the way"
+        return self.fail(GraspReason.NOTHING_HELD, f"{words}: the gripper closes to {grip.opening * 1e3:.0f} mm")
 
     def _place(self, thing: PlacedObject) -> Vector3 | None:
         """Return where the object is to be in the root's frame; None if it is not known how high it would stand."""

@@ -23,7 +23,7 @@ from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptRange
 from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
 from rbxcompose.domains.arms.motion.pose_search import Posture, searched
-from rbxcompose.domains.arms.motion.scene_messages import joint_trajectory, pose_message, pose_of
+from rbxcompose.domains.arms.motion.scene_messages import joint_trajectory
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 from rbxcompose.domains.arms.section_models import OMPL, PLANNERS
 from rbxcompose.domains.body.model import Body, Geometry
@@ -52,6 +52,7 @@ from rbxcompose.msgs.moveit_msgs import (
 from rbxcompose.msgs.moveit_msgs import MoveItErrorCodes as Codes
 from rbxcompose.msgs.moveit_msgs import PlanningScene as PlanningSceneMessage
 from rbxcompose.msgs.octomap_msgs import OctomapWithPose
+from rbxcompose.msgs.poses import pose_message, pose_of
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.shape_msgs import Mesh, MeshTriangle, Plane, SolidPrimitive
 from rbxcompose.msgs.stamps import to_duration, to_seconds

@@ -16,20 +16,15 @@ from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.scene import PlacedObject, ScenePiece
 from rbxcompose.domains.body.model import Geometry
-from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
+from rbxcompose.msgs.geometry_msgs import Point, PoseStamped
 from rbxcompose.msgs.geometry_msgs import Vector3 as Vector3Message
 from rbxcompose.msgs.nav_msgs import Path as PathMessage
+from rbxcompose.msgs.poses import pose_message, pose_of
 from rbxcompose.msgs.rbxcompose_msgs import SceneObject, SceneShape
 from rbxcompose.msgs.stamps import to_duration, to_time
 from rbxcompose.msgs.std_msgs import ColorRGBA, Header
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
 from rbxcompose.msgs.visualization_msgs import Marker, MarkerArray
-
-
-def pose_message(pose: Transform3) -> Pose:
-    """Return a pose as a message."""
-    (x, y, z), (qx, qy, qz, qw) = pose.translation, pose.rotation
-    return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
 
 
 def joint_trajectory(names: tuple[str, ...], motion: Trajectory, *, begin: int = 1, stamp: int = 0) -> JointTrajectory:
@@ -40,12 +35,6 @@ def joint_trajectory(names: tuple[str, ...], motion: Trajectory, *, begin: int =
         for time, at, speed in rows
     )
     return JointTrajectory(header=Header(stamp=to_time(stamp)), joint_names=names, points=points)
-
-
-def pose_of(message: Pose) -> Transform3:
-    """Return the pose of a message."""
-    at, turn = message.position, message.orientation
-    return Transform3((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
 
 
 def object_message(object_: PlacedObject) -> SceneObject:

@@ -13,7 +13,8 @@ from pydantic_core import PydanticCustomError
 from rbxcompose.base.config import LINK, OBJECT, Config, Length, LinkName, Name, Refers
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
-from rbxcompose.base.findings import Finding, Span, kind
+from rbxcompose.base.findings import Finding, Span, kind, suggest
+from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.arms.motion.scene import MOST_PADDING, MOST_SHAPES, PlacedObject, mistake_in, settled
 from rbxcompose.domains.arms.motion.scene_text import LARGEST, NO_SCENE, SceneFile, read_scene
@@ -22,6 +23,8 @@ from rbxcompose.domains.arms.sections.arms import arms
 from rbxcompose.domains.body.files import FORMATS, mesh_problem
 from rbxcompose.domains.body.model import Body, Geometry
 from rbxcompose.domains.body.sections.body import body
+from rbxcompose.domains.worlds.sections.world import world
+from rbxcompose.domains.worlds.shapes import WorldBox, WorldCylinder, WorldShape
 from rbxcompose.manifest.fields import FileName, FramePose
 from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.registry import section
@@ -34,6 +37,7 @@ CLOUD_MAPPER = "cloud_mapper"
 """The type of what each entry of `clouds` runs."""
 NO_OBJECT = kind("RBX2306")
 NO_MESH = kind("RBX2350")
+MAP_FRAME = "map"
 COLOURS = {
     "black": (0.1, 0.1, 0.1),
     "white": (1.0, 1.0, 1.0),
@@ -168,6 +172,8 @@ class SceneModel(Config):
 
     objects: dict[Name, ObjectModel] = {}
     """Things by name."""
+    world: list[Name] = []
+    """Objects of the robot's world that arms know, where the file of the world puts them in `map`."""
     clouds: dict[Name, CloudModel] = {}
     """What sensors of distances see, by the name of the thing that it becomes."""
     file: FileName | None = None
@@ -188,6 +194,8 @@ class SceneOfRobot:
     frames: tuple[str, ...] = ()
     paddings: Mapping[str, float] = field(default_factory=dict)
     clouds: Mapping[str, CloudModel] = field(default_factory=dict)
+    of_world: tuple[str, ...] = ()
+    """Names of the things that the file of its world has."""
 
     def on(self, known: Body) -> tuple[PlacedObject, ...]:
         """Return the things as seen by a robot that stands at the origin of all frames."""
@@ -237,6 +245,10 @@ def _config(thing: PlacedObject) -> dict[str, object]:
     }
 
 
+def _names(read: SceneOfRobot) -> Mapping[str, Mapping[str, object]]:
+    return {OBJECT: dict.fromkeys(read.of_world)}
+
+
 @section(
     "scene",
     SceneModel,
@@ -247,6 +259,8 @@ def _config(thing: PlacedObject) -> dict[str, object]:
     shared=((), ("objects",), ("clouds",)),
     wires=True,
     components=_components,
+    defines=(OBJECT,),
+    defined=_names,
 )
 def scene(reading: Reading[SceneModel]) -> SceneOfRobot:
     """Things that arms must not hit, by name; they stand in the frame of a link, and move with it.
@@ -273,6 +287,8 @@ def scene(reading: Reading[SceneModel]) -> SceneOfRobot:
         *(cloud.frame for cloud in read.clouds.values() if cloud.frame not in known.links),
     )
     outer = description.virtual.frame if description.virtual else ""
+    of_world = tuple(_of_world(reading, read))
+    named = (*named, *(thing.link for thing in of_world))
     frames = tuple(frame for frame in dict.fromkeys((outer, *read.frames, *named)) if frame and frame != known.frame)
     found = []
     for name, model in read.objects.items():
@@ -283,6 +299,7 @@ def scene(reading: Reading[SceneModel]) -> SceneOfRobot:
             reading.report.add(NO_OBJECT.at(reading.key(*path), f"object '{name}': {wrong}"))
         elif not model.file or file is not None:
             found.append(model.placed(name, known.root, file))
+    found += of_world
     found += _of_file(reading, read, known, {item.name for item in found})
     for name in read.clouds:
         if name in known.links or any(item.name == name for item in found):
@@ -290,7 +307,45 @@ def scene(reading: Reading[SceneModel]) -> SceneOfRobot:
             span = reading.key("scene", "clouds", name)
             reading.report.add(NO_OBJECT.at(span, f"the cloud '{name}' would have the name of {what}"))
     paddings = {link: padding for link in known.links if (padding := read.paddings.get(link, read.padding))}
-    return SceneOfRobot(tuple(found), frames, paddings, read.clouds)
+    return SceneOfRobot(tuple(found), frames, paddings, read.clouds, tuple(thing.name for thing in of_world))
+
+
+def _of_world(reading: Reading[SceneModel], read: SceneModel) -> Iterator[PlacedObject]:
+    """Yield the things that the scene takes from the world of the robot."""
+    around = reading.contents.of(world) if read.world else None
+    if around is None and "world" in reading.contents.root:
+        return  # what is wrong with the world is reported there
+    objects = around.file.objects if around else {}
+    for index, name in enumerate(read.world):
+        help_text = ""
+        if around is None:
+            wrong, help_text = "the robot has no 'world'", "write 'world: FILE', or put it into 'objects'"
+        elif name not in objects:
+            wrong, help_text = f"'{around.file.name}' has no such object", suggest(name, objects, "its objects")
+        elif objects[name].path:
+            wrong = f"it moves in '{around.file.name}', and arms know only what stands"
+        elif objects[name].box is None and objects[name].cylinder is None:
+            wrong = "arms know only boxes and cylinders of a world"
+        elif name in read.objects:
+            wrong = "the scene has an object of this name"
+        else:
+            yield _standing(objects[name].placed(name), objects[name].colour)
+            continue
+        span = reading.value("scene", "world", index)
+        reading.report.add(NO_OBJECT.at(span, f"object '{name}' of the world: {wrong}", help=help_text))
+
+
+def _standing(shape: WorldShape, colour: str) -> PlacedObject:
+    """Return something that stands in the world as a thing of the scene."""
+    solid = shape.solid
+    if isinstance(solid, WorldCylinder):
+        geometry = Geometry("cylinder", (solid.radius, solid.height))
+    else:
+        geometry = Geometry("box", solid.size if isinstance(solid, WorldBox) else (0.0, 0.0, 0.0))
+    x, y, _ = (at := Transform3.from_pose2(shape.pose)).translation
+    place = Transform3((x, y, shape.z + solid.height / 2), at.rotation)
+    shown = (*COLOURS[colour], 1.0) if colour in COLOURS else None
+    return PlacedObject(shape.name, geometry, MAP_FRAME, place, colour=shown)
 
 
 def _file(reading: Reading[SceneModel], model: ObjectModel, path: KeyPath) -> Path | None:

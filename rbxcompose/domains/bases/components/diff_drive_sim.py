@@ -3,20 +3,44 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
 from rbxcompose import sdk
-from rbxcompose.base.geometry import Pose2, Transform3, Velocity2
+from rbxcompose.base.geometry import AT_REST, Pose2, Transform3, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.bases.twins import ABSURD, DiffDriveCore, DiffDriveSettings
+from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.poses import transform_message
+from rbxcompose.msgs.rbxcompose_msgs import Switches, World, WorldRobots
 from rbxcompose.msgs.stamps import to_time
-from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.msgs.std_msgs import Header, String
+from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.sdk.ports import BULK
 
+if TYPE_CHECKING:
+    from rbxcompose.domains.worlds.world import SimulatedWorld
+
+TRUTH = "ground_truth"
+IN_WORLD: dict[str, sdk.Port[Any]] = {
+    "world": sdk.In(World, "world", qos="latched", limits=BULK).named("world"),
+    "others": sdk.In(WorldRobots, "world/others", is_open=True, may_be_silent=True).named("others"),
+    "contact": sdk.Out(String, "contact", qos="event").named("contact"),
+    "truth": sdk.Out(Odometry, TRUTH).named("truth"),
+}
+BY_PHYSICS: dict[str, sdk.Port[Any]] = {
+    "drive": sdk.Out(geometry.Twist, "physics/cmd_vel", qos="command").named("drive"),
+    "measured": sdk.In(Odometry, "physics/odom").named("measured"),
+    "truth": sdk.In(Odometry, TRUTH).named("truth"),
+}
+WITH_WHEELS: dict[str, sdk.Port[Any]] = {
+    "wheel_drop": sdk.Out(Switches, "wheel_drop").named("wheel_drop"),
+    "put_back": sdk.Serves(Trigger, "put_back", skill=None).named("put_back"),
+}
 ODOM = "odom"
 BASE = "base_footprint"
 
@@ -36,6 +60,14 @@ class DiffDriveSimConfig(sdk.Config):
     """The base brakes when no command arrives for this long."""
     rate: sdk.Frequency = Field(50.0, ge=1, le=1000)
     """How often it moves and publishes; a low rate lets more robots run on a machine."""
+    drift: sdk.Ratio = Field(0.0, ge=-0.5, le=0.5)
+    """By which share its odometry overestimates how far it drives and turns."""
+    wheel_distance: sdk.Length = Field(0.0, ge=0)
+    """Between its wheels. With it, `wheel_drop` tells which hang over a hole of its `world`; then it stays there."""
+    in_world: bool = False
+    """Whether it stands in the robot's `world` and touches what is there; if the robot has one, that is the default."""
+    by_physics: bool = False
+    """Whether a physics engine moves it; with `simulator: physics`, that is the default."""
 
 
 @sdk.component("diff_drive_sim")
@@ -60,7 +92,8 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
     @classmethod
     def ports(cls, config: DiffDriveSimConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports, with the rate of the odometry."""
-        return super().ports(config) | {"odom": sdk.Out(Odometry, "odom", rate=config.rate).named("odom")}
+        odom = sdk.Out(Odometry, "odom", rate=config.rate).named("odom")
+        return super().ports(config) | {"odom": odom} | in_world(config)
 
     @classmethod
     def capabilities(cls, config: DiffDriveSimConfig) -> tuple[sdk.Capability, ...]:
@@ -74,13 +107,19 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
             stops_after=sdk.Setting(config.command_timeout, "command_timeout"),
             acceleration=sdk.Setting(config.acceleration, "acceleration"),
             turn_acceleration=sdk.Setting(config.turn_acceleration, "turn_acceleration"),
+            wheel_distance=sdk.Setting(config.wheel_distance, "wheel_distance") if config.wheel_distance else None,
         )
         return base, sdk.WritesFrame("tf", sdk.Setting(ODOM), sdk.Setting(BASE))
 
     def configure(self) -> None:
         """Put the base at the origin of `odom`."""
         self.core = DiffDriveCore(settings_of(self.config))
-        self.pose, self.place = self.core.pose, placed(self.core.pose)  # the last one, and as a message
+        self.estimate = self.core.pose  # in `odom`, by the wheels
+        self.pose, self.place = self.estimate, placed(self.estimate)  # the last one, and as a message
+        self.world: SimulatedWorld | None = None
+        self.hangs = False  # whether a wheel has no ground
+        self.grounded = self.core.pose  # where all its wheels had ground the last time
+        self.touched, self.contacts = "", 0  # what it touches now, and how often it began to touch something
 
     def reconfigure(self, old: DiffDriveSimConfig) -> None:
         """Apply the new limits to later commands; the last command stays as it was clamped."""
@@ -95,12 +134,36 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
         """Take a command; the status reports one that is absurd or too fast."""
         self.core.command(Velocity2(message.linear.x, message.angular.z), self.now)
 
+    def on_world(self, message: World) -> None:
+        """Stand where the robot is put in this world."""
+        from rbxcompose.domains.worlds.world import world_of  # imports numpy, which most bases do without
+
+        is_new = self.world is None
+        self.world = world_of(message)
+        if is_new:
+            self.core.pose = self.estimate = self.grounded = self.world.start
+
+    def on_others(self, message: WorldRobots) -> None:
+        """Do not drive into other robots, where they are."""
+        if self.world is not None:
+            self.world = self.world.with_robots(message, self.now)
+
     def step(self, dt: float) -> None:
         """Move for `dt` [s] and publish where the base is."""
+        before = self.core.pose
         self.core.step(self.now, dt)
+        if self.config.by_physics:
+            self.drive_wheels(before)
+        elif self.world is not None:
+            self.stay_outside(self.world, before)
+            if self.config.wheel_distance:
+                self.stay_on_ground(self.world, before, self.config.wheel_distance)
+            self.report_truth()
+        if self.core.pose is not before and not self.config.by_physics:
+            self.estimate = self.drifted(before.inverse().compose(self.core.pose))
         header = Header(stamp=to_time(self.stamp), frame_id=ODOM)
-        if self.core.pose is not self.pose:
-            self.pose, self.place = self.core.pose, placed(self.core.pose)
+        if self.estimate is not self.pose:
+            self.pose, self.place = self.estimate, placed(self.estimate)
         if self.odom.is_wanted:
             at = self.place.translation
             position = geometry.Point(at.x, at.y, at.z)
@@ -108,6 +171,66 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
         link = geometry.TransformStamped(header=header, child_frame_id=BASE, transform=self.place)
         self.tf(TFMessage(transforms=(link,)))
         self.tell_commands()
+
+    def drive_wheels(self, before: Pose2) -> None:
+        """Let the engine turn the wheels, and be where that has moved the base; the wheels tell `odom`."""
+        measured, truth = self.bound["measured"].value, self.bound["truth"].value
+        self.core.pose = pose_in(truth.pose.pose) if truth is not None else before
+        if self.world is not None and self.config.wheel_distance:
+            self.stay_on_ground(self.world, self.core.pose, self.config.wheel_distance)
+        if measured is not None:
+            self.estimate = pose_in(measured.pose.pose)
+        velocity = self.core.velocity
+        self.bound["drive"](
+            geometry.Twist(linear=geometry.Vector3(x=velocity.linear), angular=geometry.Vector3(z=velocity.angular))
+        )
+
+    def drifted(self, moved: Pose2) -> Pose2:
+        """Return where the wheels believe the base to be after a motion in its own frame."""
+        if not self.config.drift:
+            return self.core.pose
+        share = 1.0 + self.config.drift
+        return self.estimate.compose(Pose2(share * moved.x, share * moved.y, share * moved.heading))
+
+    def report_truth(self) -> None:
+        """Publish where the base is in `map`, for what sees the world from it."""
+        if self.bound["truth"].is_wanted:
+            at = placed(self.core.pose)
+            pose = geometry.Pose(geometry.Point(at.translation.x, at.translation.y, 0.0), at.rotation)
+            self.bound["truth"](self.odometry(Header(stamp=to_time(self.stamp), frame_id="map"), pose))
+
+    def stay_outside(self, world: SimulatedWorld, before: Pose2) -> None:
+        """Stop where the base touches something, and report what it is when the contact begins."""
+        found = world.first_contact(before, self.core.pose, self.now)
+        if found is not None:
+            self.core.pose, self.core.velocity = found.pose, AT_REST
+            if found.what != self.touched:
+                self.contacts += 1
+                self.bound["contact"](String(data=found.what))
+        elif self.core.pose == before:
+            return  # it still leans there
+        self.touched = found.what if found is not None else ""
+
+    def stay_on_ground(self, world: SimulatedWorld, before: Pose2, wheel_distance: float) -> None:
+        """Do not move while a wheel has no ground, and tell which one."""
+        from rbxcompose.domains.worlds.switches import switches
+
+        wheels = {"left": (0.0, wheel_distance / 2), "right": (0.0, -wheel_distance / 2)}
+        if self.hangs:
+            self.core.pose, self.core.velocity = before, AT_REST
+        dropped = world.over_holes(self.core.pose, [*wheels.values()])
+        self.hangs = bool(dropped.any())
+        if not self.hangs:
+            self.grounded = self.core.pose
+        angles = {name: math.copysign(math.pi / 2, y) for name, (_, y) in wheels.items()}
+        self.bound["wheel_drop"](switches(self.stamp, BASE, angles, dropped))
+
+    def on_put_back(self, request: Trigger.Request) -> Trigger.Response:
+        """Stand where all wheels had ground the last time, as if somebody had put the robot back."""
+        if self.config.by_physics:
+            return Trigger.Response(success=False, message="in the physics engine nobody lifts the robot")
+        self.core.pose, self.core.velocity, self.hangs = self.grounded, AT_REST, False
+        return Trigger.Response(success=True)
 
     def odometry(self, header: Header, pose: geometry.Pose) -> Odometry:
         """Return pose and velocity of the base as a message."""
@@ -146,13 +269,23 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
 
     def summary(self) -> dict[str, str]:
         """Report how far it went."""
-        return {"distance driven": f"{self.core.distance:.2f} m"}
+        has_contacts = self.world is not None and not self.config.by_physics
+        touched = {"contacts": str(self.contacts)} if has_contacts else {}
+        return {"distance driven": f"{self.core.distance:.2f} m", **touched}
+
+
+def in_world(config: DiffDriveSimConfig) -> dict[str, sdk.Port[Any]]:
+    """Return the ports of a base that stands in a world."""
+    if not config.in_world:
+        return {}
+    ports = {"world": IN_WORLD["world"], **BY_PHYSICS} if config.by_physics else IN_WORLD
+    return ports | (WITH_WHEELS if config.wheel_distance else {})
 
 
 def placed(pose: Pose2) -> geometry.Transform:
     """Return a pose as a message."""
     at = Transform3.from_pose2(pose)
-    return geometry.Transform(translation=geometry.Vector3(*at.translation), rotation=geometry.Quaternion(*at.rotation))
+    return transform_message(at)
 
 
 def settings_of(config: DiffDriveSimConfig) -> DiffDriveSettings:

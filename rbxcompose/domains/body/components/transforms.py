@@ -44,6 +44,8 @@ class TransformsConfig(Config):
     """Frame of places."""
     odom: str = "odom"
     """Frame of the base's odometry."""
+    is_localised: bool = False
+    """Whether a component finds the robot in its map; otherwise `odom` coincides with `map`."""
     urdf: Annotated[str, AfterValidator(_checked)] = ""
     """Text of the URDF of a body whose frames it publishes."""
 
@@ -72,7 +74,8 @@ class Transforms(Component[TransformsConfig]):
         """Declare the frames that it writes."""
         body = body_of(config.urdf)
         joints = [WritesFrame(_port(item), Setting(item.parent), Setting(item.child)) for item in body.joints.values()]
-        return (WritesFrame("tf_static", Setting(config.map, "map"), Setting(config.odom, "odom")), *joints)
+        coinciding = WritesFrame("tf_static", Setting(config.map, "map"), Setting(config.odom, "odom"))
+        return tuple(joints) if config.is_localised else (coinciding, *joints)
 
     def configure(self) -> None:
         """Read the body; no joint has been reported yet."""
@@ -86,8 +89,8 @@ class Transforms(Component[TransformsConfig]):
         """Publish the fixed frames once; late subscribers receive them, too."""
         fixed = (joint for joint in self.body.joints.values() if joint.kind == "fixed")
         time = to_time(self.stamp)
-        coinciding = link(time, self.config.map, self.config.odom, Transform3())
-        self.tf_static(TFMessage(transforms=(coinciding, *self.links(fixed, time))))
+        coinciding = () if self.config.is_localised else (link(time, self.config.map, self.config.odom, Transform3()),)
+        self.tf_static(TFMessage(transforms=(*coinciding, *self.links(fixed, time))))
         self.wake()
 
     def on_joint_states(self, message: JointState) -> None:

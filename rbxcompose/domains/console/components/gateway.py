@@ -21,6 +21,7 @@ from collections.abc import (
     MutableMapping,
     Sequence,
 )
+from concurrent.futures import Future
 from contextlib import suppress
 from functools import cached_property, partial
 from pathlib import Path
@@ -31,7 +32,9 @@ from rbxcompose.base.clock import SteppedClock
 from rbxcompose.base.config import AngularSpeed, Config, Speed
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Refused
+from rbxcompose.bus.actions import ActionServer, ServedGoal
 from rbxcompose.bus.graph import Graph, GraphName
+from rbxcompose.bus.names import data_key, resolve
 from rbxcompose.bus.services import ServedRequest
 from rbxcompose.bus.tokens import SPACE
 from rbxcompose.bus.transport import Closable
@@ -39,6 +42,7 @@ from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import NAME, Guest
 from rbxcompose.commands.lookup import place_of
 from rbxcompose.domains.console.access import LOCAL_NAMES, Door, Role, network_names, own_secret, role_of, secret_path
+from rbxcompose.domains.console.foxglove_server import FoxgloveServer, RobotAccess
 from rbxcompose.domains.console.lease import DriveLimits
 from rbxcompose.domains.console.log_tail import findings, tail
 from rbxcompose.domains.console.models import MESHES, ServedFile, ServedModel
@@ -51,23 +55,30 @@ from rbxcompose.domains.console.protocol import (
     Bridge,
     BusRequest,
     CancelGoal,
+    GoalEnd,
+    GoalFeedback,
     Publish,
+    ReadTested,
     SaveSettings,
     SendGoal,
     Serve,
+    ServeAction,
     ServiceAnswer,
     ServiceCall,
     Subscribe,
     TailLog,
     Unadvertise,
     Unserve,
+    UnserveAction,
     Unsubscribe,
     Unwatch,
     Watch,
 )
 from rbxcompose.domains.console.streams import BOUNDARY, Streams, part
-from rbxcompose.domains.console.video import IMAGES, Picture, WrongPictureError, list_page, viewer_page, wanted
-from rbxcompose.msgs.types import Message, Service
+from rbxcompose.domains.console.video import IMAGES, Picture, list_page, viewer_page, wanted
+from rbxcompose.missions.view.tested import read_tested
+from rbxcompose.msgs.images import WrongPictureError
+from rbxcompose.msgs.types import Action, Message, Service
 from rbxcompose.runtime.control import NoAnswerError, ask_as_data
 from rbxcompose.runtime.folder import FINDINGS, BrokenStateError, RobotFolder, all_folders
 from rbxcompose.runtime.log import NAME as LOG
@@ -126,6 +137,8 @@ class GatewayConfig(Config):
     """Pages of other servers that may talk to it."""
     guard: dict[str, str] = {}
     """Least roles by patterns of names of topics, services and actions."""
+    pages: tuple[str, ...] = ()
+    """The pages that there are, in this order; all if it is empty."""
     first_page: str = "drive"
     """The page that is shown first."""
     drive_topic: str = ""
@@ -140,6 +153,8 @@ class GatewayConfig(Config):
     """The fastest that is let through."""
     max_turn_rate: AngularSpeed = math.inf
     """The fastest turn that is let through."""
+    foxglove: int = 0
+    """TCP port for Foxglove on this machine; 0 for none."""
     fleet: dict[str, str] = {}
     """Where the pages of the robots of its system are: `ADDRESS:PORT`, without an address on the same host."""
     values: dict[str, dict[str, str]] = {}
@@ -180,8 +195,10 @@ class Gateway(Component[GatewayConfig]):
             Setting(config.listen, "listen"),
             Setting(config.drive_topic, "drive_topic"),
             Setting(config.fleet, "fleet"),
+            Setting(config.camera, "camera"),
         )
-        return (page, *needed)
+        foxglove = (NeedsExtra(Setting("foxglove"), Setting("foxglove")),) if config.foxglove else ()
+        return (page, *needed, *foxglove)
 
     def configure(self) -> None:
         """Serve nothing yet: the robot must be known from outside first."""
@@ -211,6 +228,8 @@ class Gateway(Component[GatewayConfig]):
             self.warn(self.server.said.get())
         while not self.server.done.empty():
             self.info(self.server.done.get())
+        if self.server.status[0] is Level.OK and (trouble := self.server.trouble):
+            return TaskStatus(Level.WARN, trouble)
         return TaskStatus(*self.server.status)
 
 
@@ -227,7 +246,13 @@ class GatewayThread:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._stop = asyncio.Event()
         self._over: asyncio.Task[bool] | None = None
+        self._session: GatewaySession | None = None
         self._listener = self._at_port()
+
+    @property
+    def trouble(self) -> str:
+        """Return what it does not serve beside the page."""
+        return self._session.trouble if self._session is not None else ""
 
     def start(self) -> None:
         """Begin to serve."""
@@ -262,12 +287,13 @@ class GatewayThread:
             return
         with Guest(place_of(folder), stays=True) as guest:
             try:
-                session = GatewaySession(self._config, folder, guest, self.done.put)
+                session = GatewaySession(self._config, folder, guest, self.done.put, self.said.put)
             except OSError as error:
                 self._complain(f"the console is not served: {secret_path()}: {error.strerror}")
                 return
             whom = "the network" if self._config.listen == "lan" else "this machine"
             self.status = (Level.OK, f"serves {whom} at port {self._config.port}")
+            self._session = session
             try:
                 await session.serve(self._listener, self._stop)
             finally:
@@ -319,6 +345,7 @@ class LiveGraph:
 
     def __init__(self, guest: Guest) -> None:
         self._keys: set[str] = set()
+        self.changed: Callable[[], None] = lambda: None
         transport = guest.transport
         self._watched = transport.watch(
             f"{SPACE}/{guest.domain}/**",
@@ -332,6 +359,7 @@ class LiveGraph:
     def _change(self, key: str, *, is_there: bool) -> None:
         (self._keys.add if is_there else self._keys.discard)(key)
         self.__dict__.pop("_graph", None)
+        self.changed()
 
     @cached_property
     def _graph(self) -> Graph:
@@ -364,6 +392,12 @@ class LiveGraph:
     def subscribers(self, topic: str) -> Sequence[str]:
         """Return the names of the nodes that subscribe to a topic."""
         return self._ends(topic, "takers")
+
+    def key(self, topic: str, domain: int) -> str:
+        """Return the key on which the messages of a topic are published, in the type that most know."""
+        found = next(one for one in self._graph.topics if one.name == topic)
+        kind = found.kinds[0]
+        return data_key(domain, topic, kind.type, kind.hash)
 
     def is_latched(self, topic: str) -> bool:
         """Return whether the last message of a topic is kept for late subscribers."""
@@ -402,7 +436,15 @@ def _types(names: Sequence[GraphName]) -> dict[str, str]:
 class GatewaySession:
     """The web application, the bridge and the bus, all in one event loop."""
 
-    def __init__(self, config: GatewayConfig, folder: RobotFolder, guest: Guest, note: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        config: GatewayConfig,
+        folder: RobotFolder,
+        guest: Guest,
+        note: Callable[[str], None],
+        complain: Callable[[str], None],
+    ) -> None:
+        self._complain = complain
         self._config, self._folder, self._guest, self._note = config, folder, guest, note
         self._secret = own_secret() if config.listen == "lan" else None
         self._graph = LiveGraph(guest)
@@ -411,8 +453,9 @@ class GatewaySession:
         self._bridge = Bridge(self._graph, config.drive, guarded, self._role_of)
         self._bus = guest.bus()
         self._streams = Streams(lambda topic: self._graph.topics().get(topic, ""), self._subscribe_to_images)
-        self._ends: dict[tuple[type[BusRequest], str], Any] = {}  # publishers, subscriptions and clients, by name
+        self._ends: dict[tuple[type[object], str], Any] = {}  # publishers, subscriptions and clients, by name
         self._asked_of_clients: dict[int, ServedRequest[Any, Any]] = {}  # that have not answered
+        self._goals_of_clients: dict[int, ServedGoal[Any, Any, Any]] = {}  # that clients carry out
         self._requests_so_far = 0
         self._goals: dict[int, SentGoal] = {}  # that have not ended
         self._wakes: dict[int, asyncio.Event] = {}  # by client
@@ -423,6 +466,8 @@ class GatewaySession:
         self._tasks: set[asyncio.Task[None]] = set()
         self._is_command: dict[str, bool] = dict.fromkeys((STOP["type"], RELEASE["type"]), True)
         self._is_command |= dict.fromkeys(("robot.RobotStatus", _DESCRIBE["type"]), False)
+        self._foxglove: FoxgloveServer | None = None
+        self.trouble = ""  # what is not served beside the page
         self._saving = asyncio.Lock()
         self._watches: dict[str, asyncio.Task[None]] = {}  # by window
         guest.scheduler.on_error = lambda owner, error: self._loop.call_exception_handler(
@@ -440,6 +485,8 @@ class GatewaySession:
                 await stop.wait()
 
         self._loop.add_reader(self._guest.fileno(), self._pump)
+        if self._config.foxglove:
+            self._serve_foxglove(self._config.foxglove)
         self._pump()
         settings = uvicorn.Config(
             self._guarded(self._application()),
@@ -467,6 +514,8 @@ class GatewaySession:
                 timer.cancel()
         for task in self._tasks:
             task.cancel()
+        if self._foxglove is not None:
+            self._foxglove.close()
         self._graph.close()
 
     @property
@@ -622,7 +671,7 @@ class GatewaySession:
             finite = {name: limit if math.isfinite(limit) else None for name, limit in limits.items()}
             shown = {"topic": drive.topic, "type": drive.type, **finite}
         about = {"robot": self._folder.path.name, "about": config.about, "first_page": config.first_page}
-        lists = {"values": config.values, "places": config.places, "fleet": config.fleet}
+        lists = {"pages": config.pages, "values": config.values, "places": config.places, "fleet": config.fleet}
         return {**about, "drive": shown, "camera": config.camera, **lists, "stop": "/console/stop"}
 
     def _guarded(self, application: Any) -> Callable[..., Awaitable[None]]:
@@ -737,7 +786,7 @@ class GatewaySession:
         match request:
             case Subscribe(topic, message):
                 qos = Qos.LATCHED if self._graph.is_latched(topic) else Qos.STATE
-                self._ends[Subscribe, topic] = self._bus.subscribe(
+                end = self._bus.subscribe(
                     NAME,
                     topic,
                     message,
@@ -747,6 +796,8 @@ class GatewaySession:
                     limits=BULK,
                     may_be_silent=True,
                 )
+                end.is_wanted = lambda: self._bridge.wants(topic, self._now)  # what comes too early is not decoded
+                self._ends[Subscribe, topic] = end
             case Advertise(topic, message, is_latched):
                 qos = Qos.COMMAND if topic == self._config.drive_topic else Qos.LATCHED if is_latched else Qos.STATE
                 self._ends[Advertise, topic] = self._bus.publisher(NAME, topic, message, qos)
@@ -762,6 +813,14 @@ class GatewaySession:
                 self._serve(service, type_)
             case Unserve(service):
                 self._withdraw(self._ends.pop((Serve, service)))
+            case ServeAction(action, type_):
+                self._serve_action(action, type_)
+            case UnserveAction(action):
+                self._withdraw(self._ends.pop((ServeAction, action)))
+            case GoalFeedback(number, feedback):
+                self._goals_of_clients[number].feedback(feedback)
+            case GoalEnd():
+                self._end_goal(request)
             case ServiceAnswer(number, response, error):
                 asked = self._asked_of_clients.pop(number)
                 asked.fail(error) if response is None else asked.reply(response)
@@ -773,6 +832,8 @@ class GatewaySession:
                 self._begin(self._ask_robot(request))
             case TailLog():
                 self._begin(self._read_log(request))
+            case ReadTested(number, mission):
+                self._begin(self._read_tested(number, mission))
             case SaveSettings():
                 self._begin(self._save(request))
             case Watch():
@@ -781,11 +842,81 @@ class GatewaySession:
             case Unwatch(window):
                 self._stop_watching(window)
 
+    def _carry_out_further(self) -> None:
+        """Do what something from the bus made necessary."""
+        for request in self._bridge.take_requests():
+            self._carry_out(request)
+
     def _begin(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         task = self._loop.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return task
+
+    # Foxglove
+
+    def _serve_foxglove(self, port: int) -> None:
+        """Serve Foxglove beside the page, as soon as the port is free; the page is served all the same."""
+        robot = RobotAccess(self._listen_raw, self._publish_soon, self._call_soon, resolve, self._refused_to_foxglove)
+        try:
+            self._foxglove = server = FoxgloveServer(robot, self._folder.path.name, port)
+        except RuntimeError as error:
+            if not self.trouble:
+                self.trouble = f"Foxglove is not served: port {port}: {str(error).removeprefix('FoxgloveError: ')}"
+                self._complain(self.trouble)
+            self._loop.call_later(_AGAIN, self._serve_foxglove, port)
+            return
+        self.trouble = ""
+        timer: asyncio.TimerHandle | None = None
+
+        def offer() -> None:
+            nonlocal timer
+            timer = None
+            server.offer(self._graph.topics(), self._graph.services())
+
+        def changed() -> None:
+            nonlocal timer
+            timer = timer or self._loop.call_later(_PAUSE, offer)
+
+        self._graph.changed = changed
+        offer()
+
+    def _listen_raw(self, topic: str, take: Callable[[bytes], None]) -> Callable[[], None]:
+        """Pass the bytes of a topic on, in the thread that brings them."""
+        qos = Qos.LATCHED if self._graph.is_latched(topic) else Qos.STATE
+        key = self._graph.key(topic, self._guest.domain)
+        end = self._guest.transport.subscribe(key, qos, lambda arrival: take(bytes(arrival.payload)))
+        return end.close
+
+    def _publish_soon(self, topic: str, message: Message) -> None:
+        def publish() -> None:
+            end = self._ends.get((FoxgloveServer, topic))
+            if end is None:
+                end = self._ends[FoxgloveServer, topic] = self._bus.publisher(NAME, topic, type(message), Qos.STATE)
+            end(message)
+            self._pump()
+
+        self._loop.call_soon_threadsafe(publish)
+
+    def _call_soon(self, service: str, type_: type[Service[Any, Any]], request: Message) -> Future[Any]:
+        future: Future[Any] = Future()
+
+        def answered(reply: Reply[Any]) -> None:
+            if reply.response is not None:
+                future.set_result(reply.response)
+            else:
+                future.set_exception(RuntimeError(reply.error))
+
+        def call() -> None:
+            self._call(ServiceCall(0, service, type_, request, _PATIENCE), answered)
+            self._pump()
+
+        self._loop.call_soon_threadsafe(call)
+        return future
+
+    def _refused_to_foxglove(self, topic: str) -> str:
+        drives = self._config.drive_topic, *self._config.drive_aliases
+        return "people drive by the console, which knows who drives" if topic in drives else ""
 
     def _stop_watching(self, window: str) -> None:
         if (task := self._watches.pop(window, None)) is not None:
@@ -794,8 +925,8 @@ class GatewaySession:
     def _withdraw(self, end: Closable) -> None:
         self._bus.withdraw(NAME, end)
 
-    def _call(self, request: ServiceCall) -> None:
-        """Call a service as soon as its server is known to a client of it."""
+    def _call(self, request: ServiceCall, then: Callable[[Reply[Any]], None] | None = None) -> None:
+        """Call a service as soon as its server is known to a client of it; the bridge takes the reply, or `then`."""
         caller = self._ends.get((ServiceCall, request.service))
         if caller is None:
             caller = self._ends[ServiceCall, request.service] = self._bus.client(NAME, request.service, request.type)
@@ -803,13 +934,12 @@ class GatewaySession:
 
         def answered(reply: Reply[Any]) -> None:
             self._bridge.answered(request.number, reply.response, reply.error)
-            for further in self._bridge.take_requests():
-                self._carry_out(further)
+            self._carry_out_further()
 
         def attempt() -> None:
             left = deadline - self._now
             if caller.is_available or left <= 0:
-                caller(request.request, answered, timeout=max(_PAUSE, left))
+                caller(request.request, then or answered, timeout=max(_PAUSE, left))
             else:
                 self._guest.scheduler.at(self._now + _PAUSE / 10, NAME, attempt)
 
@@ -820,8 +950,31 @@ class GatewaySession:
             self._requests_so_far += 1
             self._asked_of_clients[self._requests_so_far] = asked
             self._bridge.requested(service, self._requests_so_far, asked.message)
+            self._carry_out_further()
 
         self._ends[Serve, service] = self._bus.serve_later(NAME, service, type_, requested)
+
+    def _serve_action(self, action: str, type_: type[Action[Any, Any, Any]]) -> None:
+        server: ActionServer[Any, Any, Any] = self._bus.serve_action(NAME, action, type_, lambda goal: "")
+
+        def began() -> None:
+            if server.current is not None:
+                self._requests_so_far += 1
+                self._goals_of_clients[self._requests_so_far] = server.current
+                self._bridge.goal_came(action, self._requests_so_far, server.current.request)
+
+        server.began, server.canceling = began, partial(self._bridge.goal_unwanted, action)
+        self._ends[ServeAction, action] = server
+
+    def _end_goal(self, end: GoalEnd) -> None:
+        goal = self._goals_of_clients.pop(end.number)
+        match end.outcome:
+            case Outcome.SUCCEEDED:
+                goal.succeeded(end.result)
+            case Outcome.CANCELED:
+                goal.canceled(end.result)
+            case _:
+                goal.aborted(end.reason, end.result)
 
     def _send_goal(self, request: SendGoal) -> None:
         """Send a goal as soon as the server of its action is known to a client of it."""
@@ -863,6 +1016,10 @@ class GatewaySession:
         if request.after == 0:
             answer["findings"] = findings(self._folder.path / FINDINGS)
         self._bridge.robot_answered(request.number, answer)
+        self._pump()
+
+    async def _read_tested(self, number: int, mission: str) -> None:
+        self._bridge.robot_answered(number, await asyncio.to_thread(read_tested, self._config.robot, mission))
         self._pump()
 
     async def _save(self, request: SaveSettings) -> None:

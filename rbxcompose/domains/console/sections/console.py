@@ -13,6 +13,7 @@ from rbxcompose.compiler.sections.bus import bus
 from rbxcompose.compiler.sections.places import places
 from rbxcompose.compiler.sections.values import values
 from rbxcompose.domains.body.sections.body import body
+from rbxcompose.domains.console.checks import PICTURES
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Contents, Reading, WantedComponent, Wiring
@@ -21,9 +22,14 @@ from rbxcompose.sdk.capabilities import Drives, Forwards, Setting
 from rbxcompose.sdk.ports import Out
 
 GATEWAY = "gateway"
+FOXGLOVE_PORT = 8765
 _TELEOP = "teleop"  # the input of a mux that is for people
-_PICTURES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _VELOCITIES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
+
+
+PageName = Literal[
+    "data", "diagnostics", "drive", "fleet", "log", "map", "mission", "model", "mux", "parameters", "robot"
+]
 
 
 class DrivePage(Config):
@@ -50,12 +56,14 @@ class ConsoleModel(Config):
     """The role that visitors need at least for topics, services and actions, by patterns: `/right_arm/*: configure`."""
     port: int = Field(8080, ge=1, le=65535)
     """TCP port of the page."""
-    first_page: Literal[
-        "data", "diagnostics", "drive", "fleet", "log", "map", "mission", "model", "mux", "parameters", "robot"
-    ] = "drive"
-    """The page that is shown first."""
+    pages: list[PageName] = []
+    """Which pages there are, in this order. Default: all."""
+    first_page: PageName = "drive"
+    """The page that is shown first; if there is none of this name, the first one is."""
     drive: DrivePage = DrivePage()
     """How people drive from the page."""
+    foxglove: bool | Annotated[int, Field(ge=1, le=65535)] = False
+    """Whether Foxglove and Lichtblick on this machine find the robot at port 8765, or at which port."""
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
@@ -70,7 +78,9 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         "port": read.port,
         "listen": read.listen,
         "origins": read.origins,
+        "foxglove": FOXGLOVE_PORT if read.foxglove is True else int(read.foxglove),
         "guard": read.guard,
+        "pages": read.pages,
         "first_page": read.first_page,
         **_drive(read.drive, components, namespace),
         "camera": _camera(read.drive.camera, components, namespace),
@@ -91,15 +101,9 @@ def _text(node: TreeNode | None, key: str) -> str:
 
 
 def _places(contents: Contents) -> dict[str, object]:
-    """Return the places of the manifest, with the colours that only viewers need."""
-    written = contents.root.get("places")
+    """Return the places of the robot."""
     return {
-        name: {
-            "x": place.x,
-            "y": place.y,
-            "heading": place.heading,
-            "colour": _text(written.get(name) if isinstance(written, MappingNode) else None, "colour"),
-        }
+        name: {"x": place.x, "y": place.y, "heading": place.heading, "colour": place.colour}
         for name, place in contents.of(places).items()
     }
 
@@ -125,11 +129,15 @@ def _drive(page: DrivePage, components: Mapping[str, RobotComponent], namespace:
 
 
 def _camera(written: str | None, components: Mapping[str, RobotComponent], namespace: str) -> str:
-    """Return the topic of the pictures that drivers see: that of a component, else as written; by default the first."""
+    """Return the topic of the pictures that drivers see: that of a component, else as written; by default the first.
+
+    One of depths, which has ROS's names, is taken only if the component has no other.
+    """
     for name, component in components.items():
-        for end in component.ends:
-            if isinstance(end.port, Out) and end.type_name in _PICTURES and written in (None, name):
-                return end.topic
+        ends = (end for end in component.ends if isinstance(end.port, Out) and end.type_name in PICTURES)
+        shown = sorted((end.topic for end in ends), key=lambda topic: "depth" in topic.split("/"))
+        if shown and written in (None, name):
+            return shown[0]
     return resolve(written, namespace) if written else ""
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 
@@ -10,9 +9,16 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Related, Report, Severity, Span, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.importing.foreign_files import ForeignFile, ForeignMap, FreeNames, Given
-from rbxcompose.commands.importing.importer import CLOCK, DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM, importer
+from rbxcompose.commands.importing.importer import (
+    CLOCK,
+    DISAGREES,
+    NOT_CARRIED_OVER,
+    OTHER_PROGRAM,
+    RENAMED_TOPIC,
+    importer,
+)
 from rbxcompose.commands.importing.manifest_text import Row, flow, header, place, quantity, row, section
-from rbxcompose.commands.importing.ros_parameters import NodeParameters, parameters_with
+from rbxcompose.commands.importing.ros_parameters import NodeParameters, parameters_with, topic_name
 from rbxcompose.domains.muxes.words import OWN_NAMES
 from rbxcompose.manifest.tree import MappingNode, SequenceNode
 from rbxcompose.manifest.validate import OUT_OF_RANGE, WRONG_TYPE, label_of
@@ -21,9 +27,7 @@ TWIST_MUX, YOCS = "twist_mux", "yocs"
 _INPUTS = {TWIST_MUX: "topics", YOCS: "subscribers"}
 _LOCKS = "locks"
 _MOST = 1 << 31  # of a priority
-RENAMED_TOPIC = kind("RBX2294", Severity.WARNING)
 GUESSED_OUTPUT = kind("RBX2295", Severity.WARNING)
-_TOPIC = re.compile(r"/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*")
 _USUAL, _OTHERWISE = "cmd_vel", "cmd_vel_out"
 _LOCK_PORT = "lock_"
 
@@ -205,11 +209,9 @@ def _topic(given: Given[str], one: ForeignMux, report: Report) -> str:
     """Return a topic as a manifest may have it; private ones are below the name of the node."""
     written = given.value.strip()
     topic = f"{one.node.lstrip('/') or one.program}/{written[1:].lstrip('/')}" if written.startswith("~") else written
-    if _TOPIC.fullmatch(topic):
-        return topic
-    parts = (re.sub(r"^[0-9_]+|[^a-z0-9_]+", "_", part.lower()).strip("_") for part in topic.split("/"))
-    slash = "/" if topic.startswith("/") else ""
-    name = f"{slash}{'/'.join(part for part in parts if part) or 'topic'}"
+    name = topic_name(topic)
+    if name == topic:
+        return name
     if one.output is None or given is not one.output or "/" not in topic.lstrip("/"):
         words = f"the topic '{plain(written, 60)}' becomes '{name}'"
         report.add(RENAMED_TOPIC.at(given.span, words, help="whoever sends there must use this name"))

@@ -11,8 +11,8 @@ from rbxcompose.base.config import Config, Frequency, Name, Time
 from rbxcompose.compiler.sections.components import ComponentEntry, components
 from rbxcompose.domains.muxes.words import MODE_OF, HandoverLimits, MuxEnding, MuxMode, MuxProfile, mode_of
 from rbxcompose.manifest.fields import PortName, TopicName
-from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import ANY, Contents, Reading, Renames, SetScope, WantedComponent, Wiring
+from rbxcompose.manifest.registry import section, sections_in_use
+from rbxcompose.manifest.section import ANY, ROBOT, Contents, Reading, Renames, SetScope, WantedComponent, Wiring
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at
 from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type
@@ -207,9 +207,19 @@ def _connects(contents: Contents) -> dict[str, dict[str, str]]:
         for name, source in one.inputs.items():
             component, _, port = (source.source or "").partition(".")
             if (written := contents.of(components).get(component)) is not None:
-                for output in _outputs(written, mux, port):
-                    found.setdefault(component, {})[output] = source.topic or f"{mux}/{name}"
+                outputs = _outputs(written, mux, port)
+            else:
+                brought = _brought(contents, component)
+                outputs = [output for output, topic in brought.items() if port == output or (not port and topic == mux)]
+            for output in outputs:
+                found.setdefault(component, {})[output] = source.topic or f"{mux}/{name}"
     return found
+
+
+def _brought(contents: Contents, component: str) -> Mapping[str, str]:
+    """Return the outputs, with their topics, of a component that a section brings."""
+    sections = (section for section in sections_in_use(ROBOT) if section.name in contents.root)
+    return next((section.outputs[component] for section in sections if component in section.outputs), {})
 
 
 def _outputs(entry: ComponentEntry, topic: str, port: str) -> list[str]:

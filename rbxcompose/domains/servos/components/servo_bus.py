@@ -21,14 +21,16 @@ from rbxcompose.domains.servos.joint_drive import JointDrive, PositionDrive, Ser
 from rbxcompose.domains.servos.joint_states import Enable, Hold, JointMode, MoveTo
 from rbxcompose.domains.servos.servo_cycle import ServoCycle, ServoItem, prepare, set_up, with_torque
 from rbxcompose.domains.servos.supervision import Periods, Reboots, be_prompt, joint_report, joint_state
-from rbxcompose.domains.servos.twins.fault_script import FaultScript, InjectFault
-from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.fault_script import FaultScript, InjectFault, ListFaults
+from rbxcompose.domains.servos.twins.physics_motor import PhysicsJoints, PhysicsMotor
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo, IdealMotor, ServoMotor
+from rbxcompose.domains.servos.twins.servo_faults import FAULTS
 from rbxcompose.domains.servos.twins.servo_twin import TwinBus, twin_of, twin_servos
 from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
-from rbxcompose.sdk import Component, Later, Out, Port, Serves, ServesAction, component
-from rbxcompose.sdk.capabilities import Capability, ConnectedBy, NeedsExtra, OpensPort, Setting, within
+from rbxcompose.sdk import Component, In, Later, Out, Port, Serves, ServesAction, component
+from rbxcompose.sdk.capabilities import Capability, ConnectedBy, NeedsExtra, OpensPort, Setting, TurnsJoints, within
 from rbxcompose.sdk.component import Context
 
 
@@ -38,6 +40,8 @@ class OpenedBus:
 
     bus: ServoBus
     faults: FaultScript | None = None
+    physics: PhysicsJoints | None = None
+    """The link to the engine that moves the servos, if one does."""
     note: str = ""
     """What people should know of it; empty if nothing."""
 
@@ -55,28 +59,31 @@ def open_bus(
     Raises:
         PortError: if the port cannot be opened.
     """
-    path, faults = config.port, None
+    path, faults, physics = config.port, None, None
     if config.twin:
         has_bytes = is_real_time and config.twin == "pty"
-        servos = twin_servos(joints, is_ideal=config.twin == "ideal", noise=config.noise, seed=config.seed)
+        motor = PhysicsMotor if config.by_physics else IdealMotor if config.twin == "ideal" else ServoMotor
+        servos = twin_servos(joints, motor=motor, noise=config.noise, seed=config.seed)
+        physics = PhysicsJoints(joints, servos) if config.by_physics else None
         servos |= {f"servo {id_}": [FakeServo(model, id_)] for id_, model in config.lone.items()}
         twin = at_end.enter_context(twin_of(servos, now, has_bytes=has_bytes))
         faults = FaultScript(config.faults.values(), servos, twin)
         if isinstance(twin, TwinBus):
             is_other = config.twin == "pty"
             note = "bytes need real time, so servos are simulated without them" if is_other else ""
-            return OpenedBus(twin, faults, note)
+            return OpenedBus(twin, faults, physics, note)
         path = str(twin.path)
     known = {servo.id: servo.model for joint in joints for servo in joint.servos}
     bus = bus_type(config.kind).open(path, known | config.lone, baud=config.baud, clock=now, is_fast=config.fast)
     at_end.callback(bus.close)
-    return OpenedBus(bus, faults)
+    return OpenedBus(bus, faults, physics)
 
 
 GONE = "the bus of servos has gone"
 REOPEN = 0.5  # [s] between attempts to find a port that has gone
 REPORT = 1.0  # [s] between reports to diagnostics
 PUBLISHED = 50.0  # [Hz] of joint states, at most
+SET_POINTS, MOVED = "physics/set_points", "physics/joint_states"  # to and from the physics engine
 
 
 @component("servo_bus")
@@ -101,6 +108,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
         """Return the ports: for each joint, for all, and those of the controllers."""
         states = Out(JointState, "joint_states", rate=config.rate / cycles_between(config))
         found = super().ports(config) | {"joint_states": states} | joint_ports(config)
+        if config.by_physics:
+            found |= {"set_points": Out(JointState, SET_POINTS, rate=config.rate), "moved": In(JointState, MOVED)}
         for name, setup in config.controllers.items():
             ports = controller_type(setup.type).ports(name, setup.config)
             found |= {f"{name}_{port}": one for port, one in ports.items()}
@@ -123,7 +132,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
         packages = (NeedsExtra(Setting(kind.package), Setting(kind.extra)),) if kind.package and has_bytes else ()
         port = Setting(config.port, "port")
         ports = () if config.twin else (OpensPort(port),)
-        return (*led, *packages, *((ConnectedBy(port),) if config.port else ()), *ports)
+        turned = (TurnsJoints(Setting(config.efforts)),) if config.by_physics else ()
+        return (*led, *packages, *turned, *((ConnectedBy(port),) if config.port else ()), *ports)
 
     def __init__(self, name: str, config: ServoBusConfig, context: Context) -> None:
         """Give the ports of joints and controllers their methods."""
@@ -153,7 +163,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         opened = open_bus(config, joints, lambda: self.now, self.at_end, is_real_time=is_real_time)
         if opened.note:
             self.warn(opened.note)
-        self.faults = opened.faults
+        self.faults, self.physics = opened.faults, opened.physics
         self.cycle = ServoCycle(opened.bus, drives, mimics, config.watchdog, config.thermal.scope == "bus")
         self.reboots = Reboots(opened.bus, self.prepare)
         seats = {
@@ -210,13 +220,22 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.context.wake_at((math.floor(self.now / self.period + 1e-6) + 1) * self.period)
         if self.faults is not None:
             self.faults.play(self.now)
+        if self.physics is not None and not self.physics.is_felt:
+            return  # nobody knows yet where the joints are
         try:
             self.run_cycle()
         except PortError as error:
             self.lose(error)
+        if self.physics is not None:
+            self.bound["set_points"](self.physics.set_points(self.stamp))
         if self.now - self.reported_at >= REPORT:
             self.reported_at = self.now
             self.report()
+
+    def on_moved(self, message: JointState) -> None:
+        """Take over where the physics engine has moved the joints."""
+        if self.physics is not None:
+            self.physics.feel(message)
 
     def run_cycle(self) -> None:
         """Run the cycle with all active controllers, and publish."""
@@ -367,6 +386,13 @@ class ServoBusDriver(Component[ServoBusConfig]):
         if self.faults is None:
             raise Refused("real servos have their own faults")
         return self.faults.inject(request, self.now)
+
+    @answers(ListFaults)
+    def list_faults(self, request: ListFaults) -> Mapping[str, str]:
+        """Return what may go wrong."""
+        if self.faults is None:
+            raise Refused("real servos have their own faults")
+        return {name: fault.about for name, fault in FAULTS.items()}
 
     # What is published
 

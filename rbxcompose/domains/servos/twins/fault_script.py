@@ -7,7 +7,7 @@ from typing import Protocol
 
 from rbxcompose.base.config import Config
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.requests import Command, Refused
+from rbxcompose.base.requests import Command, Query, Refused
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_faults import FAULTS, UNPLUG, FaultName, servo_faults
 
@@ -26,6 +26,14 @@ class InjectFault(Command):
         """Return it as a person would say it."""
         lasting = "" if self.lasts is None else f" for {self.lasts:g} s"
         return f"{self.fault} of {self.joint or 'the bus'}{lasting}"
+
+
+@dataclass(frozen=True, slots=True)
+class ListFaults(Query[Mapping[str, str]]):
+    """Return what may go wrong with the simulated servos of a bus: what a servo then does, by the name of a fault."""
+
+    about = "servo_bus"
+    component: str
 
 
 class TwinFault(Config):

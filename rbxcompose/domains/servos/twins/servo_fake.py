@@ -60,8 +60,12 @@ class ServoMotor:
         self.position = self._aim = position
         self.velocity = self._speed = self.effort = 0.0
 
+    def relax(self) -> None:
+        """Stay, without torque."""
+        self.push(0.0)
+
     def push(self, effort: float) -> None:
-        """Stay, at a load: 0 without torque."""
+        """Stay, at a load."""
         self.put(self.position)
         self.effort = effort
 
@@ -188,7 +192,7 @@ class _Orders:
 class FakeServo:
     """One servo of a model, at `id`, at rest in the middle of its range, with torque off.
 
-    An ideal one is at its goal at once, without heat or load. `noise` [ticks] is the standard deviation of measured
+    `motor` is the type of its motor. `noise` [ticks] is the standard deviation of measured
     positions, which `seed` repeats.
 
     Raises:
@@ -202,7 +206,7 @@ class FakeServo:
         *,
         baud: int = 1_000_000,
         holds_on_enable: bool = True,
-        is_ideal: bool = False,
+        motor: type[ServoMotor] = ServoMotor,
         noise: float = 0.0,
         seed: int = 0,
     ) -> None:
@@ -213,7 +217,7 @@ class FakeServo:
         self.load = 0.0  # of the most, which the outside puts on it
         self.heard = 0.0  # [s], time of the last instruction
         centre = float(self.model.items["present_position"].centre)
-        self.motor = (IdealMotor if is_ideal else ServoMotor)(centre, self.model.per_tick)
+        self.motor = motor(centre, self.model.per_tick)
         self.noise = noise
         self._random = Random(f"{seed}/{id}")  # noqa: S311 - no secret, and must be repeatable
         self._known: _Orders | None = None  # what the memory orders, until it changes
@@ -335,15 +339,19 @@ class FakeServo:
     def _move(self, dt: float) -> None:
         orders, motor = self._orders, self.motor
         if not orders.has_torque:
-            motor.push(0.0)
+            motor.relax()
         elif self.faults.is_jammed or (abs(self._outer) > orders.strength and not motor.is_ideal):
             wanted = orders.speed if orders.is_wheel else orders.goal - motor.position
             motor.push(math.copysign(orders.strength, wanted) if wanted else 0.0)
         elif not orders.is_wheel:
             motor.approach(orders.goal, orders.fastest, orders.acceleration, dt, orders.strength)
         else:
-            circle = self.model.family.ticks if self.model.protocol == 1 else 0
-            motor.turn(orders.speed, orders.acceleration, dt, circle, orders.strength)
+            motor.turn(orders.speed, orders.acceleration, dt, self._circle, orders.strength)
+
+    @property
+    def _circle(self) -> int:
+        """Return after how many ticks its positions begin again while it turns; 0 if they go on."""
+        return self.model.family.ticks if self.model.protocol == 1 else 0
 
     @property
     def _outer(self) -> float:
@@ -380,7 +388,8 @@ class FakeServo:
         """Write what it measures into its memory."""
         motor, orders = self.motor, self._orders
         speed = motor.velocity * self.model.per_tick
-        measured = motor.position + (self._random.gauss(0.0, self.noise) if self.noise else 0.0)
+        turned = motor.position % self._circle if orders.is_wheel and self._circle else motor.position
+        measured = turned + (self._random.gauss(0.0, self.noise) if self.noise else 0.0)
         is_going = orders.has_torque and not orders.is_wheel and abs(orders.goal - motor.position) > 1
         self._write_measured("present_position", round(measured))
         self._write_measured("present_speed", self.model.to_raw("present_speed", speed))

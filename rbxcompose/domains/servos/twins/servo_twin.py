@@ -11,7 +11,7 @@ from pathlib import Path
 from rbxcompose.domains.devices.serial_ports import LostPortError
 from rbxcompose.domains.servos.bus import FoundServo, ServoReading, ServoStatistics
 from rbxcompose.domains.servos.joint_drive import ServoJoint
-from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo, ServoMotor
 from rbxcompose.domains.servos.twins.servo_line import FakeLine
 from rbxcompose.domains.servos.twins.servo_port import FakePort
 
@@ -119,12 +119,12 @@ class TwinBus:
 
 
 def twin_servos(
-    joints: Iterable[ServoJoint], *, is_ideal: bool = False, noise: float = 0.0, seed: int = 0
+    joints: Iterable[ServoJoint], *, motor: type[ServoMotor] = ServoMotor, noise: float = 0.0, seed: int = 0
 ) -> dict[str, list[FakeServo]]:
     """Return simulated servos by joint; `noise` [rad] is the standard deviation of the positions that they measure."""
     return {
         joint.name: [
-            FakeServo(servo.model, servo.id, is_ideal=is_ideal, noise=noise / servo.model.per_tick, seed=seed)
+            FakeServo(servo.model, servo.id, motor=motor, noise=noise / servo.model.per_tick, seed=seed)
             for servo in joint.servos
         ]
         for joint in joints

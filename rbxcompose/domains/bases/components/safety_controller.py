@@ -1,0 +1,185 @@
+"""Keeps a base from what its bumpers, cliff sensors and dropped wheels feel."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+from pydantic import Field, model_validator
+
+from rbxcompose import sdk
+from rbxcompose.base.geometry import Velocity2
+from rbxcompose.base.levels import Level
+from rbxcompose.domains.bases.safety import SafetyCore, SafetyPhase, SafetySettings
+from rbxcompose.manifest.fields import TopicName
+from rbxcompose.msgs.geometry_msgs import Twist, Vector3
+from rbxcompose.msgs.rbxcompose_msgs import Switches
+from rbxcompose.msgs.std_msgs import Empty
+
+DOES = {
+    SafetyPhase.PAUSE: "stops",
+    SafetyPhase.BACK: "backs off",
+    SafetyPhase.STUCK: "cannot get away, and waits for somebody",
+    SafetyPhase.TURN: "turns away",
+}
+
+
+class SafetyControllerConfig(sdk.Config):
+    """What it listens to, and how it backs off."""
+
+    enabled: Annotated[bool, sdk.Live()] = True
+    """Whether it acts at all; not, for example, while the robot pushes itself into its dock."""
+    evades: list[TopicName] = ["bumper", "cliff"]
+    """Topics with switches from which it backs off and turns away."""
+    holds: list[TopicName] = ["wheel_drop"]
+    """Topics with switches at which it stands still until they are off again."""
+    heartbeat: TopicName | None = None
+    """Where it tells again and again that it works: a lock of the mux, which holds all others back if it does not."""
+    pause: Annotated[sdk.Time, sdk.Live()] = Field(0.2, ge=0)
+    """How long it stands before it backs off, so that others can note what was there."""
+    back_speed: Annotated[sdk.Speed, sdk.Live()] = Field(0.1, ge=0)
+    """How fast it backs off; with 0 it stands until somebody has moved it."""
+    back_time: Annotated[sdk.Time, sdk.Live()] = Field(1.0, ge=0)
+    """How long it goes on backing off after nothing is felt any more."""
+    longest: Annotated[sdk.Time, sdk.Live()] = Field(3.0, gt=0)
+    """How long it backs off at most; then it stands until nothing is felt any more, since it does not see behind."""
+    turn: Annotated[sdk.Angle, sdk.Live()] = Field(math.radians(60), ge=0, le=math.pi)
+    """How far it turns away then."""
+    turn_rate: Annotated[sdk.AngularSpeed, sdk.Live()] = Field(math.radians(45), gt=0)
+    """How fast it turns away."""
+    settle: Annotated[sdk.Time, sdk.Live()] = Field(1.0, ge=0)
+    """How long it stands still after the last switch of `holds` is off again."""
+    silence: Annotated[sdk.Time, sdk.Live()] = Field(0.5, gt=0)
+    """A sensor that was not heard for so long is broken: the base stands still."""
+
+    @model_validator(mode="after")
+    def _listens(self) -> SafetyControllerConfig:
+        topics = [*self.evades, *self.holds]
+        if not topics or len(set(topics)) < len(topics):
+            raise ValueError("it needs topics in 'evades' or 'holds', each once")
+        return self
+
+
+@sdk.component("safety_controller")
+class SafetyController(sdk.Component[SafetyControllerConfig]):
+    """Backs off where a bumper is pressed or the floor ends, and stands while a wheel hangs or a sensor is silent.
+
+    It commands only then: give it the highest input of the mux of the base.
+
+    Example:
+        protection: {type: safety_controller, turn: 90 deg, connect: {cmd_vel: cmd_vel/safety}}
+    """
+
+    rate = 20.0
+    cmd_vel = sdk.Out(Twist, "cmd_vel", qos="command")
+
+    @classmethod
+    def ports(cls, config: SafetyControllerConfig) -> dict[str, sdk.Port[Any]]:
+        """Return an input for each topic of switches, and where it tells that it works."""
+        found: dict[str, sdk.Port[Any]] = {
+            port_of(topic): sdk.In(Switches, topic) for topic in (*config.evades, *config.holds)
+        }
+        if config.heartbeat is not None:
+            found["heartbeat"] = sdk.Out(Empty, config.heartbeat, qos="command", rate=cls.rate)
+        return super().ports(config) | {name: port.named(name) for name, port in found.items()}
+
+    @classmethod
+    def capabilities(cls, config: SafetyControllerConfig) -> tuple[sdk.Capability, ...]:
+        """Declare how fast it moves the base."""
+        speed, rate = sdk.Setting(config.back_speed, "back_speed"), sdk.Setting(config.turn_rate, "turn_rate")
+        return (sdk.CommandsMotion("cmd_vel", speed, rate, protects=True),)
+
+    def configure(self) -> None:
+        """Have heard nothing yet."""
+        config = self.config
+        self.core = SafetyCore(settings_of(config), config.evades, config.holds)
+        self.topics = {port_of(topic): topic for topic in (*config.evades, *config.holds)}
+        self.has_commanded = False
+        self.misses_since = math.inf  # when a silence counts as a fault: sensors may begin a little later [s]
+        self.reported: tuple[Level, str] | None = None
+
+    def reconfigure(self, old: SafetyControllerConfig) -> None:
+        """Apply the new settings from now on."""
+        self.core.settings = settings_of(self.config)
+        if not self.config.enabled:
+            self.core.forget(self.now)
+
+    def received(self, port: str, message: Switches) -> None:
+        """Take which switches are on, and react at once."""
+        states = zip(message.name, message.angle.tolist(), message.is_on, strict=True)
+        on = {name: angle for name, angle, is_on in states if is_on}
+        self.core.feel(self.topics[port], on, self.now)
+        if on or self.core.phase is not SafetyPhase.WATCH:
+            self.act()
+
+    def step(self, dt: float) -> None:
+        """Command the base, if something is felt or a sensor is silent, and tell that it works."""
+        self.act()
+        if self.config.heartbeat is not None:
+            self.bound["heartbeat"](Empty())
+
+    def act(self) -> None:
+        """Command the base for now; the last command is a stop."""
+        if self.context.is_stopped:
+            return
+        wanted = self.core.command(self.now) if self.config.enabled else None
+        if wanted is not None or self.has_commanded:
+            velocity = wanted or Velocity2()
+            self.cmd_vel(Twist(linear=Vector3(x=velocity.linear), angular=Vector3(z=velocity.angular)))
+        self.has_commanded = wanted is not None
+        self.report()
+
+    def start(self) -> None:
+        """Expect all sensors from now on."""
+        self.misses_since = min(self.misses_since, self.now + self.core.settings.silence)
+
+    def stop(self) -> None:
+        """Begin anew after `release`."""
+        self.core.forget(self.now)
+
+    def go_on(self) -> None:
+        """Count the silence anew: robot time stood still."""
+        self.core.forget(self.now)
+
+    def report(self) -> None:
+        """Report what it does, if that has changed."""
+        silent, held, phase = self.core.silent(self.now), self.core.held, self.core.phase
+        if not silent:
+            self.misses_since = -math.inf
+        if not self.config.enabled:
+            level, text = Level.WARN, "is off: nothing keeps the robot from bumping and falling"
+        elif silent:
+            level = Level.ERROR if self.now > self.misses_since else Level.OK
+            text = f"holds the base: {' and '.join(silent)} {'is' if len(silent) == 1 else 'are'} silent"
+        elif held:
+            level, text = Level.ERROR, f"holds the base: {' and '.join(held)}"
+        elif phase is SafetyPhase.WATCH:
+            level, text = Level.OK, "holds the base for a moment" if self.has_commanded else "nothing is felt"
+        else:
+            felt = " and ".join(self.core.felt)
+            level = Level.ERROR if phase is SafetyPhase.STUCK else Level.WARN
+            text = DOES[phase] + (f": {felt}" if felt else "")
+        if (level, text) != self.reported:
+            self.reported = level, text
+            self.status(level, text)
+            if level is Level.ERROR:
+                self.warn(text)
+
+
+def port_of(topic: str) -> str:
+    """Return the name of the input of a topic."""
+    return topic.strip("/").replace("/", "_")
+
+
+def settings_of(config: SafetyControllerConfig) -> SafetySettings:
+    """Return the settings of the core."""
+    return SafetySettings(
+        config.pause,
+        config.back_speed,
+        config.back_time,
+        config.longest,
+        config.turn,
+        config.turn_rate,
+        config.settle,
+        config.silence,
+    )

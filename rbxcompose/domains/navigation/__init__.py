@@ -1,0 +1,1 @@
+"""Navigation: maps with costs, ways through them, and following these."""

@@ -1,0 +1,1 @@
+"""What gives a robot its map, and drives it through that."""

@@ -1,0 +1,181 @@
+"""Where the robot is in its map, by its laser."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from rbxcompose import sdk
+from rbxcompose.base.geometry import Pose2
+from rbxcompose.base.levels import Level
+from rbxcompose.domains.navigation.frames import BASE, ODOM, odom_in_map
+from rbxcompose.domains.navigation.localisation import LocalisationSettings, ParticleFilter
+from rbxcompose.domains.worlds.poses import message_of, pose_in, rays_of
+from rbxcompose.domains.worlds.world import MAP_FRAME, grid_of
+from rbxcompose.msgs import geometry_msgs as geometry
+from rbxcompose.msgs.nav_msgs import OccupancyGrid
+from rbxcompose.msgs.sensor_msgs import LaserScan
+from rbxcompose.msgs.stamps import to_nanoseconds
+from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.msgs.std_srvs import Empty
+from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.sdk.ports import BULK
+
+LOST = 0.3  # share of a scan that the map explains below which the robot is probably elsewhere
+GIVEN = 0.5, math.radians(15)  # standard deviations of a pose that comes without any [m], [rad]
+
+
+class LocalisationConfig(sdk.Config):
+    """What it starts from, and how many places it considers."""
+
+    scan: str = "scan"
+    """Topic of the laser."""
+    scan_frame: str = "laser_link"
+    """The frame of the laser."""
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where the robot probably is at first: x, y [m] and heading [rad] in `map`."""
+    spread: Annotated[sdk.Length, sdk.Live()] = Field(0.2, ge=0)
+    """Standard deviation of both coordinates of a start, also in another map."""
+    turn_spread: Annotated[sdk.Angle, sdk.Live()] = Field(math.radians(10), ge=0)
+    """Standard deviation of its heading."""
+    anywhere: bool = False
+    """Whether it may be anywhere at first."""
+    least: Annotated[int, Field(ge=10, le=100_000), sdk.Live()] = 500
+    """Particles at least."""
+    most: Annotated[int, Field(ge=10, le=100_000), sdk.Live()] = 2000
+    """Particles at most."""
+    seed: int = 1
+    """Of the random numbers."""
+
+
+@sdk.component("particle_localisation")
+class ParticleLocalisation(sdk.Component[LocalisationConfig]):
+    """Finds the robot in its map by a laser, with a particle filter, and publishes where `odom` is in `map`.
+
+    Example:
+        localisation: {type: particle_localisation}
+    """
+
+    made_by = "The section `navigation` runs it."
+    rate = 10.0
+    tf = sdk.Out(TFMessage, "/tf")
+    estimate = sdk.Out(geometry.PoseWithCovarianceStamped, "amcl_pose", qos="latched")
+    cloud = sdk.Out(geometry.PoseArray, "particle_cloud")
+    map = sdk.In(OccupancyGrid, "map", qos="latched", limits=BULK)
+    initialpose = sdk.In(
+        geometry.PoseWithCovarianceStamped, "initialpose", qos="event", is_open=True, may_be_silent=True
+    )
+    anywhere = sdk.Serves(Empty, "reinitialize_global_localization", skill=None)
+    odometry = sdk.Looks(source=BASE, target=ODOM)
+
+    @classmethod
+    def ports(cls, config: LocalisationConfig) -> dict[str, sdk.Port[Any]]:
+        """Return the ports, with those of its laser."""
+        return super().ports(config) | {
+            "scan": sdk.In(LaserScan, config.scan).named("scan"),
+            "laser": sdk.Looks(source=config.scan_frame, target=BASE).named("laser"),
+        }
+
+    @classmethod
+    def capabilities(cls, config: LocalisationConfig) -> tuple[sdk.Capability, ...]:
+        """Declare the frame that it places."""
+        extra = sdk.NeedsExtra(sdk.Setting("scipy"), sdk.Setting("navigation"))
+        return sdk.WritesFrame("tf", sdk.Setting(MAP_FRAME), sdk.Setting(ODOM)), extra
+
+    def configure(self) -> None:
+        """Know no map yet."""
+        self.filter: ParticleFilter | None = None
+        self.scan: LaserScan | None = None  # that is not taken yet
+        self.correction = Pose2()  # of `odom` in `map`, until the map is known
+
+    def activate(self) -> None:
+        """Watch how well the map explains what the laser sees."""
+        self.add_diagnostic("scan", self.explained)
+
+    def reconfigure(self, old: LocalisationConfig) -> None:
+        """Draw another number of particles from the next scan on."""
+        if self.config.least > self.config.most:
+            raise sdk.Refused("'least' is not above 'most'")
+        if self.filter is not None:
+            self.filter.settings = filter_settings(self.config)
+
+    def explained(self, now: float) -> sdk.TaskStatus:
+        """Report how much of the newest scan the map explains."""
+        if self.filter is None:
+            return sdk.TaskStatus(Level.WARN, "there is no map")
+        share = f"the map explains {self.filter.quality:.0%} of what the laser sees"
+        return sdk.TaskStatus(Level.OK if self.filter.quality >= LOST else Level.WARN, share)
+
+    def on_map(self, message: OccupancyGrid) -> None:
+        """Begin in a new map: at the start, or where the robot was believed to be."""
+        config, before = self.config, self.filter
+        self.filter = ParticleFilter(grid_of(message), filter_settings(config), config.seed)
+        if before is not None or not config.anywhere:
+            self.begin(before.pose if before is not None else Pose2(*config.start), config.spread, config.turn_spread)
+
+    def on_initialpose(self, message: geometry.PoseWithCovarianceStamped) -> None:
+        """Begin again at a pose that somebody pointed at in a viewer."""
+        covariance = np.asarray(message.pose.covariance, float).reshape(6, 6)
+        spread, turn_spread = math.sqrt(max(0.0, covariance[0, 0])), math.sqrt(max(0.0, covariance[5, 5]))
+        self.begin(pose_in(message.pose.pose), spread or GIVEN[0], turn_spread or GIVEN[1])
+
+    def on_anywhere(self, request: Empty.Request) -> Empty.Response:
+        """Begin again with no idea."""
+        if self.filter is not None:
+            self.filter.start_anywhere()
+        return Empty.Response()
+
+    def begin(self, pose: Pose2, spread: float, turn_spread: float) -> None:
+        """Begin around a pose, unless it is none of the map."""
+        if self.filter is None:
+            return
+        try:
+            self.filter.start(pose, spread, turn_spread)
+        except ValueError as error:
+            self.warn(str(error))
+
+    def on_scan(self, message: LaserScan) -> None:
+        """Weigh a scan, now or as soon as it is known from where it was taken."""
+        self.scan = message
+        self.take_scan()
+
+    def take_scan(self) -> None:
+        """Weigh the newest scan, unless that has been done."""
+        if (message := self.scan) is None or self.filter is None:
+            return
+        try:
+            laser = self.bound["laser"].transform(at=to_nanoseconds(message.header.stamp) or None)
+            base = self.odometry.transform(at=to_nanoseconds(message.header.stamp) or None)
+        except LookupError:
+            return  # diagnostics of transforms say so
+        self.scan = None
+        self.filter.move(base.to_pose2())
+        angles, ranges = rays_of(message)
+        ranges = np.where(ranges <= message.range_max, ranges, math.inf)
+        if self.filter.see(laser.to_pose2(), angles, ranges):
+            self.tell(self.filter, message.header)
+
+    def step(self, dt: float) -> None:
+        """Publish where `odom` is in `map`."""
+        self.take_scan()
+        if self.filter is not None:
+            self.correction = self.filter.correction
+        self.tf(odom_in_map(self.correction, self.stamp))
+
+    def tell(self, found: ParticleFilter, of: Header) -> None:
+        """Publish the pose and, for viewers, the particles."""
+        header = Header(stamp=of.stamp, frame_id=MAP_FRAME)
+        covariance = np.zeros((6, 6))
+        covariance[np.ix_((0, 1, 5), (0, 1, 5))] = found.covariance
+        pose = geometry.PoseWithCovariance(message_of(found.pose), covariance.ravel())
+        self.estimate(geometry.PoseWithCovarianceStamped(header, pose))
+        if self.cloud.is_wanted:
+            self.cloud(geometry.PoseArray(header, tuple(message_of(Pose2(*one)) for one in found.poses.tolist())))
+
+
+def filter_settings(config: LocalisationConfig) -> LocalisationSettings:
+    """Return the settings of the filter."""
+    return LocalisationSettings(least=min(config.least, config.most), most=config.most)

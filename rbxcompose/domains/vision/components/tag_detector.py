@@ -1,0 +1,245 @@
+"""Finds tags in the pictures of a camera."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+
+from pydantic import Field, model_validator
+
+from rbxcompose import sdk
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
+from rbxcompose.base.levels import Level
+from rbxcompose.domains.vision.tags import DEFAULT_FAMILY, FAMILIES, SeenTag, TagFinder, board_pose
+from rbxcompose.domains.worlds.optics import Intrinsics
+from rbxcompose.manifest.fields import TopicName
+from rbxcompose.msgs import geometry_msgs as geometry
+from rbxcompose.msgs.images import WrongPictureError, grey
+from rbxcompose.msgs.poses import pose_message, transform_message
+from rbxcompose.msgs.sensor_msgs import CameraInfo, Image
+from rbxcompose.msgs.std_msgs import Header, String
+from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.msgs.vision_msgs import (
+    BoundingBox3D,
+    Detection3D,
+    Detection3DArray,
+    ObjectHypothesis,
+    ObjectHypothesisWithPose,
+)
+from rbxcompose.sdk.ports import BULK
+
+if TYPE_CHECKING:
+    from rbxcompose.domains.vision.tags import Numbers
+
+TAG_FAMILIES: TypeAlias = Literal[tuple(FAMILIES)]  # type: ignore[valid-type]
+THICK = 0.001  # of the box that stands for a tag [m]
+SILENCE = 2.0  # [s] without a picture after which diagnostics say so
+FRAME = "tag_"  # begins the frame of a tag with a name
+
+
+class BoardTag(sdk.Config):
+    """A tag of a board, and where it is in the frame of that: x to its right, y up, z out of it."""
+
+    number: int = Field(ge=0)
+    """Its number."""
+    x: sdk.Length = 0.0
+    """Position along x."""
+    y: sdk.Length = 0.0
+    """Position along y."""
+    z: sdk.Length = 0.0
+    """Position along z."""
+    roll: sdk.Angle = 0.0
+    """Rotation about x, then pitch about y and yaw about z."""
+    pitch: sdk.Angle = 0.0
+    """Rotation about y."""
+    yaw: sdk.Angle = 0.0
+    """Rotation about z."""
+
+
+class TagBoard(sdk.Config):
+    """A board: tags that are fixed to each other."""
+
+    tags: list[BoardTag] = Field(min_length=1)
+    """Its tags."""
+
+    @model_validator(mode="after")
+    def _has_each_once(self) -> TagBoard:
+        if len({tag.number for tag in self.tags}) < len(self.tags):
+            raise ValueError("a board has each tag once")
+        return self
+
+    @property
+    def places(self) -> dict[int, Transform3]:
+        """Return where its tags are, by number."""
+        return {
+            tag.number: Transform3((tag.x, tag.y, tag.z), quaternion_from_rpy(tag.roll, tag.pitch, tag.yaw))
+            for tag in self.tags
+        }
+
+
+class TagDetectorConfig(sdk.Config):
+    """Where the pictures come from, and what is known about the tags."""
+
+    image: TopicName = "image_raw"
+    """The topic of the pictures."""
+    info: TopicName = "camera_info"
+    """The topic of the camera's calibration."""
+    frame: str = "camera_optical_frame"
+    """The optical frame of the camera: z is ahead, x to the right of the picture."""
+    family: TAG_FAMILIES = DEFAULT_FAMILY
+    """The family of the tags."""
+    size: sdk.Length | None = Field(None, gt=0)
+    """The side of the black square of a tag; without it, tags have no pose."""
+    names: dict[sdk.Name, Annotated[int, Field(ge=0)]] = {}
+    """Numbers of tags by name."""
+    sizes: dict[sdk.Name, sdk.Length] = {}
+    """Sizes of tags with another `size`, by name."""
+    boards: dict[sdk.Name, TagBoard] = {}
+    """Boards by name."""
+    topic: TopicName = "tags"
+    """Where what is seen is published."""
+
+    @model_validator(mode="after")
+    def _are_told_apart(self) -> TagDetectorConfig:
+        if wrong := self.sizes.keys() - self.names:
+            raise ValueError(f"'sizes' names tags that 'names' does not have: {', '.join(sorted(wrong))}")
+        if len({*self.names.values()}) < len(self.names):
+            raise ValueError("two 'names' have the same number")
+        if wrong := self.names.keys() & self.boards.keys():
+            raise ValueError(f"a tag and a board have the same name: {', '.join(sorted(wrong))}")
+        return self
+
+
+@dataclass(frozen=True)
+class Sight:
+    """A tag or a board that was seen, with its pose in the optical frame if that is known."""
+
+    name: str
+    size: float
+    pose: Transform3 | None
+    covariance: Numbers | None
+    doubt: float = 0.0
+
+
+@sdk.component("tag_detector")
+class TagDetector(sdk.Component[TagDetectorConfig]):
+    """Publishes which tags and boards a camera sees, and where: as detections, and as transforms of those with a name.
+
+    A detection has the name of the tag, or its number; its score falls when the tag might as well be mirrored, as small
+    ones are from afar.
+
+    Example:
+        tags: {type: tag_detector, frame: camera_optical_frame, size: 12 cm, names: {box: 7}}
+    """
+
+    process = "vision"
+    rate = 1.0
+    tf = sdk.Out(TFMessage, "/tf")
+    nearest = sdk.Out(String, "nearest_tag")
+
+    @classmethod
+    def ports(cls, config: TagDetectorConfig) -> dict[str, sdk.Port[Any]]:
+        """Return the ports, with the topics of its camera."""
+        return super().ports(config) | {
+            "image": sdk.In(Image, config.image, qos="bulk", limits=BULK).named("image"),
+            "info": sdk.In(CameraInfo, config.info).named("info"),
+            "seen": sdk.Out(Detection3DArray, config.topic).named("seen"),
+        }
+
+    @classmethod
+    def capabilities(cls, config: TagDetectorConfig) -> tuple[sdk.Capability, ...]:
+        """Declare what it needs, and the frames that it places."""
+        frame = sdk.Setting(config.frame, "frame")
+        frames = [
+            sdk.WritesFrame("tf", frame, sdk.Setting(f"{FRAME}{name}"), needs_parent=True)
+            for name in (*config.names, *config.boards)
+        ]
+        return (sdk.NeedsExtra(sdk.Setting("cv2"), sdk.Setting("vision")), *frames)
+
+    def configure(self) -> None:
+        """Know no camera yet."""
+        config = self.config
+        self.names = {number: name for name, number in config.names.items()}
+        self.sizes = {config.names[name]: size for name, size in config.sizes.items()}
+        self.finder = TagFinder(config.family, config.size, self.sizes)
+        self.boards = {name: board.places for name, board in config.boards.items()}
+        self.camera: Intrinsics | None = None
+        self.problem, self.camera_problem = "", "no camera_info has come"
+        self.seen_at, self.said = self.now, ""
+
+    def on_info(self, message: CameraInfo) -> None:
+        """Know the camera."""
+        try:
+            self.camera, self.camera_problem = Intrinsics.of_message(message), ""
+        except ValueError as error:
+            self.camera, self.camera_problem = None, str(error)
+
+    def on_image(self, message: Image) -> None:
+        """Find the tags of a picture, and publish where they are."""
+        self.seen_at = self.now
+        try:
+            picture = grey(message)
+        except WrongPictureError as error:
+            self.problem = str(error)
+            return
+        camera, self.problem = self.camera, self.camera_problem
+        if camera is not None and (camera.height, camera.width) != picture.shape:
+            size = f"{message.width} x {message.height}"
+            self.problem = f"pictures are {size}, and camera_info is of {camera.width} x {camera.height}"
+            camera = None
+        found = self.finder.find(picture, camera)
+        header = Header(stamp=message.header.stamp, frame_id=message.header.frame_id or self.config.frame)
+        seen = [self.sight(tag) for tag in found]
+        if camera is not None:
+            seen += self.seen_boards(found, camera)
+        self.bound["seen"](Detection3DArray(header, tuple(self.detection(header, one) for one in seen)))
+        transforms = [
+            geometry.TransformStamped(header, f"{FRAME}{one.name}", transform_message(one.pose))
+            for one in seen
+            if one.pose is not None and (one.name in self.boards or one.name in self.config.names)
+        ]
+        if transforms:
+            self.tf(TFMessage(transforms=tuple(transforms)))
+        near = min(((math.hypot(*one.pose.translation), one.name) for one in seen if one.pose), default=(0.0, ""))
+        self.nearest(String(data=near[1]))
+
+    def sight(self, tag: SeenTag) -> Sight:
+        """Return a tag with its name and its size."""
+        name, size = self.names.get(tag.number, str(tag.number)), self.size_of(tag.number) or THICK
+        return Sight(name, size, tag.pose, tag.covariance, tag.doubt)
+
+    def size_of(self, number: int) -> float | None:
+        """Return the side of a tag [m], None if that is not known."""
+        return self.sizes.get(number, self.config.size)
+
+    def seen_boards(self, found: Sequence[SeenTag], camera: Intrinsics) -> list[Sight]:
+        """Return the boards of which tags were found."""
+        sizes = {tag.number: size for tag in found if (size := self.size_of(tag.number)) is not None}
+        seen = []
+        for name, places in self.boards.items():
+            placed = board_pose([tag for tag in found if tag.number in sizes], places, sizes, camera)
+            if placed is not None:
+                seen.append(Sight(name, THICK, *placed))
+        return seen
+
+    def detection(self, header: Header, one: Sight) -> Detection3D:
+        """Return what was seen as a message; without a pose, its score is 0."""
+        pose = geometry.PoseWithCovariance()
+        box = BoundingBox3D()
+        if one.pose is not None and one.covariance is not None:
+            pose = geometry.PoseWithCovariance(pose_message(one.pose), one.covariance.ravel())
+            box = BoundingBox3D(pose.pose, geometry.Vector3(one.size, one.size, THICK))
+        score = 0.0 if one.pose is None else 1.0 - one.doubt
+        result = ObjectHypothesisWithPose(ObjectHypothesis(class_id=one.name, score=score), pose)
+        return Detection3D(header, (result,), box, one.name)
+
+    def step(self, dt: float) -> None:
+        """Report whether pictures come, and whether they can be used."""
+        silent = self.now - self.seen_at
+        problem = f"no picture for {silent:.0f} s" if silent > SILENCE else self.problem
+        if problem and problem != self.said:
+            self.warn(problem)
+        self.said = problem
+        self.status(Level.ERROR if problem else Level.OK, problem or "pictures come")

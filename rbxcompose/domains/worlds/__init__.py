@@ -1,0 +1,1 @@
+"""Worlds: what stands around a simulated robot, what its rays hit and where it touches."""

@@ -1,0 +1,1 @@
+"""What is in a simulated world, and what sees it."""

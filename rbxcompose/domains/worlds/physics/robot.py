@@ -1,0 +1,224 @@
+"""What a robot is to a physics engine: its body, which wheels drive it, and how its joints are held."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import field
+from pathlib import Path
+
+import numpy as np
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Span
+from rbxcompose.base.geometry import Transform3, Vector3, rotate
+from rbxcompose.domains.body.model import Body, BodyLink, Geometry, Shape
+from rbxcompose.domains.worlds.physics.rigid import RigidPart
+from rbxcompose.domains.worlds.physics.solids import Points, apply
+
+FOOTPRINT = "base_footprint"
+LEVEL = 5e-3  # what ends within this above the lowest point of a robot reaches the ground, too [m]
+STEADY = 0.01  # so far the centre of mass is within what carries the robot [m]
+DIRECTIONS = 32  # in which that is tried
+
+
+@dataclass(frozen=True, slots=True)
+class PhysicsServo:
+    """How a joint is held at its target. What is None follows from the URDF and from what the joint moves."""
+
+    effort: float | None = None
+    """Greatest torque [Nm] or force [N]. Default: the effort of the URDF."""
+    stiffness: float | None = None
+    """Torque for each radian that is missing [Nm/rad], or force for each metre. Default: all of it at 3 deg or 3 mm."""
+    damping: float | None = None
+    """Torque against the velocity [Nm s/rad, N s/m]. Default: critical for the inertia at rest."""
+    speed: float | None = None
+    """How fast the set point moves to a target [rad/s, m/s]. Default: the velocity of the URDF; 0 is at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class PhysicsWheels:
+    """The joints of the wheels that drive, by side."""
+
+    left: tuple[str, ...]
+    right: tuple[str, ...]
+    radius: float
+    """From the axle to the ground [m]."""
+    distance: float
+    """Between the middles of the left and the right wheels [m]."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return all of their joints."""
+        return (*self.left, *self.right)
+
+
+@dataclass(frozen=True)
+class PhysicsRobot:
+    """A body with what its URDF does not say."""
+
+    body: Body
+    meshes: Mapping[str, Path] = field(default_factory=dict)
+    """The file of each mesh, by its name in the URDF."""
+    drives: bool | None = None
+    """Whether it moves freely on wheels; else it is fixed to the ground. Default: whether wheels are found."""
+    left_wheels: tuple[str, ...] = ()
+    """The joints that drive at its left. Default: see `find_wheels`."""
+    right_wheels: tuple[str, ...] = ()
+    """The joints that drive at its right."""
+    wheel_radius: float = 0.035
+    """Of the wheels that are added if the body has none [m]."""
+    wheel_distance: float = 0.23
+    """Between the middles of the wheels that are added [m]."""
+    base: str = ""
+    """The link that is put at the start. Default: `base_footprint`, or the root."""
+    servos: Mapping[str, PhysicsServo] = field(default_factory=dict)
+    """How joints are held; one that is not named is held by its URDF."""
+    unheld: frozenset[str] = frozenset()
+    """Joints that nothing holds. Those that carry unpowered wheels are found without."""
+    positions: Mapping[str, float] = field(default_factory=dict)
+    """Of joints at the start [rad or m]. Default: at rest."""
+    ignored: Sequence[tuple[str, str]] = ()
+    """Pairs of links that never touch each other."""
+
+    @property
+    def base_link(self) -> str:
+        """Return the link that is put at the start."""
+        return self.base or (FOOTPRINT if FOOTPRINT in self.body.links else self.body.own_root)
+
+
+def outline_body(radius: float, height: float) -> Body:
+    """Return the body of a robot of which only the outline is known: a cylinder 1 cm above the ground."""
+    span = Span("", 1, 1, 1, 1)
+    length = max(height - 0.01, 0.01)
+    shape = Shape(Geometry("cylinder", (radius, length)), Transform3((0.0, 0.0, 0.01 + length / 2)), span)
+    return Body("robot", {FOOTPRINT: BodyLink(FOOTPRINT, span, None, (shape,), (shape,))})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedParts:
+    """Rigid parts, and where each is in the frame of the base while all joints are where they start."""
+
+    parts: Sequence[RigidPart]
+    poses: Sequence[Transform3]
+
+    @property
+    def lowest(self) -> float:
+        """Return the height of the lowest point of a shape [m]; 0 if there are no shapes."""
+        return min((self.lowest_of(index) for index in range(len(self.parts)) if self.parts[index].shapes), default=0.0)
+
+    def lowest_of(self, index: int) -> float:
+        """Return the height of the lowest point of a part [m], inf without shapes."""
+        return float(min((points[:, 2].min() for points in self.points_of(index)), default=math.inf))
+
+    def points_of(self, index: int) -> list[Points]:
+        """Return the outermost points of each shape of a part in the frame of the base (n, 3) [m]."""
+        pose = self.poses[index]
+        return [apply(pose.compose(at), solid.points) for _, solid, at in self.parts[index].shapes]
+
+    @property
+    def centre(self) -> Points:
+        """Return the centre of all mass in the frame of the base (3,) [m]."""
+        masses = np.array([part.mass for part in self.parts])
+        centres = [apply(pose, part.centre[None])[0] for part, pose in zip(self.parts, self.poses, strict=True)]
+        return np.asarray(masses @ np.array(centres) / masses.sum())
+
+    def axis_of(self, index: int) -> Vector3:
+        """Return the axis of the joint of a part in the frame of the base."""
+        joint = self.parts[index].joint
+        return rotate(self.poses[index].rotation, joint.axis) if joint else (0.0, 0.0, 0.0)
+
+
+def placed_parts(robot: PhysicsRobot, parts: Sequence[RigidPart]) -> PlacedParts:
+    """Return parts with their places at the start.
+
+    Raises:
+        ValueError: if the base is no link.
+    """
+    if robot.base_link not in robot.body.links:
+        raise ValueError(f"'{robot.base_link}' is no link of '{robot.body.name}'")
+    poses = [Transform3()]
+    for part, joint in ((part, part.joint) for part in parts if part.joint is not None):
+        moved = joint.origin.inverse().compose(joint.at(robot.body.position(joint, robot.positions)))
+        poses.append(poses[part.parent].compose(part.origin).compose(moved))
+    base = next(
+        pose.compose(part.links[robot.base_link])
+        for part, pose in zip(parts, poses, strict=True)
+        if robot.base_link in part.links
+    ).inverse()
+    return PlacedParts(parts, [base.compose(pose) for pose in poses])
+
+
+def find_wheels(robot: PhysicsRobot, placed: PlacedParts) -> PhysicsWheels | None:
+    """Return the wheels that the robot names, or those that its body shows, or None.
+
+    A wheel hangs on the base, or on its suspension, by a continuous joint whose axis points left or right; it reaches
+    the ground, and is at one side. Without one at each side there are none.
+
+    Raises:
+        ValueError: if a wheel that the robot names is no joint that turns.
+    """
+    named = (*robot.left_wheels, *robot.right_wheels)
+    ground = placed.lowest
+    found: dict[str, tuple[Vector3, float]] = {}
+    for index, part in enumerate(placed.parts):
+        joint = part.joint
+        if joint is None or joint.kind not in ("continuous", "revolute"):
+            continue
+        x, y, z = placed.poses[index].translation
+        middles = [points.mean(0) for points in placed.points_of(index)]
+        centre = tuple(np.mean(middles, 0).tolist()) if middles else (x, y, z)
+        shows = (
+            joint.kind == "continuous"
+            and joint.mimic is None
+            and _is_on_base(placed.parts, part)
+            and abs(placed.axis_of(index)[1]) > 0.9
+            and placed.lowest_of(index) < ground + LEVEL
+            and abs(centre[1]) > LEVEL
+        )
+        if joint.name in named or (shows and not named):
+            found[joint.name] = (x, centre[1], z), z - min(placed.lowest_of(index), ground + LEVEL)
+    if missing := [name for name in named if name not in found]:
+        raise ValueError(f"'{missing[0]}' is no joint that turns a wheel")
+    left = robot.left_wheels or tuple(name for name, (at, _) in found.items() if at[1] > 0)
+    right = robot.right_wheels or tuple(name for name, (at, _) in found.items() if at[1] < 0)
+    if not (left and right):
+        return None
+    sides = [float(np.mean([found[name][0][1] for name in side])) for side in (left, right)]
+    radius = float(np.mean([found[name][1] for name in (*left, *right)]))
+    return PhysicsWheels(left, right, radius, sides[0] - sides[1])
+
+
+def _is_on_base(parts: Sequence[RigidPart], part: RigidPart) -> bool:
+    """Return whether a part hangs on the base, or on a suspension that slides on the base."""
+    carrier = parts[part.parent]
+    return part.parent == 0 or (carrier.parent == 0 and carrier.joint is not None and carrier.joint.slides)
+
+
+def is_steady(placed: PlacedParts, ground: float) -> bool:
+    """Return whether what reaches the ground carries the centre of mass: it lies well within their convex hull."""
+    points = np.concatenate([points for index in range(len(placed.parts)) for points in placed.points_of(index)])
+    carrying = points[points[:, 2] < ground + LEVEL / 2, :2] - placed.centre[:2]
+    turn = np.arange(DIRECTIONS) * (math.tau / DIRECTIONS)
+    return bool(carrying.size) and bool(
+        ((np.stack((np.cos(turn), np.sin(turn)), -1) @ carrying.T).max(1) > STEADY).all()
+    )
+
+
+def is_tyre(placed: PlacedParts, index: int, ground: float) -> bool:
+    """Return whether a part turns without end about a horizontal axis and reaches the ground itself."""
+    joint = placed.parts[index].joint
+    level = abs(placed.axis_of(index)[2]) < 0.1
+    return joint is not None and joint.kind == "continuous" and level and placed.lowest_of(index) < ground + LEVEL
+
+
+def rolls_freely(placed: PlacedParts, index: int, ground: float) -> bool:
+    """Return whether a part hangs on a continuous joint and reaches the ground, itself or by what it carries."""
+    joint = placed.parts[index].joint
+    if joint is None or joint.kind != "continuous" or joint.mimic is not None:
+        return False
+    carried = {index}
+    for other in range(index + 1, len(placed.parts)):
+        if placed.parts[other].parent in carried:
+            carried.add(other)
+    return min(map(placed.lowest_of, carried)) < ground + LEVEL

@@ -1,0 +1,262 @@
+"""What a camera sees of a world: its things as flat faces, and these as colours and depths."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.worlds.grid_map import GridMap
+from rbxcompose.domains.worlds.optics import Intrinsics
+from rbxcompose.domains.worlds.physics.conversion import WALL
+from rbxcompose.domains.worlds.physics.looks import WALLS, colour_of
+from rbxcompose.domains.worlds.physics.solids import rotation_matrix
+from rbxcompose.domains.worlds.physics.walls import wall_rectangles
+from rbxcompose.domains.worlds.shapes import WorldBox, WorldCylinder, WorldHull, WorldLight, WorldMesh, WorldShape
+from rbxcompose.domains.worlds.world import SimulatedWorld
+
+Numbers = NDArray[np.float64]
+Colours = NDArray[np.uint8]
+Depths = NDArray[np.float32]
+NEAR = 0.02  # nothing is seen nearer than this [m]
+FRACTION = 4  # bits of a fraction of a pixel in outlines
+SKY, GROUND, HOLE = (200, 215, 230), (0.49, 0.46, 0.43), (0.08, 0.08, 0.08)
+DARKEST = 0.5  # of a face on which no light falls; without lamps, light comes from the camera
+FLOOR = 100.0  # half the side of the ground [m]
+ROUND = 24  # sides of a cylinder
+_CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (0.0, 1.0)])
+BOX_SIDES: Mapping[str, tuple[int, int, int, int]] = {
+    "front": (5, 4, 6, 7),
+    "back": (3, 2, 0, 1),
+    "left": (7, 6, 2, 3),
+    "right": (1, 0, 4, 5),
+    "top": (7, 3, 1, 5),
+    "bottom": (6, 4, 0, 2),
+}
+"""The corners of each side of a box that looks along x: for who looks at it, from the top left one on to the left."""
+_SIDES = np.array(list(BOX_SIDES.values()))
+
+
+@dataclass(frozen=True, eq=False)
+class WorldFaces:
+    """Flat quads, seen from one side; a triangle repeats a corner."""
+
+    corners: Numbers
+    """In `map` (n, 4, 3) [m]; who sees a face sees them turn left."""
+    colours: Colours
+    """Red, green and blue of each (n, 3)."""
+    things: NDArray[np.int32]
+    """Which shape of the world each belongs to (n,), in their order; -1 for walls and the ground."""
+
+    @classmethod
+    def joined(cls, parts: Sequence[WorldFaces]) -> WorldFaces:
+        """Return the faces of several."""
+        return cls(
+            np.concatenate([part.corners for part in parts]),
+            np.concatenate([part.colours for part in parts]),
+            np.concatenate([part.things for part in parts]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class CameraView:
+    """What a camera sees, row by row from the upper left."""
+
+    colours: Colours
+    """Red, green and blue (h, w, 3)."""
+    depths: Depths
+    """Along the optical axis (h, w) [m]; inf where nothing is."""
+    things: NDArray[np.int32]
+    """Which shape of the world each pixel shows (h, w); -1 where it is none."""
+
+
+class WorldView:
+    """A world for cameras: what stands still becomes faces once."""
+
+    def __init__(self, world: SimulatedWorld) -> None:
+        self._world = world
+        self._numbers = {shape.name: number for number, shape in enumerate(world.shapes)}
+        still = [shape for shape in world.shapes if shape.path is None]
+        parts = [_ground(world), _walls(world.grid), *(self._faces_of(shape) for shape in still)]
+        self._still = WorldFaces.joined(parts)
+
+    def seen(
+        self, pose: Transform3, camera: Intrinsics, time: float, most: float, robots: Sequence[WorldShape] = ()
+    ) -> CameraView:
+        """Return what a camera at `pose`, of its optical frame in `map`, sees at a time [s] up to `most` [m] away.
+
+        Distortion is left out. Other `robots` are where they are given.
+        """
+        moving = [self._faces_of(shape.at(time)) for shape in self._world.shapes if shape.path is not None]
+        moving += [_painted(_corners_of(robot), colour_of("")[:3]) for robot in robots]
+        return draw(WorldFaces.joined([self._still, *moving]), pose, camera, most, self._world.lights)
+
+    def _faces_of(self, shape: WorldShape) -> WorldFaces:
+        number = self._numbers[shape.name]
+        colours = self._world.colours
+        red, green, blue, _ = colour_of(colours[number] if colours else "")
+        return _painted(_corners_of(shape), (red, green, blue), number)
+
+
+def _painted(corners: Numbers, colour: Sequence[float], thing: int = -1) -> WorldFaces:
+    """Return faces of one colour, from 0 to 1."""
+    count = len(corners)
+    colours = np.tile(np.round(np.array(colour) * 255).astype(np.uint8), (count, 1))
+    return WorldFaces(corners, colours, np.full(count, thing, np.int32))
+
+
+def _ground(world: SimulatedWorld) -> WorldFaces:
+    """Return the ground, and holes just above it."""
+    x, y = world.start.x, world.start.y
+    whole = [(x + a * FLOOR, y + b * FLOOR, 0.0) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
+    parts = [_painted(np.array([whole]), GROUND)]
+    for hole in world.holes:
+        edge = np.array([(*corner, 1e-3) for corner in hole.corners], float)
+        fan = [(edge[0], edge[i], edge[i + 1], edge[i + 1]) for i in range(1, len(edge) - 1)]
+        parts += [_painted(np.array(way), HOLE) for way in (fan, [each[::-1] for each in fan])]
+    return WorldFaces.joined(parts)
+
+
+def _walls(grid: GridMap) -> WorldFaces:
+    """Return the sides of what is occupied in a map."""
+    rectangles = wall_rectangles(grid)
+    low, high = rectangles[:, :2] * grid.resolution, rectangles[:, 2:] * grid.resolution
+    sizes = np.column_stack((high - low, np.full(len(low), WALL)))
+    middles = np.column_stack(((low + high) / 2, np.zeros(len(low))))
+    corners = (middles[:, None] + _CORNERS * sizes[:, None])[:, _SIDES].reshape(-1, 4, 3)
+    return _painted(_turned(corners, grid.origin.x, grid.origin.y, grid.origin.heading), WALLS)
+
+
+def _corners_of(shape: WorldShape) -> Numbers:
+    """Return the faces of a shape in `map` (n, 4, 3) [m]."""
+    corners: Numbers
+    match shape.solid:
+        case WorldBox(size=size):
+            corners = (_CORNERS * size)[_SIDES]
+        case WorldCylinder(radius=radius, height=height):
+            angles = np.arange(ROUND + 1) * (math.tau / ROUND)
+            rim = np.column_stack((np.cos(angles), np.sin(angles))) * radius
+            low, high = (np.column_stack((rim, np.full(len(rim), z))) for z in (0.0, height))
+            sides = np.stack((high[:-1], low[:-1], low[1:], high[1:]), 1)
+            middle = np.broadcast_to((0.0, 0.0, height), (ROUND // 2, 3))
+            top = np.stack((middle, high[:-2:2], high[1:-1:2], high[2::2]), 1)
+            corners = np.concatenate((sides, top))
+        case WorldHull(corners=points, triangles=triangles):
+            corners = np.array(points)[np.array(triangles)[:, (0, 1, 2, 2)]]
+        case WorldMesh():
+            return np.concatenate([_corners_of(part) for part in shape.convex])
+    return _turned(corners, shape.pose.x, shape.pose.y, shape.pose.heading, shape.z)
+
+
+def _turned(corners: Numbers, x: float, y: float, heading: float, z: float = 0.0) -> Numbers:
+    cos, sin = math.cos(heading), math.sin(heading)
+    return np.asarray(corners @ np.array([(cos, sin, 0), (-sin, cos, 0), (0, 0, 1)]) + (x, y, z))
+
+
+def draw(
+    faces: WorldFaces, pose: Transform3, camera: Intrinsics, most: float, lights: Sequence[WorldLight] = ()
+) -> CameraView:
+    """Return what a camera at `pose`, of its optical frame in `map`, sees of faces up to `most` [m] away.
+
+    Of a flat face, 1 / depth is linear in the pixels of a picture; each pixel shows the face where that is greatest.
+    """
+    height, width = camera.height, camera.width
+    turn = rotation_matrix(pose.rotation)
+    points = (faces.corners - np.array(pose.translation)) @ turn
+    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    offsets = np.einsum("ij,ij->i", normals, points[:, 0])
+    nearness = np.full((height, width), 1.0 / most, np.float32)
+    shown = np.full((height, width), -1, np.int32)
+    for index in _may_be_seen(points, offsets, camera).tolist():
+        outline = points[index] if points[index][:, 2].min() >= NEAR else _ahead(points[index])
+        pixels = outline[:, :2] / outline[:, 2:] * (camera.fx, camera.fy) + (camera.cx, camera.cy)
+        left, top = np.clip(np.floor(pixels.min(0)), 0, (width, height)).astype(int).tolist()
+        right, bottom = np.clip(np.ceil(pixels.max(0)) + 1, 0, (width, height)).astype(int).tolist()
+        if left >= right or top >= bottom:
+            continue
+        inside = np.zeros((bottom - top, right - left), np.uint8)
+        drawn = np.clip(np.round((pixels - (left, top)) * (1 << FRACTION)), -(1 << 24), 1 << 24)
+        cv2.fillConvexPoly(inside, drawn.astype(np.int32), 1, cv2.LINE_8, FRACTION)
+        a, b, c = normals[index] / offsets[index]
+        across = ((np.arange(left, right) - camera.cx) * (a / camera.fx) + c).astype(np.float32)
+        down = ((np.arange(top, bottom) - camera.cy) * (b / camera.fy)).astype(np.float32)
+        near = across[None, :] + down[:, None]
+        place = np.s_[top:bottom, left:right]
+        wins = inside.view(bool)
+        wins &= near > nearness[place]
+        np.copyto(nearness[place], near, where=wins)
+        np.copyto(shown[place], index, where=wins)
+    depths = np.where(shown >= 0, 1.0 / nearness, np.float32(math.inf))
+    bright = np.full((len(points), 3), DARKEST)
+    for lamp in lights:
+        at = (np.array(lamp.at) - pose.translation) @ turn
+        bright += _facing(points - at, normals)[:, None] * lamp.strength * colour_of(lamp.colour or "white")[:3]
+    if not lights:
+        bright += (1 - DARKEST) * _facing(points, normals)[:, None]
+    return CameraView(_coloured(faces, bright, shown), depths, np.append(faces.things, -1)[shown])
+
+
+def _may_be_seen(points: Numbers, offsets: Numbers, camera: Intrinsics) -> NDArray[np.intp]:
+    """Return which faces look at a camera and are not wholly behind it, or beside its picture."""
+    sides = np.array(
+        [
+            (camera.fx, 0, camera.cx + 0.5),
+            (-camera.fx, 0, camera.width - camera.cx - 0.5),
+            (0, camera.fy, camera.cy + 0.5),
+            (0, -camera.fy, camera.height - camera.cy - 0.5),
+        ]
+    )
+    is_beside = ((points @ sides.T).max(1) <= 0).any(1)
+    return np.flatnonzero((offsets < 0) & (points[:, :, 2].max(1) > NEAR) & ~is_beside)
+
+
+def _ahead(outline: Numbers) -> Numbers:
+    """Return the part of a polygon (n, 3) that is before the camera; some of it is."""
+    found = []
+    for before, here in zip(np.roll(outline, 1, 0), outline, strict=True):
+        if (before[2] < NEAR) != (here[2] < NEAR):
+            found.append(before + (NEAR - before[2]) / (here[2] - before[2]) * (here - before))
+        if here[2] >= NEAR:
+            found.append(here)
+    return np.array(found)
+
+
+def _facing(points: Numbers, normals: Numbers) -> Numbers:
+    """Return the cosine of the angle between the normal of each face and its direction to the origin (n,), 0 from
+    behind: how bright light from there makes it."""
+    middles = points.mean(1)
+    lengths = np.linalg.norm(middles, axis=1) * np.linalg.norm(normals, axis=1)
+    return np.asarray(np.maximum(0.0, -np.einsum("ij,ij->i", middles, normals) / np.maximum(lengths, 1e-12)))
+
+
+def _coloured(faces: WorldFaces, bright: Numbers, shown: NDArray[np.int32]) -> Colours:
+    """Return the colour of each pixel (h, w, 3), by the face that it shows and how bright each face is (n, 3)."""
+    palette = np.zeros((len(bright) + 1, 4), np.uint8)  # as whole numbers, which are looked up at once
+    palette[:-1, :3] = faces.colours * np.minimum(bright, 1.0)
+    palette[-1, :3] = SKY
+    found = np.take(palette.view(np.uint32).ravel(), shown, mode="wrap").view(np.uint8)
+    return np.asarray(cv2.cvtColor(found.reshape(*shown.shape, 4), cv2.COLOR_BGRA2BGR), np.uint8)
+
+
+class Lens:
+    """Bends pictures as a camera with distortion does."""
+
+    def __init__(self, camera: Intrinsics) -> None:
+        self.camera = camera
+        straight = camera.unbent
+        x, y = (np.ascontiguousarray(camera.rays[:, :, axis], np.float32) for axis in (0, 1))
+        places = x * np.float32(straight.fx) + straight.cx, y * np.float32(straight.fy) + straight.cy
+        self._map = None if straight is camera else tuple(each.astype(np.float32) for each in places)
+
+    def bent(self, colours: Colours, depths: Depths) -> tuple[Colours, Depths]:
+        """Return the picture and the depths of a camera, which were drawn for `camera.unbent`."""
+        if self._map is None:
+            return colours, depths
+        columns, rows = self._map
+        bent = cv2.remap(colours, columns, rows, cv2.INTER_LINEAR)
+        return np.asarray(bent, np.uint8), depths[np.rint(rows).astype(np.intp), np.rint(columns).astype(np.intp)]

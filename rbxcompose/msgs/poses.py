@@ -1,0 +1,28 @@
+"""Poses and transforms in messages."""
+
+from __future__ import annotations
+
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.msgs.geometry_msgs import Point, Pose, Quaternion, Transform, Vector3
+
+
+def pose_of(message: Pose) -> Transform3:
+    """Return a pose."""
+    at, turn = message.position, message.orientation
+    return Transform3((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
+
+
+def pose_message(pose: Transform3) -> Pose:
+    """Return a pose as a message."""
+    return Pose(Point(*pose.translation), Quaternion(*pose.rotation))
+
+
+def transform_of(message: Transform) -> Transform3:
+    """Return a transform."""
+    at, turn = message.translation, message.rotation
+    return Transform3((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
+
+
+def transform_message(pose: Transform3) -> Transform:
+    """Return a transform as a message."""
+    return Transform(Vector3(*pose.translation), Quaternion(*pose.rotation))

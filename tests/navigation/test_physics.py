@@ -1,0 +1,83 @@
+"""Robots that a physics engine moves through worlds, in virtual time."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.msgs.geometry_msgs import Twist, Vector3
+from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.rbxcompose_msgs import Switches
+from rbxcompose.msgs.sensor_msgs import LaserScan
+from rbxcompose.msgs.std_msgs import String
+from rbxcompose.sdk.ports import Qos
+from rbxcompose.testing import Bench
+from rbxcompose.testing.bench import run_robot
+from tests.navigation.test_robot import Room
+
+pytestmark = pytest.mark.timeout(120)
+mujoco = pytest.importorskip("mujoco", reason="mujoco is not installed")
+
+ROBOT = """body: {urdf: rbx:robots/turtlebot/turtlebot.urdf}
+world: ../../room.yaml
+simulator: physics
+components:
+  base: {type: diff_drive_sim}
+  laser: {type: laser_sim, frame: base_link}
+"""
+CRATE = """rbx: 1
+kind: World
+name: room
+objects:
+  crate: {box: [30 cm, 60 cm, 40 cm], at: {x: 1 m}, mass: MASS}
+"""
+
+
+def pushed(folder: Path, mass: str) -> tuple[float, float, list[str]]:
+    """Return how far a robot that pushes a crate gets [m], how far ahead its laser sees that, and what it touched."""
+    bench = Room(folder, ROBOT, CRATE.replace("MASS", mass)).bench
+    truth, scans = bench.collect("/ground_truth", Odometry), bench.collect("/scan", LaserScan)
+    touched = bench.collect("/contact", String, Qos.EVENT)
+    for _ in range(60):
+        bench.publish("/cmd_vel", Twist(linear=Vector3(x=0.3)), Qos.COMMAND)
+        bench.advance(0.1)
+    ahead = float(np.asarray(scans[-1].ranges)[len(scans[-1].ranges) // 2])
+    return truth[-1].pose.pose.position.x, ahead, [message.data for message in touched]
+
+
+def test_a_robot_pushes_what_is_light_and_stalls_before_what_stands_fast(tmp_path: Path) -> None:
+    light, seen, touched = pushed(tmp_path, "1 kg")
+    fast, _, _ = pushed(tmp_path, "0 kg")
+    assert light > 1.2
+    assert seen < 0.4  # its laser sees the crate where it is now
+    assert fast < 0.85
+    assert touched[0] == "crate"
+
+
+def test_a_kobuki_bumps_backs_off_and_goes_on(repository: Path) -> None:
+    sets = ("simulator=physics",)
+    plan = compile_robot("robots/kobuki", sets=sets, environment={}).plan
+    assert plan is not None
+    bench = Bench(plan=plan)
+    bumps, drops = bench.collect("/bumper", Switches), bench.collect("/wheel_drop", Switches)
+    driven = bench.collect("/ground_truth", Odometry)
+    bench.advance(60.0)
+    pressed = [any(message.is_on) for message in bumps]
+    began = sum(now and not before for before, now in pairwise(pressed))
+    assert began >= 3
+    assert not any(any(message.is_on) for message in drops)
+    ahead = [message.twist.twist.linear.x for message in driven]
+    assert min(ahead) < -0.05
+    assert max(ahead[-len(ahead) // 4 :]) > 0.1
+
+
+def test_the_house_is_cleaned_without_a_touch(repository: Path) -> None:
+    plan = compile_robot("robots/house", sets=("simulator=physics",), environment={}).plan
+    assert plan is not None
+    ran = run_robot(plan)
+    assert ran.outcome == "success"
+    assert ran.bench.component("physics").summary() == {"contacts": "0"}

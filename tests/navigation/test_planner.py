@@ -1,0 +1,73 @@
+"""Ways through a map."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from rbxcompose.base.geometry import Pose2
+from rbxcompose.domains.navigation import planner
+from rbxcompose.domains.navigation.costs import CostSettings, LayeredCosts
+from rbxcompose.domains.navigation.planner import NoPathError, plan
+from tests.navigation.houses import HOUSE, ONE_WALL, SIDE, room
+
+SETTINGS = CostSettings(radius=0.2, inflation=0.5)
+COSTS = LayeredCosts(HOUSE, SETTINGS)
+PLACES = st.builds(Pose2, st.floats(-3.2, 3.2), st.floats(-3.2, 3.2), st.floats(-math.pi, math.pi))
+
+
+def test_a_way_leads_around_a_wall_and_ends_as_the_goal_does() -> None:
+    goal = Pose2(2.0, 0.3, 1.0)
+    found = plan(LayeredCosts(ONE_WALL, SETTINGS), Pose2(-2.0, 0.0), goal, 0.1)
+    assert found.poses[-1].distance(goal) < 1e-9
+    assert found.poses[-1].heading == goal.heading
+    assert (found.poses[0].x, found.poses[0].y) == (-2.0, 0.0)
+    assert max(abs(pose.y) for pose in found.poses) > 1.8
+    shortest = math.dist((-2, 0), (0, 1.8)) + math.dist((0, 1.8), (2, 0.3))
+    assert shortest < found.length < 1.15 * shortest
+
+
+def test_in_the_open_it_is_straight() -> None:
+    found = plan(LayeredCosts(room(), SETTINGS), Pose2(-2.0, -1.0), Pose2(2.0, 1.3), 0.1)
+    assert found.length == pytest.approx(math.hypot(4.0, 2.3), abs=0.02)
+
+
+@given(PLACES, PLACES)
+@settings(max_examples=40, deadline=None)
+def test_no_pose_of_a_way_is_blocked_and_poses_are_close(start: Pose2, goal: Pose2) -> None:
+    assume(not COSTS.is_blocked(start.x, start.y) and not COSTS.is_blocked(goal.x, goal.y))
+    found = plan(COSTS, start, goal, 0.1)
+    assert not any(COSTS.is_blocked(pose.x, pose.y) for pose in found.poses)
+    assert all(before.distance(after) < 2 * SIDE for before, after in pairwise(found.poses))
+
+
+def test_a_goal_that_cannot_be_reached_says_why_and_how_near() -> None:
+    costs = LayeredCosts(room((1.0, -3, 1.2, 3)), SETTINGS)
+    with pytest.raises(NoPathError, match="no way leads to the goal") as trouble:
+        plan(costs, Pose2(), Pose2(2.0, 0.0), 0.1)
+    assert trouble.value.nearest == pytest.approx(1.3, abs=0.1)
+    with pytest.raises(NoPathError, match="an obstacle is at the goal"):
+        plan(costs, Pose2(), Pose2(1.1, 0.0), 0.1)
+    with pytest.raises(NoPathError, match="outside of the map") as outside:
+        plan(costs, Pose2(), Pose2(9.0, 0.0), 0.1)
+    assert outside.value.is_final
+
+
+def test_a_goal_in_an_obstacle_is_reached_within_the_tolerance() -> None:
+    found = plan(LayeredCosts(ONE_WALL, SETTINGS), Pose2(-2.0, 0.0), Pose2(-0.2, 0.0), 0.3)
+    assert 0 < found.poses[-1].distance(Pose2(-0.2, 0.0)) <= 0.3
+
+
+def test_a_robot_that_touches_something_may_leave_it() -> None:
+    assert plan(LayeredCosts(ONE_WALL, SETTINGS), Pose2(-0.2, 0.0), Pose2(-2.0, 0.0), 0.1).length > 1.7
+
+
+def test_a_large_map_is_searched_roughly_first_with_the_same_result(monkeypatch: pytest.MonkeyPatch) -> None:
+    start, goal = Pose2(-3.0, -3.0), Pose2(3.0, 3.0)
+    exact = plan(COSTS, start, goal, 0.1)
+    monkeypatch.setattr(planner, "LARGE", 1)
+    assert plan(COSTS, start, goal, 0.1).length < 1.05 * exact.length

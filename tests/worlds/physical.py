@@ -1,0 +1,68 @@
+"""Shipped robots and worlds for tests of the physics engine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.base.findings import Report, Span
+from rbxcompose.base.geometry import Pose2
+from rbxcompose.domains.body.description import Description
+from rbxcompose.domains.body.sections.body import body
+from rbxcompose.domains.body.urdf import read_text
+from rbxcompose.domains.worlds.outline import outline_of
+from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, outline_body
+from rbxcompose.domains.worlds.shapes import WorldShape
+from rbxcompose.domains.worlds.world import NO_WALLS, SimulatedWorld
+from rbxcompose.domains.worlds.world_file import read_world
+from rbxcompose.manifest.documents import Documents
+from tests.shipped import compiled
+
+pytest.importorskip("mujoco")
+
+ROOT = Path(__file__).parents[2]
+STEP = 0.02
+ORIGIN = Pose2()
+
+
+@cache
+def description(name: str) -> Description | None:
+    """Return what a shipped robot says about its body."""
+    robot = compiled(f"robots/{name}", environment={}).robot
+    assert robot is not None
+    return robot.manifest.contents.of(body)
+
+
+def shipped(name: str, **options: object) -> PhysicsRobot:
+    """Return a shipped robot; one without a body has an outline only."""
+    found = description(name)
+    if found is None:
+        return PhysicsRobot(outline_body(0.2, 0.5), drives=True)
+    return PhysicsRobot(found.body, found.meshes, **options)  # type: ignore[arg-type]
+
+
+def from_urdf(links_and_joints: str, **options: object) -> PhysicsRobot:
+    found, mistakes = read_text(f'<robot name="test">{links_and_joints}</robot>')
+    assert not mistakes
+    return PhysicsRobot(found, **options)  # type: ignore[arg-type]
+
+
+def empty(robot: PhysicsRobot, *shapes: WorldShape, start: Pose2 = ORIGIN) -> SimulatedWorld:
+    return SimulatedWorld("empty", NO_WALLS, shapes, start, *outline_of(robot.body))
+
+
+@cache
+def shipped_world(name: str, start: Pose2) -> SimulatedWorld:
+    """Return a world that ships with a robot of 20 cm at a pose."""
+    span = Span("", 1, 1, 1, 1)
+    file = read_world(ROOT / f"worlds/{name}.yaml", Documents(Report(), {}), span)
+    assert file is not None
+    shapes = tuple(model.placed(name) for name, model in file.objects.items())
+    return SimulatedWorld(name, file.grid, shapes, start, 0.2, 0.5)
+
+
+def shipped_robots() -> Iterable[str]:
+    return sorted(file.parent.name for file in ROOT.glob("robots/*/robot.yaml"))
