@@ -32,6 +32,11 @@ _RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 
 _PRIORITIES = {"high": "interactive_high", "medium": "data", "low": "background"}
 _TAKEN = ("os error 98", "Unable to acquire lock")  # what Zenoh says of an endpoint in use
 _session_numbers = itertools.count()
+_routers: list[zenoh.Session] = []
+"""Every router that this process has opened, also when it is closed.
+
+Freeing its session waits, with Python's lock held, for a task of Zenoh's threads, and these may wait for that lock.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,7 +220,9 @@ def open_router(endpoint: str, link: RouterLink = NO_LINK) -> zenoh.Session:
         OSError: if `endpoint` is taken.
     """
     try:
-        return _opened(router_settings(endpoint, link), _THREADS_WITH_LINKS if link.listen or link.connect else THREADS)
+        threads = _THREADS_WITH_LINKS if link.listen or link.connect else THREADS
+        _routers.append(session := _opened(router_settings(endpoint, link), threads))
+        return session
     except zenoh.ZError as error:
         if not any(cause in str(error) for cause in _TAKEN):
             raise
