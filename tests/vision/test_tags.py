@@ -13,7 +13,8 @@ from rbxcompose.base.geometry import Transform3, conjugate, multiply
 from tests.vision.tagged import CAMERA, facing, picture
 
 pytest.importorskip("cv2", reason="OpenCV is not installed")
-from rbxcompose.domains.vision.tags import FAMILIES, TagFinder, board_pose, tag_picture
+from rbxcompose.domains.vision.tags import TagFinder, board_pose
+from rbxcompose.domains.worlds.tag_pictures import FAMILIES, tag_picture
 
 SIZE = 0.15
 FINDER = TagFinder(size=SIZE)

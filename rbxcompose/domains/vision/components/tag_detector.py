@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field, model_validator
 
@@ -12,8 +12,9 @@ from rbxcompose import sdk
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.vision.tags import DEFAULT_FAMILY, FAMILIES, SeenTag, TagFinder, board_pose
+from rbxcompose.domains.vision.tags import SeenTag, TagFinder, board_pose
 from rbxcompose.domains.worlds.optics import Intrinsics
+from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, TAG_FAMILIES
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.images import WrongPictureError, grey
@@ -33,7 +34,6 @@ from rbxcompose.sdk.ports import BULK
 if TYPE_CHECKING:
     from rbxcompose.domains.vision.tags import Numbers
 
-TAG_FAMILIES: TypeAlias = Literal[tuple(FAMILIES)]  # type: ignore[valid-type]
 THICK = 0.001  # of the box that stands for a tag [m]
 SILENCE = 2.0  # [s] without a picture after which diagnostics say so
 FRAME = "tag_"  # begins the frame of a tag with a name
