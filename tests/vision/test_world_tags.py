@@ -10,7 +10,7 @@ import pytest
 from rbxcompose.base.geometry import Pose2, Transform3, quaternion_from_yaw
 from rbxcompose.domains.vision.tags import SeenTag, TagFinder
 from rbxcompose.domains.worlds.optics import TO_OPTICAL, Intrinsics
-from rbxcompose.domains.worlds.shapes import WorldBox, WorldShape
+from rbxcompose.domains.worlds.shapes import ShapePath, WorldBox, WorldShape
 from rbxcompose.domains.worlds.tag_pictures import tag_on
 from rbxcompose.domains.worlds.view import WorldView
 from rbxcompose.domains.worlds.world import SimulatedWorld
@@ -20,6 +20,7 @@ from rbxcompose.msgs.vision_msgs import Detection3DArray
 from tests.navigation.test_eyes import LEVEL
 from tests.navigation.test_robot import Room
 from tests.navigation.test_sensors import SIMULATORS
+from tests.parts.project import Project
 
 cv2 = pytest.importorskip("cv2", reason="OpenCV is not installed")
 CAMERA = Intrinsics.of_view(640, 480, math.radians(60))
@@ -51,6 +52,30 @@ def test_each_side_of_a_box_shows_its_tag(index: int) -> None:
     off = tag.pose.inverse().compose(truth)
     assert math.hypot(*off.translation) < 0.01
     assert 2 * math.acos(min(1.0, abs(off.rotation[3]))) < math.radians(2)
+
+
+@pytest.mark.parametrize(
+    ("thing", "why"),
+    [
+        ("box: [10 cm, 10 cm, 10 cm], tags: {front: {number: 3, size: 9 cm}}", "does not fit on 'front', 10 x 10 cm"),
+        ("box: [10 cm, 10 cm, 10 cm], tags: {left: {number: 3, size: 5 cm, up: 3 cm}}", "does not fit on 'left'"),
+        ("box: [10 cm, 10 cm, 10 cm], tags: {front: 587}", "tag36h11 has the tags 0 to 586, and no 587"),
+        ("mesh: chair.stl, tags: {front: 3}", "a mesh has no flat sides for tags"),
+        ("box: [10 cm, 10 cm, 10 cm], turns: true", "what 'turns' has a 'path'"),
+    ],
+)
+def test_a_tag_that_cannot_be_there_is_refused_with_the_reason(tmp_path: Path, thing: str, why: str) -> None:
+    (tmp_path / "world.yaml").write_text(f"rbx: 1\nkind: World\nname: room\nobjects:\n  it: {{{thing}}}\n")
+    said = Project(tmp_path).check("world: ../../world.yaml\n").text
+    assert why in said
+    assert "world.yaml:5:" in said
+
+
+def test_who_turns_faces_where_it_goes_also_while_it_waits() -> None:
+    path = ShapePath(((0.0, 0.0, 0.0), (1.0, 1.0, 0.0), (2.0, 1.0, 0.0), (3.0, 1.0, 2.0)), turns=True)
+    headings = [path.heading_at(time, 9.0) for time in (-1.0, 0.5, 1.5, 2.5, 8.0)]
+    assert headings == pytest.approx([0.0, 0.0, 0.0, math.pi / 2, math.pi / 2])
+    assert ShapePath(path.points).heading_at(0.5, 9.0) == 9.0
 
 
 ROBOT = """body: {urdf: eye.urdf}
