@@ -46,7 +46,7 @@ def test_the_robot_keeps_its_distance_to_a_guide_through_the_house(simulator: st
     if simulator == "physics":
         pytest.importorskip("mujoco", reason="mujoco is not installed")
     sets = (f"simulator={simulator}",)
-    plan = compile_robot(str(ROOT / "robots/house"), profiles=["guide", "tagged"], sets=sets, environment={}).plan
+    plan = compile_robot(str(ROOT / "robots/house"), profiles=["tagged"], sets=sets, environment={}).plan
     assert plan is not None
     bench = Bench(plan=plan)
     truth, contacts = bench.collect("/ground_truth", Odometry), bench.collect("/contact", String)

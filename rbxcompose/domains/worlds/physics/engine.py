@@ -125,7 +125,7 @@ class PhysicsWorld:
         self._mj.mj_comPos(self._model, self._data)
 
     def place(self, name: str, pose: Pose2) -> None:
-        """Put a shape that has a path elsewhere in `map`, from the next step on and for good."""
+        """Put a shape that has a path elsewhere in `map`, from the next step on and for good; its heading stays."""
         self._placed[name] = pose
 
     def _turn_wheels(self, dt: float) -> None:
@@ -145,7 +145,8 @@ class PhysicsWorld:
         for shape, mocap in zip(self._moving, self._mocaps, strict=True):
             pose = self._placed.get(shape.name) or shape.pose_at(self.time)
             self._data.mocap_pos[mocap, :2] = pose.x, pose.y
-            self._data.mocap_quat[mocap] = math.cos(pose.heading / 2), 0.0, 0.0, math.sin(pose.heading / 2)
+            if shape.path is not None and shape.path.turns:
+                self._data.mocap_quat[mocap] = math.cos(pose.heading / 2), 0.0, 0.0, math.sin(pose.heading / 2)
 
     def _move_set_points(self, dt: float) -> None:
         """Move set points towards targets, as fast as their servos do."""
