@@ -157,7 +157,7 @@ class TagFollower(sdk.Component[TagFollowerConfig]):
         silent = self.now - self.heard
         problem = self.problem
         if silent > config.silence:
-            problem = f"the camera has told nothing for {silent:.1f} s" if self.heard > -math.inf else "no camera has told"
+            problem = f"the camera has told nothing for {silent:.1f} s" if silent < math.inf else "no camera has told"
         if goal is None and not config.always:
             if self.drives:
                 self.rest()
