@@ -33,7 +33,7 @@ DOMAINS = {
     "console": "body",
     "navigation": "bases body worlds",
     "servos": "body devices",
-    "vision": "body worlds",
+    "vision": "bases body worlds",
     "worlds": "body",
 }
 """Which other domains a domain may import; one that is not named here imports none."""
