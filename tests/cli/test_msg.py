@@ -58,6 +58,7 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
         "action/FollowPerson.action",
         "action/FollowTag.action",
         "action/FollowPoint.action",
+        "action/Localise.action",
         "action/Grip.action",
         "action/LookAtPoint.action",
         "action/MoveArm.action",

@@ -31,7 +31,7 @@ DOMAINS = {
     "arms": "body servos worlds",
     "bases": "body servos worlds",
     "console": "body",
-    "navigation": "bases body worlds",
+    "navigation": "bases body vision worlds",
     "servos": "body devices",
     "vision": "bases body worlds",
     "worlds": "body",
