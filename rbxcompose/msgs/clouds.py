@@ -33,6 +33,16 @@ def points_of(message: PointCloud2) -> Points:
     Raises:
         CloudError: if the message does not say where x, y and z are, or has fewer bytes than it says.
     """
+    points = rows_of(message).reshape(-1, 3)
+    return np.asarray(points[np.isfinite(points).all(axis=1)])
+
+
+def rows_of(message: PointCloud2) -> Points:
+    """Return the points of a cloud row by row [m], of shape (height, width, 3), in the frame of its header.
+
+    Raises:
+        CloudError: if the message does not say where x, y and z are, or has fewer bytes than it says.
+    """
     width, height, step = message.width, message.height, message.point_step
     if width * height > MOST_POINTS:
         raise CloudError(f"it has {width * height:,} points, and may have {MOST_POINTS:,}")
@@ -44,10 +54,9 @@ def points_of(message: PointCloud2) -> Points:
     if len(message.data) < needed:
         raise CloudError(f"it has {len(message.data):,} bytes, and needs {needed:,}")
     if not needed:
-        return np.empty((0, 3))
+        return np.empty((0, 0, 3))
     raw = np.ndarray((height, width), kind, message.data, strides=(row, step))
-    points = np.stack([raw[axis].ravel() for axis in _AXES], axis=1).astype(np.float64, copy=False)
-    return np.asarray(points[np.isfinite(points).all(axis=1)])
+    return np.stack([raw[axis] for axis in _AXES], axis=-1).astype(np.float64, copy=False)
 
 
 def _layout(message: PointCloud2) -> np.dtype[np.void]:

@@ -1,4 +1,4 @@
-"""What stands on a table, by a cloud of points: the table is a plane, and each thing on it a box or an upright cylinder.
+"""What stands on a table, by a cloud of points: the table is a plane, each thing on it a box or an upright cylinder.
 
 Points are in a level frame, z up, lengths in [m]. A view shows only the near sides of things, so what is hidden is
 taken to be there: each thing goes down to the table, and one of which neither the top nor a second side is seen is as
@@ -26,7 +26,10 @@ THICK = 0.012  # how far cells of a plane may be from it before it is refined [m
 BROKEN = 0.08  # parts of a table are so near to each other [m]
 ALONG = 2.0  # times as wide as others a gap along the sight may be
 EDGE = 0.005  # by which a thing may reach over what is seen of the table [m]
-ABOVE = 0.1  # sine of the angle from which on a top is seen
+FLAT = 0.1  # sine of the angle below which a surface is not measured well
+PLATE = 0.02  # thickness that is made up for a table [m]
+NARROW = 0.2  # the same for sides of things
+FAR_OFF = 0.006  # how far a cell counts as off a side at most, so that few of them do not turn a box [m]
 MANY, FINE = 20, 0.004  # cells, and how far these are off a shape [m]: each halves the confidence
 SURE = 5  # cells that show where a side is
 _TURNS = np.radians(np.arange(0.0, 90.0, 1.0))
@@ -105,12 +108,14 @@ class TablePlane(NamedTuple):
 
 
 class _Footprint(NamedTuple):
-    """A shape seen from above: its middle, how it is turned, its sides, and how far points are off it."""
+    """A shape seen from above: its middle, how it is turned, its sides, and how far points are off it: root mean square,
+    and mean of what counts."""
 
     middle: Numbers
     yaw: float
     sides: tuple[float, float]
     off: float
+    miss: float
 
 
 def levelled(points: Numbers, camera: Transform3) -> Numbers:
@@ -123,14 +128,16 @@ def find_things(
 ) -> Tabletop:
     """Return the table and the things that a camera at a pose in the level frame sees.
 
-    `points` (n, 3) are in the frame of the camera. The same points and seed give the same.
+    `points` are in the frame of the camera: (n, 3), or (h, w, 3) by pixels, of which those at edges are left out that
+    are neither of what is before nor of what is behind. The same points and seed give the same.
 
     Raises:
         NothingFlatError: if no table is seen.
     """
     settings = settings or TabletopSettings()
     eye = np.array(camera.translation)
-    points = levelled(points[np.isfinite(points).all(1)], camera)
+    is_known = _is_of_surface(points) if points.ndim == 3 else np.isfinite(points).all(1)
+    points = levelled(points[is_known], camera)
     if not len(points):
         raise NothingFlatError("the cloud has no points")
     is_near = np.hypot(*(points[:, :2] - eye[:2]).T) <= settings.farthest
@@ -149,6 +156,24 @@ def find_things(
     ]
     found.sort(key=lambda thing: math.dist(thing.pose.translation, camera.translation))
     return Tabletop(_table(top, plane), tuple(found))
+
+
+def _is_of_surface(rows: Numbers) -> Flags:
+    """Return which points (h, w, 3) have a neighbour beside and one above or below that are of the same surface, unless
+    that is seen from a flat angle: what is as narrow as a pixel is measured badly.
+    """
+    found: Flags = np.isfinite(rows).all(-1)
+    with np.errstate(invalid="ignore"):
+        for axis, flat in ((0, FLAT), (1, NARROW)):
+            first, second = (rows[1:], rows[:-1]) if axis == 0 else (rows[:, 1:], rows[:, :-1])
+            way, ray = first - second, first + second
+            along = np.einsum("...i,...i", way, ray) ** 2
+            joins = along * (1 + flat**2) <= np.einsum("...i,...i", way, way) * np.einsum("...i,...i", ray, ray)
+            alike = np.zeros_like(found)
+            alike[tuple(slice(1, None) if axis == each else slice(None) for each in (0, 1))] |= joins
+            alike[tuple(slice(None, -1) if axis == each else slice(None) for each in (0, 1))] |= joins
+            found &= alike
+    return found
 
 
 def cells_of(points: Numbers, side: float) -> Numbers:
@@ -190,7 +215,9 @@ def table_plane(cells: Numbers, settings: TabletopSettings, random: np.random.Ge
     order = np.argsort(-(np.abs(off) < THICK).sum(1), kind="stable")[:BEST]
     best: tuple[TablePlane, Flags] | None = None
     for index in order:
-        found = _refined(cells, TablePlane(*slopes[index].tolist(), float(levels[index]), THICK))
+        found = _refined(
+            cells, TablePlane(float(slopes[index, 0]), float(slopes[index, 1]), float(levels[index]), THICK)
+        )
         if found is not None and (best is None or found[1].sum() > best[1].sum()):
             best = found
     if best is None or best[1].sum() < least or math.hypot(best[0].a, best[0].b) > steep:
@@ -261,7 +288,7 @@ def fitted(cells: Numbers, plane: TablePlane, eye: Numbers, voxel: float) -> Tab
     height = float(np.percentile(over, 98))
     middle = cells[:, :2].mean(0)
     sight = np.array((*middle, plane.heights(middle[None])[0] + height)) - eye
-    is_seen_above = -sight[2] > ABOVE * float(np.linalg.norm(sight))
+    is_seen_above = -sight[2] > FLAT * float(np.linalg.norm(sight))
     is_top = over > height - 2 * voxel
     outline = cells[~is_top, :2]
     if is_seen_above:
@@ -271,7 +298,7 @@ def fitted(cells: Numbers, plane: TablePlane, eye: Numbers, voxel: float) -> Tab
     if len(outline) < SURE:
         return None
     box, round_ = _rectangle(outline, sight[:2], is_seen_above, voxel), _circle(outline)
-    is_round = round_ is not None and round_.off < box.off
+    is_round = round_ is not None and round_.miss < box.miss
     kind: Literal["box", "cylinder"] = "cylinder" if is_round else "box"
     best = round_ if round_ is not None and is_round else box
     low = float(plane.heights(best.middle[None])[0])
@@ -296,8 +323,12 @@ def _circle(points: Numbers) -> _Footprint | None:
     wide = float(np.ptp(own @ _COMPASS, axis=0).max())
     if not 0 < 2 * radius < 1.4 * wide:
         return None
-    off = float(np.sqrt(np.mean((np.hypot(*(own - at).T) - radius) ** 2)))
-    return _Footprint(middle + at, 0.0, (2 * radius, 2 * radius), off)
+    return _Footprint(middle + at, 0.0, (2 * radius, 2 * radius), *_missed(np.hypot(*(own - at).T) - radius))
+
+
+def _missed(off: Numbers) -> tuple[float, float]:
+    """Return how far points are off a shape (n,): root mean square, and mean of what counts."""
+    return float(np.sqrt(np.mean(off**2))), float(np.minimum(np.abs(off), FAR_OFF).mean())
 
 
 def _rectangle(points: Numbers, sight: Numbers, is_seen_above: bool, voxel: float) -> _Footprint:
@@ -316,7 +347,7 @@ def _rectangle(points: Numbers, sight: Numbers, is_seen_above: bool, voxel: floa
         mine = turned[(nearest == side) & (np.abs(gaps[:, side]) < voxel), side % 2]
         if len(mine) >= SURE:
             (low if side < 2 else high)[side % 2] = np.median(mine)
-    off = float(np.sqrt(np.mean(_gaps(turned, low, high) ** 2)))
+    missed = _missed(_gaps(turned, low, high))
     thin = int(np.argmin(high - low))
     if not is_seen_above and (high - low)[thin] < 3 * voxel:
         depth = float((high - low)[1 - thin])
@@ -327,16 +358,16 @@ def _rectangle(points: Numbers, sight: Numbers, is_seen_above: bool, voxel: floa
     size = high - low
     at = middle + np.array(((cos, -sin), (sin, cos))) @ ((low + high) / 2)
     if turn >= math.pi / 4:
-        return _Footprint(at, turn - math.pi / 2, (float(size[1]), float(size[0])), off)
-    return _Footprint(at, turn, (float(size[0]), float(size[1])), off)
+        return _Footprint(at, turn - math.pi / 2, (float(size[1]), float(size[0])), *missed)
+    return _Footprint(at, turn, (float(size[0]), float(size[1])), *missed)
 
 
 def _off_sides(points: Numbers, turns: Numbers) -> Numbers:
-    """Return how far points (n, 2) are off the sides of the rectangle around them at each turn (m,), squared."""
+    """Return how far points (n, 2) are off the sides of the rectangle around them at each turn (m,)."""
     cos, sin = np.cos(turns), np.sin(turns)
     turned = np.stack((points @ np.stack((cos, sin)), points @ np.stack((-sin, cos))), -1)  # (n, m, 2)
     low, high = np.percentile(turned, 1, axis=0), np.percentile(turned, 99, axis=0)
-    return np.asarray((_gaps(turned, low, high) ** 2).mean(0))
+    return np.asarray(np.minimum(_gaps(turned, low, high), FAR_OFF).mean(0))
 
 
 def _gaps(turned: Numbers, low: Numbers, high: Numbers) -> Numbers:
@@ -360,6 +391,3 @@ def _table(top: Numbers, plane: TablePlane) -> TabletopThing:
     level = float(plane.heights(np.array([(x, y)]))[0])
     pose = Transform3((float(x), float(y), level - PLATE / 2), quaternion_from_yaw(float(turns[best])))
     return TabletopThing("box", (float(size[0]), float(size[1]), PLATE), pose, 1.0, plane.off)
-
-
-PLATE = 0.02  # thickness that is made up for a table [m]
