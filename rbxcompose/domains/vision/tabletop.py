@@ -162,7 +162,7 @@ def _is_of_surface(rows: Numbers) -> Flags:
     """Return which points (h, w, 3) have a neighbour beside and one above or below that are of the same surface, unless
     that is seen from a flat angle: what is as narrow as a pixel is measured badly.
     """
-    found: Flags = np.isfinite(rows).all(-1)
+    found = np.asarray(np.isfinite(rows).all(-1))
     with np.errstate(invalid="ignore"):
         for axis, flat in ((0, FLAT), (1, NARROW)):
             first, second = (rows[1:], rows[:-1]) if axis == 0 else (rows[:, 1:], rows[:, :-1])
