@@ -75,6 +75,7 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
         "msg/WorldLight.msg",
         "msg/WorldRobots.msg",
         "msg/WorldShape.msg",
+        "msg/WorldTag.msg",
         "msg/SceneObject.msg",
         "msg/SceneObjects.msg",
         "msg/SceneShape.msg",

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.base.geometry import Transform3, multiply, quaternion_about
-from rbxcompose.domains.vision.tags import DEFAULT_FAMILY, tag_picture
 from rbxcompose.domains.worlds.optics import Intrinsics
+from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, tag_picture
 
 Picture = NDArray[np.uint8]
 FINE = 4  # each pixel is the mean of so many by so many rays

@@ -11,6 +11,7 @@ from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.levels import Level
 from rbxcompose.msgs.poses import pose_of, transform_of
 from rbxcompose.msgs.sensor_msgs import CameraInfo, Image
+from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.std_msgs import Header, String
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.msgs.vision_msgs import Detection3DArray
@@ -108,6 +109,28 @@ def test_what_is_no_picture_is_reported_and_not_published() -> None:
     level, message = seeing.state()
     assert level == Level.ERROR
     assert message.startswith("the encoding 'yuv' is not known")
+
+
+def test_of_two_tags_with_one_name_the_one_that_was_there_keeps_it() -> None:
+    seeing = Seeing(names={"box": 7})
+    seeing.sees({7: facing(0.3, 0, 1.5)})
+    shot = np.minimum(picture({7: facing(0.3, 0, 1.5)}, SIZE), picture({7: facing(-0.3, 0, 1.0)}, SIZE))
+    seeing.takes(Image(OPTICAL, 480, 640, "mono8", 0, 640, shot.tobytes()))
+    assert [one.id for one in seeing.seen[-1].detections] == ["box", "box"]
+    assert [one.transform.translation.x for one in seeing.placed[-1].transforms] == pytest.approx([0.3], abs=0.02)
+    assert seeing.state() == (Level.ERROR, "the tag 'box' is seen twice")
+
+
+def test_a_picture_of_the_future_has_no_transforms_and_one_without_a_time_is_of_now() -> None:
+    seeing = Seeing(names={"box": 7})
+    shot = picture({7: facing(0, 0, 1)}, SIZE).tobytes()
+    seeing.takes(Image(OPTICAL, 480, 640, "mono8", 0, 640, shot))
+    assert abs(to_nanoseconds(seeing.placed[-1].transforms[0].header.stamp) - seeing.bench.clock.stamp()) < 2e8
+    late = Header(stamp=to_time(seeing.bench.clock.stamp() + 3_000_000_000), frame_id=OPTICAL.frame_id)
+    seeing.takes(Image(late, 480, 640, "mono8", 0, 640, shot))
+    assert (len(seeing.placed), len(seeing.seen)) == (1, 2)
+    level, message = seeing.state()
+    assert (level, message) == (Level.ERROR, "pictures are stamped 3.0 s in the future: is the camera's clock right?")
 
 
 def test_a_camera_that_freezes_is_reported() -> None:

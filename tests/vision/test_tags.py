@@ -13,7 +13,8 @@ from rbxcompose.base.geometry import Transform3, conjugate, multiply
 from tests.vision.tagged import CAMERA, facing, picture
 
 pytest.importorskip("cv2", reason="OpenCV is not installed")
-from rbxcompose.domains.vision.tags import FAMILIES, TagFinder, board_pose, tag_picture
+from rbxcompose.domains.vision.tags import TagFinder, board_pose
+from rbxcompose.domains.worlds.tag_pictures import FAMILIES, dictionary, tag_picture
 
 SIZE = 0.15
 FINDER = TagFinder(size=SIZE)
@@ -44,6 +45,12 @@ def test_a_tag_is_found_where_it_is(
     assert math.dist(found.pose.translation, pose.translation) < 0.04 * distance
     if found.doubt < 0.2:
         assert angle_between(found.pose, pose) < math.radians(8)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_families_are_as_opencv_has_them(family: str) -> None:
+    known = dictionary(family)
+    assert (len(known.bytesList), known.markerSize + 2) == FAMILIES[family][1:]
 
 
 def test_errors_of_the_pose_are_as_large_as_its_covariance_says() -> None:

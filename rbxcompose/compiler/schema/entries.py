@@ -70,7 +70,8 @@ def _entry(prefix: str, word: Schema, types: Iterable[str], options: Mapping[str
 
 
 def _word(classes: Mapping[str, type[Any]]) -> Schema:
-    return {"enum": [*classes], "enumDescriptions": [_about(cls) for cls in classes.values()]}
+    about = [getattr(cls, "made_by", "") or _about(cls) for cls in classes.values()]
+    return {"enum": [*classes], "enumDescriptions": about}
 
 
 def _about(cls: type[Any]) -> str:

@@ -44,13 +44,13 @@ def laid_over(definitions: Mapping[str, Schema]) -> dict[str, Schema]:
 
 
 def _untyped(definitions: Mapping[str, Schema]) -> Schema:
-    """Return the descriptions of the keys of a component that does not repeat its type, one that users list."""
-    about: dict[str, list[str]] = {}
+    """Return of which types the keys of a component are that does not repeat its type, one that users list."""
+    owners: dict[str, list[str]] = {}
     for name in (name.removeprefix(COMPONENT) for name in definitions if name.startswith(COMPONENT)):
         for key, schema in definitions[f"{COMPONENT}{name}"]["properties"].items():
             if key not in (TYPE, *OPTIONS) and "description" in schema:  # a group of fields may have none
-                about.setdefault(key, []).append(f"Of `{name}`: {schema['description']}")
-    keys = {key: {"description": "\n\n".join(texts)} for key, texts in sorted(about.items())}
+                owners.setdefault(key, []).append(f"`{name}`")
+    keys = {key: {"description": f"Of {', '.join(names)}."} for key, names in sorted(owners.items())}
     return {"if": {"not": {"anyOf": [{"required": [TYPE]}]}}, "then": {"properties": keys}}
 
 

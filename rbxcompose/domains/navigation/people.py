@@ -174,16 +174,18 @@ class TrackedPerson:
         return math.hypot(self.vx, self.vy)
 
 
-class _Track:
+class PersonTrack:
     """One person in a Kalman filter: position and velocity."""
 
-    def __init__(self, number: int, seen: PersonSighting, time: float) -> None:
-        self.number, self.time, self.seen, self.count = number, time, time, 1
+    def __init__(self, name: str, seen: PersonSighting, time: float) -> None:
+        """Begin where somebody is seen at a time [s]."""
+        self.name, self.time, self.seen, self.count = name, time, time, 1
         self.state = np.array((seen.x, seen.y, 0.0, 0.0))
         self.spread = np.diag((EXACT**2, EXACT**2, AT_FIRST**2, AT_FIRST**2))
         self.first, self.moved = (seen.x, seen.y), 0.0
 
     def predict(self, time: float) -> None:
+        """Let somebody walk on until a time [s]."""
         dt, self.time = time - self.time, time
         move = np.eye(4)
         move[0, 2] = move[1, 3] = dt
@@ -200,12 +202,19 @@ class _Track:
         return found if found <= GATE else math.inf
 
     def correct(self, seen: PersonSighting) -> None:
+        """Take where somebody is seen at the time of the prediction."""
         gain = self.spread[:, :2] @ np.linalg.inv(self.spread[:2, :2] + np.eye(2) * _noise(seen))
         self.state = self.state + gain @ (np.array((seen.x, seen.y)) - self.state[:2])
         self.spread = self.spread - gain @ self.spread[:2]
         self.seen, self.count = self.time, self.count + 1
         if seen.is_whole:
             self.moved = max(self.moved, math.hypot(seen.x - self.first[0], seen.y - self.first[1]))
+
+    def person(self, time: float, reliability: float) -> TrackedPerson:
+        """Return where somebody is expected at a time [s]."""
+        x, y, vx, vy = self.state.tolist()
+        ahead = max(0.0, time - self.time)
+        return TrackedPerson(self.name, x + vx * ahead, y + vy * ahead, vx, vy, reliability)
 
 
 def _noise(seen: PersonSighting) -> float:
@@ -217,7 +226,7 @@ class PeopleTracks:
 
     def __init__(self, forget: float = 2.0) -> None:
         self.forget = forget
-        self._tracks: list[_Track] = []
+        self._tracks: list[PersonTrack] = []
         self._made = 0
         self._time = -math.inf
 
@@ -238,10 +247,10 @@ class PeopleTracks:
         for j in sorted(free):
             if seen[j].is_whole:
                 self._made += 1
-                self._tracks.append(_Track(self._made, seen[j], time))
+                self._tracks.append(PersonTrack(f"person_{self._made}", seen[j], time))
         self._tracks = [track for track in self._tracks if time - track.seen <= self._kept(track)]
 
-    def _kept(self, track: _Track) -> float:
+    def _kept(self, track: PersonTrack) -> float:
         return self.forget if track.count >= SEEN_OFTEN else min(DOUBTED, self.forget)
 
     def clear(self) -> None:
@@ -254,8 +263,29 @@ class PeopleTracks:
         for track in self._tracks:
             if track.count < SEEN_OFTEN or time - track.seen > SHOWN:
                 continue
-            x, y, vx, vy = track.state.tolist()
-            ahead = max(0.0, time - track.time)
-            sure = 0.5 + 0.5 * min(1.0, track.moved / MOVED)
-            found.append(TrackedPerson(f"person_{track.number}", x + vx * ahead, y + vy * ahead, vx, vy, sure))
+            found.append(track.person(time, 0.5 + 0.5 * min(1.0, track.moved / MOVED)))
         return found
+
+
+class NamedTracks:
+    """Everybody who is told apart by a name, which comes with each sighting."""
+
+    def __init__(self, forget: float = 2.0) -> None:
+        self.forget = forget
+        self._tracks: dict[str, PersonTrack] = {}
+
+    def see(self, name: str, seen: PersonSighting, time: float) -> None:
+        """Take where somebody is seen at a time [s]; an older one counts not, and who leaps is new there."""
+        track = self._tracks.get(name)
+        if track is None or time - track.time > self.forget:
+            self._tracks[name] = PersonTrack(name, seen, time)
+        elif time > track.time:
+            track.predict(time)
+            if track.away(seen) < math.inf:
+                track.correct(seen)
+            else:
+                self._tracks[name] = PersonTrack(name, seen, time)
+
+    def people(self, time: float) -> list[TrackedPerson]:
+        """Return who is seen at a time [s], where it is expected then."""
+        return [track.person(time, 1.0) for track in self._tracks.values() if time - track.seen <= SHOWN]

@@ -6,7 +6,7 @@ import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from rbxcompose.domains.vision.tags import tag_picture
+from rbxcompose.domains.worlds.tag_pictures import tag_picture
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -1,10 +1,9 @@
-"""Square tags: how they look, where they are in a picture, and where they are before the camera."""
+"""Square tags: where they are in a picture, and before the camera."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +12,9 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.worlds.optics import Intrinsics
 from rbxcompose.domains.worlds.physics.solids import rotation_matrix
+from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, GreyPicture, dictionary
 
 Numbers = NDArray[np.float64]
-GreyPicture = NDArray[np.uint8]
-
-DEFAULT_FAMILY = "tag36h11"
-FAMILIES: Mapping[str, str] = {
-    "tag36h11": "DICT_APRILTAG_36h11",
-    "tag36h10": "DICT_APRILTAG_36h10",
-    "tag25h9": "DICT_APRILTAG_25h9",
-    "tag16h5": "DICT_APRILTAG_16h5",
-    "aruco_original": "DICT_ARUCO_ORIGINAL",
-    **{f"aruco_{n}x{n}_{count}": f"DICT_{n}X{n}_{count}" for n in (4, 5, 6, 7) for count in (50, 100, 250, 1000)},
-}
-"""Families by name, and what OpenCV calls them."""
 PIXEL_NOISE = 0.3  # standard deviation of a corner after its refinement [px]
 FAR_OFF = 3.0  # a tag whose corners miss its pose by more is none, or is bent [px]
 
@@ -47,34 +35,6 @@ class SeenTag:
     doubt: float = 0.0
     """From 0 to 1: how well the mirrored pose explains the corners, compared with this one. Above 0.5, do not trust
     its rotation."""
-
-
-def tag_picture(number: int, family: str = DEFAULT_FAMILY, module: int = 1, margin: int = 1) -> GreyPicture:
-    """Return a tag in black and white (n, n), `module` pixels for each of its cells and a white margin of cells.
-
-    Raises:
-        KeyError: if there is no such family.
-        ValueError: if it has no such tag.
-    """
-    import cv2
-
-    known = dictionary(family)
-    if not 0 <= number < len(known.bytesList):
-        raise ValueError(f"{family} has the tags 0 to {len(known.bytesList) - 1}, and no {number}")
-    cells = cv2.aruco.generateImageMarker(known, number, known.markerSize + 2)
-    framed = np.pad(cells, margin, constant_values=255)
-    return np.asarray(np.kron(framed, np.ones((module, module), np.uint8)), np.uint8)
-
-
-def dictionary(family: str) -> Any:
-    """Return a family as OpenCV knows it.
-
-    Raises:
-        KeyError: if there is no such family.
-    """
-    import cv2
-
-    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, FAMILIES[family]))
 
 
 class TagFinder:

@@ -9,7 +9,7 @@ from functools import lru_cache
 from itertools import pairwise
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import Pose2, Vector3
+from rbxcompose.base.geometry import Pose2, Transform3, Vector3
 
 Point2 = tuple[float, float]
 FLAT = 1e-12  # an area that is none [m^2]
@@ -198,6 +198,8 @@ class ShapePath:
     points: tuple[tuple[float, float, float], ...]
     """Time [s], x and y in `map` [m]."""
     repeats: bool = False
+    turns: bool = False
+    """Whether it faces where it goes."""
 
     def __post_init__(self) -> None:
         if not self.points or not all(map(math.isfinite, (number for point in self.points for number in point))):
@@ -207,20 +209,47 @@ class ShapePath:
 
     def place_at(self, time: float) -> Point2:
         """Return x and y [m] at a time [s]."""
-        first, last = self.points[0], self.points[-1]
-        if self.repeats and time > last[0] > first[0]:
-            time = first[0] + (time - first[0]) % (last[0] - first[0])
-        after = bisect_right(self.points, time, key=lambda point: point[0])
+        time, after = self._between(time)
         if after in (0, len(self.points)):
-            return (first if after == 0 else last)[1:]
+            return self.points[0 if after == 0 else -1][1:]
         (t0, x0, y0), (t1, x1, y1) = self.points[after - 1 : after + 1]
         part = (time - t0) / (t1 - t0)
         return x0 + (x1 - x0) * part, y0 + (y1 - y0) * part
 
+    def heading_at(self, time: float, otherwise: float) -> float:
+        """Return the direction in which it goes, or went last [rad]; before that, where it will go."""
+        if not self.turns:
+            return otherwise
+        _, after = self._between(time)
+        ways = [(b[1] - a[1], b[2] - a[2]) for a, b in pairwise(self.points)]
+        for dx, dy in (*ways[: max(after, 1)][::-1], *ways):
+            if dx or dy:
+                return math.atan2(dy, dx)
+        return otherwise
+
+    def _between(self, time: float) -> tuple[float, int]:
+        """Return a time [s] within the path, if it repeats, and the number of the first point after it."""
+        first, last = self.points[0], self.points[-1]
+        if self.repeats and time > last[0] > first[0]:
+            time = first[0] + (time - first[0]) % (last[0] - first[0])
+        return time, bisect_right(self.points, time, key=lambda point: point[0])
+
+
+@dataclass(frozen=True, slots=True)
+class WorldTag:
+    """A square tag on a thing, as cameras see it."""
+
+    number: int
+    family: str
+    size: float
+    """The side of its black square [m]."""
+    place: Transform3
+    """In the frame of the thing, with z above its base: x to the right of the tag, y up, z out of it."""
+
 
 @dataclass(frozen=True, slots=True)
 class WorldShape:
-    """A thing in a world, which moves if it has a path; its heading stays."""
+    """A thing in a world, which moves if it has a path."""
 
     name: str
     solid: ConvexSolid | WorldMesh
@@ -231,14 +260,19 @@ class WorldShape:
     path: ShapePath | None = None
     mass: float = 0.0
     """Of one that can be pushed [kg]; 0 if it stands fast."""
+    tags: tuple[WorldTag, ...] = ()
 
     def pose_at(self, time: float) -> Pose2:
         """Return its pose in `map` at a time [s]."""
-        return self.pose if self.path is None else Pose2(*self.path.place_at(time), self.pose.heading)
+        if self.path is None:
+            return self.pose
+        return Pose2(*self.path.place_at(time), self.path.heading_at(time, self.pose.heading))
 
     def at(self, time: float) -> WorldShape:
         """Return the shape as it stands at a time [s]."""
-        return self if self.path is None else WorldShape(self.name, self.solid, self.pose_at(time), self.z)
+        if self.path is None:
+            return self
+        return WorldShape(self.name, self.solid, self.pose_at(time), self.z, tags=self.tags)
 
     def is_between(self, low: float, high: float) -> bool:
         """Return whether some of it is at heights from `low` to `high` [m]; both may be the same."""
@@ -246,7 +280,7 @@ class WorldShape:
 
     @property
     def convex(self) -> tuple[WorldShape, ...]:
-        """Return its convex parts, at the same pose and with the same name."""
+        """Return its convex parts, at the same pose and with the same name, without tags."""
         if not isinstance(self.solid, WorldMesh):
             return (self,)
         return tuple(

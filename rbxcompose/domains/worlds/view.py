@@ -1,9 +1,10 @@
-"""What a camera sees of a world: its things as flat faces, and these as colours and depths."""
+"""What a camera sees of a world: its things as flat faces, and these as colours, tags and depths."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
 
 import cv2
 import numpy as np
@@ -17,7 +18,16 @@ from rbxcompose.domains.worlds.physics.conversion import WALL
 from rbxcompose.domains.worlds.physics.looks import WALLS, colour_of
 from rbxcompose.domains.worlds.physics.solids import rotation_matrix
 from rbxcompose.domains.worlds.physics.walls import wall_rectangles
-from rbxcompose.domains.worlds.shapes import WorldBox, WorldCylinder, WorldHull, WorldLight, WorldMesh, WorldShape
+from rbxcompose.domains.worlds.shapes import (
+    WorldBox,
+    WorldCylinder,
+    WorldHull,
+    WorldLight,
+    WorldMesh,
+    WorldShape,
+    WorldTag,
+)
+from rbxcompose.domains.worlds.tag_pictures import GreyPicture, tag_picture, tag_square
 from rbxcompose.domains.worlds.world import SimulatedWorld
 
 Numbers = NDArray[np.float64]
@@ -29,6 +39,9 @@ SKY, GROUND, HOLE = (200, 215, 230), (0.49, 0.46, 0.43), (0.08, 0.08, 0.08)
 DARKEST = 0.5  # of a face on which no light falls; without lamps, light comes from the camera
 FLOOR = 100.0  # half the side of the ground [m]
 ROUND = 24  # sides of a cylinder
+TEXELS = 16  # pixels of a cell in the picture of a tag
+FINEST, FINE = 4, 2  # points along a side of a pixel of which its grey is the mean, if a tag is small or large
+SMALL = 150**2  # [px]
 _CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (0.0, 1.0)])
 BOX_SIDES: Mapping[str, tuple[int, int, int, int]] = {
     "front": (5, 4, 6, 7),
@@ -52,14 +65,22 @@ class WorldFaces:
     """Red, green and blue of each (n, 3)."""
     things: NDArray[np.int32]
     """Which shape of the world each belongs to (n,), in their order; -1 for walls and the ground."""
+    pictures: Mapping[int, GreyPicture] = field(default_factory=dict)
+    """What is on a face besides its colour, by its number: from the first corner down to the second one."""
 
     @classmethod
     def joined(cls, parts: Sequence[WorldFaces]) -> WorldFaces:
         """Return the faces of several."""
+        begins = np.cumsum([0, *(len(part.corners) for part in parts[:-1])]).tolist()
         return cls(
             np.concatenate([part.corners for part in parts]),
             np.concatenate([part.colours for part in parts]),
             np.concatenate([part.things for part in parts]),
+            {
+                before + number: picture
+                for part, before in zip(parts, begins, strict=True)
+                for number, picture in part.pictures.items()
+            },
         )
 
 
@@ -81,6 +102,7 @@ class WorldView:
     def __init__(self, world: SimulatedWorld) -> None:
         self._world = world
         self._numbers = {shape.name: number for number, shape in enumerate(world.shapes)}
+        self._pictures: dict[tuple[int, str], GreyPicture] = {}  # of tags
         still = [shape for shape in world.shapes if shape.path is None]
         parts = [_ground(world), _walls(world.grid), *(self._faces_of(shape) for shape in still)]
         self._still = WorldFaces.joined(parts)
@@ -100,7 +122,17 @@ class WorldView:
         number = self._numbers[shape.name]
         colours = self._world.colours
         red, green, blue, _ = colour_of(colours[number] if colours else "")
-        return _painted(_corners_of(shape), (red, green, blue), number)
+        return WorldFaces.joined(
+            [_painted(_corners_of(shape), (red, green, blue), number), *(self._tag(tag, shape) for tag in shape.tags)]
+        )
+
+    def _tag(self, tag: WorldTag, shape: WorldShape) -> WorldFaces:
+        """Return a tag on a shape, just above its side."""
+        if (key := (tag.number, tag.family)) not in self._pictures:
+            self._pictures[key] = tag_picture(*key, module=TEXELS)
+        corners = _turned(tag_square(tag)[None], shape.pose.x, shape.pose.y, shape.pose.heading, shape.z)
+        face = _painted(corners, (1.0, 1.0, 1.0), self._numbers[shape.name])
+        return replace(face, pictures={0: self._pictures[key]})
 
 
 def _painted(corners: Numbers, colour: Sequence[float], thing: int = -1) -> WorldFaces:
@@ -198,7 +230,10 @@ def draw(
         bright += _facing(points - at, normals)[:, None] * lamp.strength * colour_of(lamp.colour or "white")[:3]
     if not lights:
         bright += (1 - DARKEST) * _facing(points, normals)[:, None]
-    return CameraView(_coloured(faces, bright, shown), depths, np.append(faces.things, -1)[shown])
+    colours = _coloured(faces, bright, shown)
+    for index, picture in faces.pictures.items():
+        _paint(colours, shown == index, picture, points[index], camera, bright[index])
+    return CameraView(colours, depths, np.append(faces.things, -1)[shown])
 
 
 def _may_be_seen(points: Numbers, offsets: Numbers, camera: Intrinsics) -> NDArray[np.intp]:
@@ -241,6 +276,40 @@ def _coloured(faces: WorldFaces, bright: Numbers, shown: NDArray[np.int32]) -> C
     palette[-1, :3] = SKY
     found = np.take(palette.view(np.uint32).ravel(), shown, mode="wrap").view(np.uint8)
     return np.asarray(cv2.cvtColor(found.reshape(*shown.shape, 4), cv2.COLOR_BGRA2BGR), np.uint8)
+
+
+def _paint(
+    colours: Colours,
+    where: NDArray[np.bool_],
+    picture: GreyPicture,
+    corners: Numbers,
+    camera: Intrinsics,
+    bright: Numbers,
+) -> None:
+    """Paint a picture on a face with corners (4, 3) in the optical frame [m], in the pixels that show it (h, w)."""
+    rows, columns = np.flatnonzero(where.any(1)), np.flatnonzero(where.any(0))
+    if not len(rows):
+        return
+    place = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    height, width = rows[-1] + 1 - rows[0], columns[-1] + 1 - columns[0]
+    fine = FINEST if height * width <= SMALL else FINE
+    # From points of the picture to those of the face, then to pixels, and then to finer ones of the part that is seen.
+    side = len(picture)
+    of_picture = np.array([(1 / side, 0, 0.5 / side), (0, 1 / side, 0.5 / side), (0, 0, 1)])
+    of_face = np.column_stack((corners[3] - corners[0], corners[1] - corners[0], corners[0]))
+    of_part = np.array([(fine, 0, (0.5 - columns[0]) * fine - 0.5), (0, fine, (0.5 - rows[0]) * fine - 0.5), (0, 0, 1)])
+    whole = of_part @ camera.matrix @ of_face @ of_picture
+    seen = cv2.warpPerspective(
+        picture,
+        whole,
+        (int(width * fine), int(height * fine)),
+        flags=cv2.INTER_NEAREST,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    greys = cv2.resize(seen, (int(width), int(height)), interpolation=cv2.INTER_AREA)
+    np.copyto(
+        colours[place], (greys[..., None] * np.minimum(bright, 1.0)).astype(np.uint8), where=where[place][..., None]
+    )
 
 
 class Lens:

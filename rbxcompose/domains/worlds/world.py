@@ -26,10 +26,12 @@ from rbxcompose.domains.worlds.shapes import (
     WorldLight,
     WorldMesh,
     WorldShape,
+    WorldTag,
 )
 from rbxcompose.msgs import rbxcompose_msgs as ours
 from rbxcompose.msgs.geometry_msgs import Point, Pose, Quaternion
 from rbxcompose.msgs.nav_msgs import MapMetaData, OccupancyGrid
+from rbxcompose.msgs.poses import pose_message, pose_of
 from rbxcompose.msgs.std_msgs import Header
 
 NO_WALLS = GridMap(np.zeros((1, 1), np.int8), 1.0)
@@ -282,9 +284,11 @@ def _shape_message(shape: WorldShape, colour: str) -> ours.WorldShape:
         np.array(xs, float),
         np.array(ys, float),
         shape.path is not None and shape.path.repeats,
+        shape.path is not None and shape.path.turns,
         colour,
         shape.mass,
         tuple(_hull_message(*part) for part in parts),
+        tuple(ours.WorldTag(tag.number, tag.family, tag.size, pose_message(tag.place)) for tag in shape.tags),
     )
 
 
@@ -318,5 +322,7 @@ def _shape_of(message: ours.WorldShape) -> WorldShape:
     points = tuple(
         (float(t), float(x), float(y)) for t, x, y in zip(message.times, message.xs, message.ys, strict=True)
     )
-    path = ShapePath(points, message.repeats) if points else None
-    return WorldShape(message.name, solid, Pose2(message.x, message.y, message.heading), message.z, path, message.mass)
+    path = ShapePath(points, message.repeats, message.turns) if points else None
+    pose = Pose2(message.x, message.y, message.heading)
+    tags = tuple(WorldTag(tag.number, tag.family, tag.size, pose_of(tag.pose)) for tag in message.tags)
+    return WorldShape(message.name, solid, pose, message.z, path, message.mass, tags)

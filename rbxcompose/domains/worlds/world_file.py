@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -17,6 +17,7 @@ from rbxcompose.domains.body.meshes import MissingLibraryError
 from rbxcompose.domains.worlds.grid_map import GridMap, MapError, read_map
 from rbxcompose.domains.worlds.ground import WorldHole, in_polygon
 from rbxcompose.domains.worlds.shapes import ShapePath, WorldBox, WorldCylinder, WorldLight, WorldMesh, WorldShape
+from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, TAG_FAMILIES, TagSide, tag_on
 from rbxcompose.domains.worlds.world import NO_WALLS
 from rbxcompose.domains.worlds.world_mesh import world_mesh
 from rbxcompose.manifest.documents import Documents, ManifestHeader
@@ -62,6 +63,24 @@ class WorldCylinderModel(Config):
     """Its height."""
 
 
+class WorldTagModel(Config):
+    """A tag on a side of something."""
+
+    number: int = Field(ge=0)
+    """Its number."""
+    family: TAG_FAMILIES = DEFAULT_FAMILY
+    """The family that it is of."""
+    size: Length | None = Field(None, gt=0)
+    """The side of its black square; four fifths of the shorter side of where it is by default."""
+    right: Length = 0.0
+    """How far its middle is to the right of that of the side, for who looks at it."""
+    up: Length = 0.0
+    """How far it is above that."""
+
+
+WorldTags = Annotated[int, Field(ge=0)] | WorldTagModel | list[WorldTagModel]
+
+
 class WorldObjectModel(Config):
     """Something in the world: one shape, and where it stands or how it moves."""
 
@@ -84,6 +103,10 @@ class WorldObjectModel(Config):
     """Points that it moves to, each with the time at which it is there, and x and y."""
     repeats: bool = False
     """Whether it goes along its path again and again."""
+    turns: bool = False
+    """Whether it faces where it goes."""
+    tags: dict[TagSide, WorldTags] = {}
+    """Tags on its sides, for cameras: a number, or more about one or several. Its front is where it faces: along x."""
     colour: str = ""
     """How viewers draw it."""
     mass: Mass = Field(0.0, ge=0)
@@ -97,8 +120,14 @@ class WorldObjectModel(Config):
             raise ValueError("the sides of a box are above zero")
         if self.path and self.mass:
             raise ValueError("something with a 'path' is moved by nobody else, and has no 'mass'")
+        if self.turns and not self.path:
+            raise ValueError("what 'turns' has a 'path'")
         if self.path:
             ShapePath(tuple(self.path), self.repeats)
+        if self.mesh is None:
+            self.placed("")
+        elif self.tags:
+            raise ValueError("a mesh has no flat sides for tags")
         return self
 
     def placed(self, name: str) -> WorldShape:
@@ -110,8 +139,20 @@ class WorldObjectModel(Config):
             solid = WorldBox(self.box)
         elif self.cylinder is not None:
             solid = WorldCylinder(self.cylinder.radius, self.cylinder.length)
-        path = ShapePath(tuple(self.path), self.repeats) if self.path else None
-        return WorldShape(name, solid, self.at.pose, self.z, path, self.mass)
+        path = ShapePath(tuple(self.path), self.repeats, self.turns) if self.path else None
+        tags = tuple(
+            tag_on(solid, side, one.number, one.family, one.size, (one.right, one.up))
+            for side, models in self.tags.items()
+            for one in tag_models(models)
+        )
+        return WorldShape(name, solid, self.at.pose, self.z, path, self.mass, tags)
+
+
+def tag_models(written: WorldTags) -> list[WorldTagModel]:
+    """Return what is said about the tags of a side."""
+    if isinstance(written, int):
+        return [WorldTagModel(number=written)]
+    return written if isinstance(written, list) else [written]
 
 
 class WorldHoleModel(Config):

@@ -29,7 +29,7 @@ from rbxcompose.sdk.ports import Out
 
 MAP_SERVER, NAVIGATOR, GO_TO, RECOVER = "map_server", "navigator", "go_to", "recover"
 LOCALISATION = "localisation"
-PEOPLE, TRACKER, FOLLOW, FOLLOWER = "people", "people_tracker", "follow_person", "person_follower"
+PEOPLE, FOLLOW, FOLLOWER = "people", "follow_person", "person_follower"
 SLIM = 0.2  # [m] radius of a robot without a body
 ROUND = 0.01  # [m] between the circles around a footprint and within, below which it counts as a circle
 _SCAN = "sensor_msgs/msg/LaserScan"
@@ -176,8 +176,21 @@ class LocalisationModel(Config):
     """How many particles the filter has."""
 
 
+class TagsOfPeople(Config):
+    """Tags that people carry."""
+
+    frame: str = "camera_optical_frame"
+    """The optical frame of the camera that sees them."""
+    topic: TopicName = "tags"
+    """Where its `tag_detector` tells what it sees."""
+    names: list[Name] = []
+    """The names of the tags and boards; without any, all that are seen are carried by people."""
+    behind: Length = Field(0.25, ge=0)
+    """From a tag to the middle of who carries it, behind the tag."""
+
+
 class PeopleModel(Config):
-    """People whom the laser sees, and whom the robot may follow."""
+    """People whom the robot sees, and whom it may follow."""
 
     distance: Length = Field(1.0, gt=0)
     """To keep from the person whom it follows, between the middles of both."""
@@ -185,6 +198,8 @@ class PeopleModel(Config):
     """How long it waits where that person was last seen."""
     farthest: Length = Field(6.0, gt=0)
     """Who is farther away is not tracked."""
+    tags: TagsOfPeople | None = None
+    """Tags by which people are known whom a camera sees. Default: the laser sees who walks."""
 
 
 class NavigationModel(Config):
@@ -283,7 +298,11 @@ def _people(found: NavigationOfRobot, model: PeopleModel, wiring: Wiring) -> Ite
         "zones": found.zones,
         **{name: getattr(driving, name) for name in ("speed", "turn_rate", "acceleration")},
     }
-    yield WantedComponent(PEOPLE, TRACKER, {**laser, "farthest": model.farthest}, ("navigation", "people"))
+    tracker, sees = "people_tracker", laser
+    if (tags := model.tags) is not None:
+        tracker, sees = "tagged_people", {"frame": tags.frame, "topic": tags.topic, "tags": tags.names}
+        sees["behind"] = tags.behind
+    yield WantedComponent(PEOPLE, tracker, {**sees, "farthest": model.farthest}, ("navigation", "people"))
     yield WantedComponent(FOLLOW, FOLLOWER, config, ("navigation", "people"))
 
 

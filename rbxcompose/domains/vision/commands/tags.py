@@ -17,7 +17,7 @@ from rbxcompose.commands import options
 from rbxcompose.commands.console import emit, misused, refuse
 from rbxcompose.domains.body.meshes import MissingLibraryError, need
 from rbxcompose.domains.vision.tag_sheets import PAPERS, pdf_of, png_of, sheets
-from rbxcompose.domains.vision.tags import DEFAULT_FAMILY, FAMILIES
+from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, FAMILIES
 
 GROUP = "write"
 PDF, PNG = ".pdf", ".png"

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field, model_validator
 
 from rbxcompose import sdk
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
+from rbxcompose.base.geometry import Transform3, Vector3, quaternion_from_rpy
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.vision.tags import DEFAULT_FAMILY, FAMILIES, SeenTag, TagFinder, board_pose
+from rbxcompose.domains.vision.tags import SeenTag, TagFinder, board_pose
 from rbxcompose.domains.worlds.optics import Intrinsics
+from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, TAG_FAMILIES
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import geometry_msgs as geometry
+from rbxcompose.msgs.builtin_interfaces import Time
 from rbxcompose.msgs.images import WrongPictureError, grey
 from rbxcompose.msgs.poses import pose_message, transform_message
 from rbxcompose.msgs.sensor_msgs import CameraInfo, Image
+from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.std_msgs import Header, String
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.msgs.vision_msgs import (
@@ -33,9 +36,9 @@ from rbxcompose.sdk.ports import BULK
 if TYPE_CHECKING:
     from rbxcompose.domains.vision.tags import Numbers
 
-TAG_FAMILIES: TypeAlias = Literal[tuple(FAMILIES)]  # type: ignore[valid-type]
 THICK = 0.001  # of the box that stands for a tag [m]
 SILENCE = 2.0  # [s] without a picture after which diagnostics say so
+AHEAD = 0.5  # [s] a picture of a time so far in the future has a wrong clock
 FRAME = "tag_"  # begins the frame of a tag with a name
 
 
@@ -168,6 +171,7 @@ class TagDetector(sdk.Component[TagDetectorConfig]):
         self.camera: Intrinsics | None = None
         self.problem, self.camera_problem = "", "no camera_info has come"
         self.seen_at, self.said = self.now, ""
+        self.places: dict[str, Vector3] = {}  # where tags with a name were last, before the camera
 
     def on_info(self, message: CameraInfo) -> None:
         """Know the camera."""
@@ -190,20 +194,48 @@ class TagDetector(sdk.Component[TagDetectorConfig]):
             self.problem = f"pictures are {size}, and camera_info is of {camera.width} x {camera.height}"
             camera = None
         found = self.finder.find(picture, camera)
-        header = Header(stamp=message.header.stamp, frame_id=message.header.frame_id or self.config.frame)
+        header = Header(stamp=self.stamp_of(message), frame_id=message.header.frame_id or self.config.frame)
         seen = [self.sight(tag) for tag in found]
         if camera is not None:
             seen += self.seen_boards(found, camera)
         self.bound["seen"](Detection3DArray(header, tuple(self.detection(header, one) for one in seen)))
-        transforms = [
-            geometry.TransformStamped(header, f"{FRAME}{one.name}", transform_message(one.pose))
-            for one in seen
-            if one.pose is not None and (one.name in self.boards or one.name in self.config.names)
-        ]
-        if transforms:
+        placed = self.placed(seen)
+        if placed and not self.is_ahead(header):
+            transforms = [
+                geometry.TransformStamped(header, f"{FRAME}{name}", transform_message(pose))
+                for name, pose in placed.items()
+            ]
             self.tf(TFMessage(transforms=tuple(transforms)))
         near = min(((math.hypot(*one.pose.translation), one.name) for one in seen if one.pose), default=(0.0, ""))
         self.nearest(String(data=near[1]))
+
+    def stamp_of(self, message: Image) -> Time:
+        """Return when a picture was taken; one that does not say it was taken now."""
+        return message.header.stamp if to_nanoseconds(message.header.stamp) else to_time(self.stamp)
+
+    def is_ahead(self, header: Header) -> bool:
+        """Tell whether a picture is of the future: nobody could use transforms of that time."""
+        ahead = (to_nanoseconds(header.stamp) - self.stamp) / 1e9
+        if ahead > AHEAD:
+            self.problem = f"pictures are stamped {ahead:.1f} s in the future: is the camera's clock right?"
+        return ahead > AHEAD
+
+    def placed(self, seen: Sequence[Sight]) -> dict[str, Transform3]:
+        """Return the poses of tags and boards with names.
+
+        Of two with one name, the one that is nearer to where that was last is meant, at first the nearer one.
+        """
+        found: dict[str, Transform3] = {}
+        for one in seen:
+            if one.pose is None or not (one.name in self.boards or one.name in self.config.names):
+                continue
+            if one.name in found:
+                self.problem = f"the tag '{one.name}' is seen twice"
+            last = self.places.get(one.name, (0.0, 0.0, 0.0))
+            known = found.setdefault(one.name, one.pose)
+            found[one.name] = min(known, one.pose, key=lambda pose: math.dist(pose.translation, last))
+        self.places |= {name: pose.translation for name, pose in found.items()}
+        return found
 
     def sight(self, tag: SeenTag) -> Sight:
         """Return a tag with its name and its size."""

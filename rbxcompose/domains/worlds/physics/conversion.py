@@ -26,6 +26,7 @@ from rbxcompose.domains.worlds.physics.looks import (
     PhysicsCamera,
     add_lights,
     add_looks,
+    add_tag,
     colour_ground,
     colour_of,
 )
@@ -239,6 +240,9 @@ class _Conversion:
                 self._add_hulls(holder, shape, parts, at)
             case _:
                 raise TypeError(f"'{shape.name}' is a part of a shape")
+        at.pop("mass", None)
+        for tag in shape.tags if self.cameras else ():
+            add_tag(self.spec, holder, tag, shape.solid.height / 2, at)
 
     def _add_hulls(
         self, holder: Model, shape: WorldShape, parts: Sequence[tuple[float, WorldHull]], at: Mapping[str, Any]
@@ -373,7 +377,9 @@ class _Conversion:
         """Colour the world, and add what is seen of the robot."""
         colours = dict(zip((shape.name for shape in self.world.shapes), self.world.colours, strict=False))
         for geom in self.spec.worldbody.find_all("geom"):
-            belongs = self.names[geom.name]
+            belongs = self.names.get(geom.name)
+            if belongs is None:  # a tag
+                continue
             if belongs == GROUND:
                 colour_ground(self.spec, geom)
             elif geom.group == OF_WORLD:

@@ -145,6 +145,8 @@ class PhysicsWorld:
         for shape, mocap in zip(self._moving, self._mocaps, strict=True):
             pose = self._placed.get(shape.name) or shape.pose_at(self.time)
             self._data.mocap_pos[mocap, :2] = pose.x, pose.y
+            if shape.path is not None and shape.path.turns:
+                self._data.mocap_quat[mocap] = math.cos(pose.heading / 2), 0.0, 0.0, math.sin(pose.heading / 2)
 
     def _move_set_points(self, dt: float) -> None:
         """Move set points towards targets, as fast as their servos do."""

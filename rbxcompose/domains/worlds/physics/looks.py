@@ -16,12 +16,14 @@ from rbxcompose.domains.body.model import Shape
 from rbxcompose.domains.worlds.physics.rigid import RigidPart
 from rbxcompose.domains.worlds.physics.robot import PhysicsRobot
 from rbxcompose.domains.worlds.physics.solids import THIN, BodyRepair, BodyRepairs
-from rbxcompose.domains.worlds.shapes import WorldLight
+from rbxcompose.domains.worlds.shapes import WorldLight, WorldTag
+from rbxcompose.domains.worlds.tag_pictures import tag_picture, tag_square
 
 LOOKS = 2  # group of shapes that are seen by cameras and touch nothing
 NEAREST, FARTHEST = 0.02, 50.0  # that a camera sees [m]
 WALLS, TILES = (0.85, 0.83, 0.78), ((0.55, 0.55, 0.55), (0.7, 0.7, 0.7))  # red, green, blue
 TILE = 0.5  # side of a tile of the ground [m]
+TEXELS = 16  # pixels of a cell in the picture of a tag
 COLOURS = {
     "black": "000000", "white": "ffffff", "grey": "808080", "gray": "808080", "silver": "c0c0c0", "red": "d02020",
     "green": "2f8f3f", "blue": "2f5fbf", "yellow": "e8c820", "orange": "e88020", "brown": "8b5a2b", "purple": "803090",
@@ -102,6 +104,26 @@ def add_lights(spec: Model, lights: Sequence[WorldLight]) -> None:
         kind = mujoco.mjtLightType.mjLIGHT_SPOT  # of 180 deg: the renderer takes a point for a spot as well
         made = spec.worldbody.add_light(pos=lamp.at, type=kind, diffuse=colour, castshadow=False)
         made.cutoff, made.exponent = 180.0, 0.0
+
+
+def add_tag(spec: Model, body: Model, tag: WorldTag, above: float, at: Mapping[str, Any]) -> None:
+    """Add a tag to a body; a thing that is `at` a pose there has its middle `above` its base [m]."""
+    import mujoco
+
+    kinds: Any = mujoco
+    name = f"tag {len(spec.meshes)}"
+    picture = tag_picture(tag.number, tag.family, TEXELS)
+    side = len(picture)
+    drawn = spec.add_texture(name=name, type=kinds.mjtTexture.mjTEXTURE_2D, width=side, height=side, nchannel=3)
+    drawn.data = np.repeat(picture[..., None], 3, axis=2).tobytes()
+    material = spec.add_material(name=name, specular=0.0)
+    material.textures[kinds.mjtTextureRole.mjTEXROLE_RGB] = name
+    corners = tag_square(tag) - (0.0, 0.0, above)
+    made = spec.add_mesh(name=name, uservert=corners.ravel(), userface=[0, 1, 2, 0, 2, 3])
+    made.usertexcoord, made.userfacetexcoord = [0, 0, 0, 1, 1, 1, 1, 0], [0, 1, 2, 0, 2, 3]
+    made.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+    look = {"group": LOOKS, "mass": 0.0, "contype": 0, "conaffinity": 0, "material": name}
+    body.add_geom(type=kinds.mjtGeom.mjGEOM_MESH, meshname=name, **look, **at)
 
 
 def _add_look(

@@ -1,0 +1,118 @@
+"""How people who are tracked are told: as ROS's people stack does, to viewers, and to missions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, TypeVar
+
+from pydantic import Field
+
+from rbxcompose import sdk
+from rbxcompose.base.geometry import Pose2
+from rbxcompose.base.levels import Level
+from rbxcompose.domains.navigation.companion import SURE
+from rbxcompose.domains.navigation.people import TrackedPerson
+from rbxcompose.domains.worlds.poses import message_of
+from rbxcompose.domains.worlds.world import MAP_FRAME
+from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Vector3
+from rbxcompose.msgs.people_msgs import People, Person
+from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.std_msgs import Bool, ColorRGBA, Float32, Header
+from rbxcompose.msgs.visualization_msgs import Marker, MarkerArray
+
+RADIUS, SIDES = 0.25, 16  # [m] and corners of the circle that stands for a person
+LINE, TEXT = 0.04, 0.25  # [m] widths of lines and heights of texts
+BLIND = 2.0  # [s] without anything that can be used
+SURE_COLOUR, UNSURE_COLOUR = ColorRGBA(r=0.1, g=0.45, b=0.9, a=1.0), ColorRGBA(r=0.5, g=0.5, b=0.5, a=1.0)
+
+
+class PeopleConfig(sdk.Config):
+    """Where people are, and how far."""
+
+    stands_in: str = Field(MAP_FRAME, min_length=1)
+    """The frame in which people are: `map`, or `odom` for a robot without a map."""
+    farthest: sdk.Length = Field(6.0, gt=0)
+    """Who is farther away is not tracked."""
+    forget: sdk.Time = Field(2.0, gt=0)
+    """Who was hidden for longer is somebody else."""
+
+
+C = TypeVar("C", bound=PeopleConfig)
+
+
+class TellsPeople(sdk.Component[C]):
+    """Publishes who is seen: `people`, markers, and for missions the nearest who is no furniture."""
+
+    people = sdk.Out(People, "people")
+    markers = sdk.Out(MarkerArray, "people_markers")
+    person = sdk.Out(PoseStamped, "person")
+    distance = sdk.Out(Float32, "person_distance", unit="m")
+    seen = sdk.Out(Bool, "person_seen")
+
+    @classmethod
+    def ports(cls, config: C) -> dict[str, sdk.Port[Any]]:
+        """Return the ports, with where the robot is."""
+        base = sdk.Looks(source="base_footprint", target=config.stands_in).named("base")
+        return super().ports(config) | {"base": base}
+
+    def tell(self, found: Sequence[TrackedPerson]) -> None:
+        """Publish who is seen."""
+        header = Header(stamp=to_time(self.stamp), frame_id=self.config.stands_in)
+        self.people(People(header, tuple(map(person_message, found))))
+        self.markers(people_markers(found, header))
+
+    def report(self, found: Sequence[TrackedPerson], problem: str, taken: float) -> None:
+        """Publish what missions read, and what is wrong since it saw for the last time, at `taken` [s]."""
+        is_blind = bool(problem) and self.now - max(taken, 0.0) > BLIND
+        self.status(Level.WARN if is_blind else Level.OK, problem if is_blind else "sees", people=len(found))
+        if (base := self.bound["base"].now()) is None:
+            return
+        nearest = min(
+            (one for one in found if one.reliability >= SURE),
+            key=lambda one: math.hypot(one.x - base.x, one.y - base.y),
+            default=None,
+        )
+        self.seen(Bool(data=nearest is not None))
+        if nearest is None:
+            self.distance(Float32(data=self.config.farthest))
+            return
+        self.distance(Float32(data=math.hypot(nearest.x - base.x, nearest.y - base.y)))
+        walks = math.atan2(nearest.vy, nearest.vx)
+        header = Header(stamp=to_time(self.stamp), frame_id=self.config.stands_in)
+        self.person(PoseStamped(header, message_of(Pose2(nearest.x, nearest.y, walks))))
+
+
+def person_message(one: TrackedPerson) -> Person:
+    """Return somebody as ROS's people stack does."""
+    return Person(one.name, Point(x=one.x, y=one.y), Point(x=one.vx, y=one.vy), one.reliability, tagnames=(), tags=())
+
+
+def people_markers(found: Sequence[TrackedPerson], header: Header) -> MarkerArray:
+    """Return markers in place of all that were there before: a circle and a name for each, grey if it has not moved."""
+    drawn = [Marker(header=header, action=Marker.DELETEALL)]
+    corners = [math.tau * (side % SIDES) / SIDES for side in range(SIDES + 1)]
+    for number, one in enumerate(found):
+        colour = SURE_COLOUR if one.reliability >= SURE else UNSURE_COLOUR
+        circle = tuple(Point(one.x + RADIUS * math.cos(at), one.y + RADIUS * math.sin(at), 0.0) for at in corners)
+        outline = Marker(
+            header=header,
+            ns="people",
+            id=2 * number,
+            type=Marker.LINE_STRIP,
+            points=circle,
+            scale=Vector3(x=LINE),
+            color=colour,
+        )
+        name = Marker(
+            header=header,
+            ns="people",
+            id=2 * number + 1,
+            type=Marker.TEXT_VIEW_FACING,
+            pose=Pose(position=Point(one.x, one.y, 0.0)),
+            scale=Vector3(z=TEXT),
+            color=colour,
+            text=one.name.replace("_", " "),
+        )
+        drawn += [outline, name]
+    return MarkerArray(markers=tuple(drawn))

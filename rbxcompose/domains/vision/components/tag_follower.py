@@ -1,0 +1,244 @@
+"""Driving after a tag."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from rbxcompose import sdk
+from rbxcompose.base.geometry import Vector3, Velocity2
+from rbxcompose.base.levels import Level
+from rbxcompose.base.units import LENGTH, TIME
+from rbxcompose.domains.vision.following import Following, FollowingSettings
+from rbxcompose.manifest.fields import TopicName
+from rbxcompose.msgs import geometry_msgs as geometry
+from rbxcompose.msgs.rbxcompose_msgs import FollowTag
+from rbxcompose.msgs.stamps import to_nanoseconds
+from rbxcompose.msgs.vision_msgs import Detection3DArray
+
+LOST, NOT_SEEN = "lost", "not_seen"
+BASE, ODOM = "base_footprint", "odom"
+SOON = 0.5  # [s] without the tag, up to which it counts as seen
+ServedTag = sdk.ServedGoal[FollowTag.Goal, FollowTag.Result, FollowTag.Feedback]
+
+
+class TagFollowerConfig(sdk.Config):
+    """What it follows, and how."""
+
+    topic: TopicName = "tags"
+    """Where a `tag_detector` tells what its camera sees."""
+    frame: str = "camera_optical_frame"
+    """The optical frame of that camera."""
+    tag: Annotated[str, sdk.Live()] = ""
+    """The name or the number of the tag that it follows unless a goal says otherwise; empty for the nearest."""
+    always: Annotated[bool, sdk.Live()] = False
+    """Whether it follows without a goal, too."""
+    distance: Annotated[sdk.Length, sdk.Live()] = Field(0.7, gt=0)
+    """From the robot's middle to the tag, unless a goal says otherwise."""
+    tolerance: Annotated[sdk.Length, sdk.Live()] = Field(0.1, ge=0)
+    """By which the distance may be off."""
+    bearing: Annotated[sdk.Angle, sdk.Live()] = Field(math.radians(4), ge=0)
+    """To either side, at which it does not turn."""
+    gain: Annotated[float, Field(gt=0), sdk.Live()] = 1.0
+    """Speed in m/s for each metre that the distance is off; half as much again backwards."""
+    turn_gain: Annotated[float, Field(gt=0), sdk.Live()] = 2.5
+    """Turn rate in rad/s for each radian of the bearing."""
+    slowest: Annotated[sdk.Speed, sdk.Live()] = Field(0.05, ge=0)
+    """If it moves at all."""
+    speed: Annotated[sdk.Speed, sdk.Live()] = Field(0.5, gt=0)
+    """Largest speed ahead."""
+    back_speed: Annotated[sdk.Speed, sdk.Live()] = Field(0.3, ge=0)
+    """Largest speed backwards, where it sees nothing."""
+    turn_rate: Annotated[sdk.AngularSpeed, sdk.Live()] = Field(math.radians(85), gt=0)
+    """Largest turn rate."""
+    acceleration: Annotated[sdk.Acceleration, sdk.Live()] = Field(0.5, gt=0)
+    """Acceleration, also for braking."""
+    patience: Annotated[sdk.Time, sdk.Live()] = Field(3.0, gt=0)
+    """Without the tag, after which a goal has failed."""
+    silence: sdk.Time = Field(0.5, gt=0)
+    """Without anything from the camera, after which the robot stops at once."""
+
+
+@sdk.component("tag_follower")
+class TagFollower(sdk.Component[TagFollowerConfig]):
+    """Drives so that a tag stays ahead at a distance: the book's figures, with angles for distances to the side.
+
+    Without the tag it slows down; it stops at once if the camera is silent. It sees no obstacles: give it a mux with
+    something that brakes, or follow by `navigation: {people: {tags: ...}}`, which plans ways.
+
+    Example:
+        follow_tag: {type: tag_follower, frame: camera_optical_frame, tag: box, connect: {cmd_vel: cmd_vel/tag}}
+    """
+
+    rate = 20.0
+    cmd_vel = sdk.Out(geometry.Twist, "cmd_vel", qos="command")
+    follow = sdk.ServesAction(
+        FollowTag,
+        "follow_tag",
+        claims="base",
+        outcomes={LOST: "failure", NOT_SEEN: "failure"},
+        measures={"distance": LENGTH, "patience": TIME, "duration": TIME},
+    )
+
+    @classmethod
+    def ports(cls, config: TagFollowerConfig) -> dict[str, sdk.Port[Any]]:
+        """Return the ports, with those of its camera, and where it and the robot are."""
+        return super().ports(config) | {
+            "tags": sdk.In(Detection3DArray, config.topic).named("tags"),
+            "camera": sdk.Looks(source=config.frame, target=ODOM).named("camera"),
+            "base": sdk.Looks(source=BASE, target=ODOM).named("base"),
+        }
+
+    @classmethod
+    def capabilities(cls, config: TagFollowerConfig) -> tuple[sdk.Capability, ...]:
+        """Declare how fast it drives."""
+        speed, turn_rate = sdk.Setting(config.speed, "speed"), sdk.Setting(config.turn_rate, "turn_rate")
+        return (sdk.CommandsMotion("cmd_vel", speed, turn_rate),)
+
+    def configure(self) -> None:
+        """Follow nothing yet."""
+        self.following = Following()
+        self.goal: ServedTag | None = None
+        self.newest: Detection3DArray | None = None  # that is not taken yet
+        self.heard = self.began = self.seen = -math.inf  # [s]
+        self.target = ""  # the name of what it follows now
+        self.place: Vector3 | None = None  # where that was last, in `odom` [m]
+        self.problem = ""
+        self.drives = False
+
+    def on_tags(self, message: Detection3DArray) -> None:
+        """Take what the camera sees, now or as soon as it is known from where."""
+        self.newest, self.heard = message, self.now
+        self.take_tags()
+
+    def take_tags(self) -> None:
+        """Take the newest tags, unless that has been done."""
+        if (message := self.newest) is None:
+            return
+        if (frame := message.header.frame_id.lstrip("/")) not in ("", self.config.frame):
+            self.problem = f"tags are in '{frame}', and expected in '{self.config.frame}'"
+            return
+        try:
+            at = self.bound["camera"].transform(at=to_nanoseconds(message.header.stamp) or None)
+        except LookupError as error:
+            self.problem = str(error)
+            return
+        self.newest, self.problem = None, ""
+        meant, last = self.meant(), self.place
+        found: list[tuple[float, str, Vector3]] = []
+        for one in message.detections:
+            middle = one.bbox.center.position
+            before = middle.x, middle.y, middle.z
+            is_placed = bool(one.results) and one.results[0].hypothesis.score > 0.0 and math.isfinite(sum(before))
+            if is_placed and (one.id == meant or not meant):
+                place = at.apply(before)
+                found.append((math.hypot(*before) if last is None else math.dist(place, last), one.id, place))
+        if found:  # of several, the one that is nearest to where it was
+            _, self.target, self.place = min(found)
+            self.seen = self.now
+
+    def meant(self) -> str:
+        """Return the name of the tag that is to be followed; once one of several has been chosen, that one."""
+        asked = self.goal.request.tag if self.goal is not None else ""
+        return asked or self.config.tag or (self.target if self.now - self.seen <= self.config.patience else "")
+
+    def step(self, dt: float) -> None:
+        """Drive after the tag."""
+        goal, config = self.follow.current, self.config
+        if goal is not self.goal:
+            self.goal, self.began, self.place, self.target, self.seen = goal, self.now, None, "", -math.inf
+        self.take_tags()
+        if goal is not None and goal.cancel_requested:
+            self.rest()
+            goal.canceled()
+            self.goal = goal = None
+        silent = self.now - self.heard
+        problem = self.problem
+        if silent > config.silence:
+            problem = f"the camera has told nothing for {silent:.1f} s" if self.heard > -math.inf else "no camera has told"
+        if goal is None and not config.always:
+            if self.drives:
+                self.rest()
+            self.status(Level.OK, "follows nothing")
+            return
+        self.drives = True
+        aim = self.aim()
+        if silent > config.silence:
+            self.send(self.following.halt())
+        elif aim is None or self.now - self.seen > SOON:
+            self.send(self.following.without(dt))
+        else:
+            self.send(self.following.towards(self.settings, *aim, dt))
+        gone = self.now - max(self.seen, self.began)
+        self.status(Level.WARN if problem else Level.OK, problem or ("follows" if gone <= SOON else "has lost the tag"))
+        if goal is not None:
+            self.judge(goal, aim, gone, problem)
+
+    def judge(self, goal: ServedTag, aim: tuple[float, float] | None, gone: float, problem: str) -> None:
+        """End a goal that is over, or tell how far it is; the tag has been `gone` for a time [s]."""
+        request = goal.request
+        if gone > (request.patience or self.config.patience):
+            self.rest()
+            outcome = LOST if self.seen > -math.inf else NOT_SEEN
+            tag = self.target or self.meant() or "a tag"
+            why = problem or f"'{tag}' was not seen for {gone:.1f} s"
+            goal.aborted(f"{outcome}: {why}", FollowTag.Result(outcome=outcome, message=why))
+            self.goal = None
+        elif request.duration and self.now - self.began >= request.duration:
+            self.rest()
+            goal.succeeded()
+            self.goal = None
+        elif aim is not None:
+            goal.feedback(FollowTag.Feedback(self.target, *aim))
+
+    def accept_follow(self, goal: FollowTag.Goal) -> str:
+        """Refuse what is no distance or time."""
+        fine = all(0.0 <= number < math.inf for number in (goal.distance, goal.patience, goal.duration))
+        return "" if fine else "its distance, patience or duration is not finite, or below 0"
+
+    @property
+    def settings(self) -> FollowingSettings:
+        """Return how it drives now."""
+        config = self.config
+        asked = self.goal.request.distance if self.goal is not None else 0.0
+        return FollowingSettings(
+            asked or config.distance,
+            config.tolerance,
+            config.bearing,
+            config.gain,
+            config.turn_gain,
+            config.slowest,
+            config.speed,
+            config.back_speed,
+            config.turn_rate,
+            config.acceleration,
+        )
+
+    def aim(self) -> tuple[float, float] | None:
+        """Return the distance [m] and the bearing [rad, to the left] of the tag from where the robot is now."""
+        if self.place is None or (base := self.bound["base"].now()) is None:
+            return None
+        dx, dy = self.place[0] - base.x, self.place[1] - base.y
+        turned = math.remainder(math.atan2(dy, dx) - base.heading, math.tau)
+        return math.hypot(dx, dy), turned
+
+    def hold(self) -> None:
+        """Command a halt: no step follows while robot time stands still."""
+        if self.drives:
+            self.rest()
+
+    def stop(self) -> None:
+        """Command a halt."""
+        self.rest()
+
+    def rest(self) -> None:
+        """Command a halt."""
+        self.drives = False
+        self.send(self.following.halt())
+
+    def send(self, velocity: Velocity2) -> None:
+        """Publish a velocity."""
+        linear, angular = geometry.Vector3(x=velocity.linear), geometry.Vector3(z=velocity.angular)
+        self.cmd_vel(geometry.Twist(linear=linear, angular=angular))
