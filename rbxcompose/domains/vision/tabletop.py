@@ -108,8 +108,10 @@ class TablePlane(NamedTuple):
 
 
 class _Footprint(NamedTuple):
-    """A shape seen from above: its middle, how it is turned, its sides, and how far points are off it: root mean square,
-    and mean of what counts."""
+    """A shape seen from above: its middle, how it is turned, its sides.
+
+    `off` is how far points are off it, root mean square; `miss` is the mean of what counts of that.
+    """
 
     middle: Numbers
     yaw: float

@@ -159,8 +159,8 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
         self.steady = self.make_look(config.pictures, config.still)
         self.found: list[NamedThing] = []
         self.newest: PointCloud2 | None = None  # that is not used yet
-        self.tags_seen: tuple[float, list[tuple[str, Vector3]]] = -math.inf, []
-        self.came_at, self.used_at = self.now, -math.inf
+        self.newest_tags: Detection3DArray | None = None
+        self.came_at, self.used_at, self.tags_at = self.now, -math.inf, -math.inf
         self.problem, self.outcome, self.said = "", NOT_SEEN, ""
 
     @property
@@ -176,17 +176,23 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
             self.take_cloud()
 
     def on_tags(self, message: Detection3DArray) -> None:
-        """Note where tags are."""
+        """Keep what tags are seen: where the camera was then may become known later."""
+        self.tags_at, self.newest_tags = self.now, message
+
+    def tags_seen(self) -> list[tuple[str, Vector3]]:
+        """Return the names of tags that have been seen of late, and where they are in the level frame."""
+        message = self.newest_tags
+        if message is None or self.now - self.tags_at > RECENT:
+            return []
         try:
             camera = self.camera(message.header)
         except LookupError:
-            return  # a cloud that is taken from there says so
-        places = [
+            return []  # the next cloud comes soon
+        return [
             (plain(f"tag_{one.id}" if one.id.isdigit() else one.id), camera.apply(pose_of(one.bbox.center).translation))
             for one in message.detections
             if one.id and any(result.hypothesis.score > 0 for result in one.results)
         ]
-        self.tags_seen = self.now, places
 
     def camera(self, header: Header) -> Transform3:
         """Return where the camera was in the level frame.
@@ -217,8 +223,7 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
         self.newest, self.used_at, self.found = None, self.now, []
         if found is None:
             return
-        time, tags = self.tags_seen
-        self.found = self.names.take(self.now, found.things, tags if self.now - time <= RECENT else ())
+        self.found = self.names.take(self.now, found.things, self.tags_seen())
         to_camera = camera.inverse()
         header = Header(message.header.stamp, self.config.frame)
         detections = tuple(detection(header, one.name, one.thing, to_camera) for one in self.found)
