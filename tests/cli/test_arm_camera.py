@@ -57,7 +57,7 @@ def test_the_camera_is_found_on_a_neck_that_moves_and_its_description_does_not_m
     placed = frames.placed(found)
     assert len(found.off) == 8
     assert placed.translation == pytest.approx(MOUNTED.translation, abs=1e-5)
-    assert placed.rotation == pytest.approx(MOUNTED.rotation, abs=1e-5)
+    assert placed.inverse().compose(MOUNTED).rotation[:3] == pytest.approx((0, 0, 0), abs=1e-5)
 
 
 def test_frames_that_are_not_there_are_told() -> None:
@@ -83,10 +83,7 @@ def test_the_result_is_told_as_a_description_takes_it_and_a_pose_that_is_far_off
     written = yaml.safe_load(file.read_text())
     assert (written["parent"], written["frame"], written["poses"]) == ("neck", "camera", 21)
     assert written["at"]["x"] == "50.0 mm"
-    assert (
-        written["origin"] == {"xyz": "0.05000 0.00000 0.12000", "rpy": "-0.00000 0.60000 0.10000"}
-        or written["origin"]["rpy"] == "0.00000 0.60000 0.10000"
-    )
+    assert written["origin"] == {"xyz": "0.05000 0.00000 0.12000", "rpy": "0.00000 0.60000 0.10000"}
     assert show(result, argparse.Namespace(out=None, json=True)) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["misses"][0] == pytest.approx(math.sqrt((20 * 1e-6 + 25e-4) / 21))

@@ -193,8 +193,10 @@ class CameraResult:
     @property
     def text(self) -> str:
         """Return it as YAML, with the pose as `attach` and URDF have it."""
-        x, y, z = (f"{one * 1000:.1f} mm" for one in self.pose.translation)
-        roll, pitch, yaw = (f"{math.degrees(one):.2f} deg" for one in rpy_from_quaternion(self.pose.rotation))
+        x, y, z = (f"{round(one * 1000, 1) + 0.0:.1f} mm" for one in self.pose.translation)
+        roll, pitch, yaw = (
+            f"{round(math.degrees(one), 2) + 0.0:.2f} deg" for one in rpy_from_quaternion(self.pose.rotation)
+        )
         origin, (away, angle), (near, turn) = self.origin, self.found.misses, self.found.known_to
         return (
             f"parent: {json.dumps(self.parent)}\nframe: {json.dumps(self.frame)}\n"
