@@ -26,6 +26,15 @@ URDF = """<robot name="example">
 </robot>
 """
 NAVIGATION = "world: rbx:worlds/house.yaml\nnavigation:\n  planner: {patience: 15 s}\n  costs: {map_only: true}\n"
+TAGS = """
+components:
+  follow_tag: {type: tag_follower, speed: 0.3 m/s, turn_rate: 50 deg/s}
+muxes:
+  cmd_vel:
+    inputs:
+      navigation: {from: go_to, priority: 10, timeout: 0.5 s}
+      tag: {from: follow_tag, priority: 12, timeout: 0.5 s}
+"""
 FOLLOWER = f"""{NAVIGATION}  people: {{}}
 muxes:
   cmd_vel:
@@ -80,6 +89,7 @@ ROBOTS = {
     "head": HEAD,
     "navigation": NAVIGATION,
     "follower": FOLLOWER,
+    "tags": TAGS,
 }  # what the robot of a mission has besides, by a word of its block
 
 

@@ -31,9 +31,9 @@ DOMAINS = {
     "arms": "body servos worlds",
     "bases": "body servos worlds",
     "console": "body",
-    "navigation": "bases body worlds",
+    "navigation": "bases body vision worlds",
     "servos": "body devices",
-    "vision": "body worlds",
+    "vision": "bases body worlds",
     "worlds": "body",
 }
 """Which other domains a domain may import; one that is not named here imports none."""

@@ -1,7 +1,7 @@
 """Driving so that something stays ahead at a distance.
 
-The law and its figures are those of the follower in P. Goebel, ROS By Example, volume 2 (2015), chapter 10, with an angle
-in place of a distance to the side, and with accelerations that a base can do.
+The law and its figures are those of the follower in P. Goebel, ROS By Example, volume 2 (2015), chapter 10, with an
+angle in place of a distance to the side, and with accelerations that a base can do.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ LOCALISATION = "localisation"
 PEOPLE, FOLLOW, FOLLOWER = "people", "follow_person", "person_follower"
 SLIM = 0.2  # [m] radius of a robot without a body
 ROUND = 0.01  # [m] between the circles around a footprint and within, below which it counts as a circle
-_SCAN = "sensor_msgs/msg/LaserScan"
+_SCAN, _TAGS = "sensor_msgs/msg/LaserScan", "vision_msgs/msg/Detection3DArray"
 NO_MAP, NO_BODY, NO_TRUTH = kind("RBX3601"), kind("RBX3620"), kind("RBX3621")
 
 
@@ -157,13 +157,15 @@ class ParticlesModel(Config):
 class LocalisationModel(Config):
     """How the robot knows where it is in the map."""
 
-    type: Literal["odometry", "particles", "fake"] = "odometry"
-    """`odometry`: the odometry of the base is right; `particles`: by a laser, with a particle filter; `fake`: the
-    simulator tells."""
+    type: Literal["odometry", "particles", "tags", "fake"] = "odometry"
+    """`odometry`: the odometry of the base is right; `particles`: by a laser, with a particle filter; `tags`: by tags
+    that a camera sees; `fake`: the simulator tells."""
     from_: TopicName | None = Field(None, alias="from")
-    """The topic of the scans. Default: the first that a component publishes."""
+    """The topic of the scans, or of the tags. Default: the first that a component publishes."""
     frame: str = ""
-    """The frame of the laser. Default: that of the component that publishes the scans, or `laser_link`."""
+    """The frame of the laser, or the camera. Default: that of the component that publishes the scans or the tags."""
+    tags: dict[Name, PlanarPose] = {}
+    """Where tags and boards are, by name: each faces in the direction of its `heading`."""
     start: PlanarPose | None = None
     """Where the robot probably is at first. Default: where the simulated world puts it, or the origin of the map."""
     spread: Length = Field(0.2, ge=0)
@@ -175,14 +177,20 @@ class LocalisationModel(Config):
     particles: ParticlesModel = ParticlesModel()
     """How many particles the filter has."""
 
+    @model_validator(mode="after")
+    def _knows_tags(self) -> LocalisationModel:
+        if (self.type == "tags") != bool(self.tags):
+            raise ValueError("'type: tags' and 'tags' belong together: the places of tags by which the robot is found")
+        return self
+
 
 class TagsOfPeople(Config):
     """Tags that people carry."""
 
-    frame: str = "camera_optical_frame"
-    """The optical frame of the camera that sees them."""
-    topic: TopicName = "tags"
-    """Where its `tag_detector` tells what it sees."""
+    from_: TopicName | None = Field(None, alias="from")
+    """The topic of the tags. Default: the first that a component publishes."""
+    frame: str = ""
+    """The optical frame of their camera. Default: that of the component that publishes them."""
     names: list[Name] = []
     """The names of the tags and boards; without any, all that are seen are carried by people."""
     behind: Length = Field(0.25, ge=0)
@@ -271,7 +279,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
     }
     follower = {name: ("navigation", "follower", name) for name in FollowerModel.model_fields}
     places = {**follower, "inflation": ("navigation", "costs", "inflation", "radius")}
-    if model.localisation.type == "particles":
+    if model.localisation.type in ("particles", "tags"):
         yield _localisation(model.localisation, contents.of(world), wiring)
     elif model.localisation.type == "fake":
         yield WantedComponent(LOCALISATION, "fake_localisation", {}, ("navigation", "localisation"))
@@ -300,22 +308,25 @@ def _people(found: NavigationOfRobot, model: PeopleModel, wiring: Wiring) -> Ite
     }
     tracker, sees = "people_tracker", laser
     if (tags := model.tags) is not None:
-        tracker, sees = "tagged_people", {"frame": tags.frame, "topic": tags.topic, "tags": tags.names}
-        sees["behind"] = tags.behind
+        tracker, sees = "tagged_people", _camera(tags.from_, tags.frame, wiring)
+        sees |= {"tags": tags.names, "behind": tags.behind}
     yield WantedComponent(PEOPLE, tracker, {**sees, "farthest": model.farthest}, ("navigation", "people"))
     yield WantedComponent(FOLLOW, FOLLOWER, config, ("navigation", "people"))
 
 
 def _localisation(model: LocalisationModel, around: WorldOfRobot | None, wiring: Wiring) -> WantedComponent:
     start = model.start.pose if model.start else around.start if around else Pose2()
-    config = {
-        **_laser(model, wiring),
+    config: dict[str, object] = {
         "start": (start.x, start.y, start.heading),
         "spread": model.spread,
         "turn_spread": f"{model.turn_spread!r} rad",
         "anywhere": model.anywhere,
-        **model.particles.model_dump(),
     }
+    if model.type == "tags":
+        tags = {name: (place.x, place.y, place.heading) for name, place in model.tags.items()}
+        config |= {**_camera(model.from_, model.frame, wiring), "tags": tags}
+        return WantedComponent(LOCALISATION, "tag_localisation", config, ("navigation", "localisation"))
+    config |= {**_laser(model, wiring), **model.particles.model_dump()}
     return WantedComponent(LOCALISATION, "particle_localisation", config, ("navigation", "localisation"))
 
 
@@ -326,14 +337,24 @@ def _defaults(contents: Contents) -> Mapping[str, object]:
 
 def _laser(model: ObstaclesModel | LocalisationModel, wiring: Wiring) -> dict[str, object]:
     """Return the topic and the frame of a laser; nothing if there is none."""
-    topic, told = model.from_, {"scan_frame": model.frame} if model.frame else {}
+    topic, frame = _sensor(_SCAN, model.from_, model.frame, wiring)
+    return {"scan": topic, **({"scan_frame": frame} if frame else {})} if topic else {}
+
+
+def _camera(topic: str | None, frame: str, wiring: Wiring) -> dict[str, object]:
+    """Return where tags are told, and the frame of their camera; nothing if there are none."""
+    topic, frame = _sensor(_TAGS, topic, frame, wiring)
+    return {"topic": topic, **({"frame": frame} if frame else {})} if topic else {}
+
+
+def _sensor(kind: str, topic: str | None, frame: str, wiring: Wiring) -> tuple[str | None, str]:
+    """Return the topic and the frame of what publishes messages of a type, on a topic if one is given."""
     for made in wiring.components.values():
         for end in made.ends:
             is_meant = topic is None or end.topic.lstrip("/") == topic.lstrip("/")
-            if isinstance(end.port, Out) and end.type_name == _SCAN and is_meant:
-                frame = getattr(made.config, "frame", "laser_link")
-                return {"scan": end.topic, "scan_frame": frame, **told}
-    return {"scan": topic, **told} if topic else {}
+            if isinstance(end.port, Out) and end.type_name == kind and is_meant:
+                return end.topic, frame or getattr(made.config, "frame", "")
+    return topic, frame
 
 
 def _missions(read: NavigationOfRobot | None) -> Mapping[str, Mapping[str, object]]:
@@ -346,7 +367,7 @@ def _missions(read: NavigationOfRobot | None) -> Mapping[str, Mapping[str, objec
     files=(ROBOT, OVERLAY),
     order=64,
     brings=(MAP_SERVER, LOCALISATION, GO_TO, PEOPLE, FOLLOW),
-    outputs={GO_TO: {"cmd_vel": "cmd_vel"}, FOLLOW: {"cmd_vel": "cmd_vel"}},
+    outputs={one: {"cmd_vel": "cmd_vel"} for one in (GO_TO, FOLLOW, LOCALISATION)},
     wires=True,
     components=_components,
     defaults=_defaults,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
@@ -12,25 +12,18 @@ from rbxcompose.base.geometry import Vector3, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.base.units import LENGTH, TIME
 from rbxcompose.domains.vision.following import Following, FollowingSettings
-from rbxcompose.manifest.fields import TopicName
+from rbxcompose.domains.vision.tag_watcher import TagWatcher, TagWatcherConfig, WatchedTag
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.rbxcompose_msgs import FollowTag
-from rbxcompose.msgs.stamps import to_nanoseconds
-from rbxcompose.msgs.vision_msgs import Detection3DArray
 
 LOST, NOT_SEEN = "lost", "not_seen"
-BASE, ODOM = "base_footprint", "odom"
 SOON = 0.5  # [s] without the tag, up to which it counts as seen
 ServedTag = sdk.ServedGoal[FollowTag.Goal, FollowTag.Result, FollowTag.Feedback]
 
 
-class TagFollowerConfig(sdk.Config):
+class TagFollowerConfig(TagWatcherConfig):
     """What it follows, and how."""
 
-    topic: TopicName = "tags"
-    """Where a `tag_detector` tells what its camera sees."""
-    frame: str = "camera_optical_frame"
-    """The optical frame of that camera."""
     tag: Annotated[str, sdk.Live()] = ""
     """The name or the number of the tag that it follows unless a goal says otherwise; empty for the nearest."""
     always: Annotated[bool, sdk.Live()] = False
@@ -62,7 +55,7 @@ class TagFollowerConfig(sdk.Config):
 
 
 @sdk.component("tag_follower")
-class TagFollower(sdk.Component[TagFollowerConfig]):
+class TagFollower(TagWatcher[TagFollowerConfig]):
     """Drives so that a tag stays ahead at a distance: the book's figures, with angles for distances to the side.
 
     Without the tag it slows down; it stops at once if the camera is silent. It sees no obstacles: give it a mux with
@@ -83,15 +76,6 @@ class TagFollower(sdk.Component[TagFollowerConfig]):
     )
 
     @classmethod
-    def ports(cls, config: TagFollowerConfig) -> dict[str, sdk.Port[Any]]:
-        """Return the ports, with those of its camera, and where it and the robot are."""
-        return super().ports(config) | {
-            "tags": sdk.In(Detection3DArray, config.topic).named("tags"),
-            "camera": sdk.Looks(source=config.frame, target=ODOM).named("camera"),
-            "base": sdk.Looks(source=BASE, target=ODOM).named("base"),
-        }
-
-    @classmethod
     def capabilities(cls, config: TagFollowerConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it drives."""
         speed, turn_rate = sdk.Setting(config.speed, "speed"), sdk.Setting(config.turn_rate, "turn_rate")
@@ -99,43 +83,23 @@ class TagFollower(sdk.Component[TagFollowerConfig]):
 
     def configure(self) -> None:
         """Follow nothing yet."""
+        super().configure()
         self.following = Following()
         self.goal: ServedTag | None = None
-        self.newest: Detection3DArray | None = None  # that is not taken yet
-        self.heard = self.began = self.seen = -math.inf  # [s]
+        self.began = self.seen = -math.inf  # [s]
         self.target = ""  # the name of what it follows now
         self.place: Vector3 | None = None  # where that was last, in `odom` [m]
-        self.problem = ""
         self.drives = False
 
-    def on_tags(self, message: Detection3DArray) -> None:
-        """Take what the camera sees, now or as soon as it is known from where."""
-        self.newest, self.heard = message, self.now
-        self.take_tags()
-
-    def take_tags(self) -> None:
-        """Take the newest tags, unless that has been done."""
-        if (message := self.newest) is None:
-            return
-        if (frame := message.header.frame_id.lstrip("/")) not in ("", self.config.frame):
-            self.problem = f"tags are in '{frame}', and expected in '{self.config.frame}'"
-            return
-        try:
-            at = self.bound["camera"].transform(at=to_nanoseconds(message.header.stamp) or None)
-        except LookupError as error:
-            self.problem = str(error)
-            return
-        self.newest, self.problem = None, ""
+    def see(self, tags: list[WatchedTag]) -> None:
+        """Note where the tag is that is meant; of several, the one that is nearest to where it was."""
         meant, last = self.meant(), self.place
-        found: list[tuple[float, str, Vector3]] = []
-        for one in message.detections:
-            middle = one.bbox.center.position
-            before = middle.x, middle.y, middle.z
-            is_placed = bool(one.results) and one.results[0].hypothesis.score > 0.0 and math.isfinite(sum(before))
-            if is_placed and (one.id == meant or not meant):
-                place = at.apply(before)
-                found.append((math.hypot(*before) if last is None else math.dist(place, last), one.id, place))
-        if found:  # of several, the one that is nearest to where it was
+        found = [
+            (tag.away if last is None else math.dist(tag.pose.translation, last), tag.name, tag.pose.translation)
+            for tag in tags
+            if tag.name == meant or not meant
+        ]
+        if found:
             _, self.target, self.place = min(found)
             self.seen = self.now
 
@@ -154,10 +118,7 @@ class TagFollower(sdk.Component[TagFollowerConfig]):
             self.rest()
             goal.canceled()
             self.goal = goal = None
-        silent = self.now - self.heard
-        problem = self.problem
-        if silent > config.silence:
-            problem = f"the camera has told nothing for {silent:.1f} s" if self.heard > -math.inf else "no camera has told"
+        problem = self.trouble(config.silence)
         if goal is None and not config.always:
             if self.drives:
                 self.rest()
@@ -165,7 +126,7 @@ class TagFollower(sdk.Component[TagFollowerConfig]):
             return
         self.drives = True
         aim = self.aim()
-        if silent > config.silence:
+        if self.silent > config.silence:
             self.send(self.following.halt())
         elif aim is None or self.now - self.seen > SOON:
             self.send(self.following.without(dt))
