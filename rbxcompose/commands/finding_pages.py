@@ -23,6 +23,7 @@ FAMILIES = {
     "31": "muxes",
     "35": "rates and units",
     "36": "worlds and navigation",
+    "37": "seeing",
     "41": "missions",
     "42": "tests of missions",
     "50": "diagnostics",

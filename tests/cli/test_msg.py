@@ -54,6 +54,7 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
     folder = tmp_path / "rbxcompose_msgs"
     written = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     own = {
+        "action/FindObjects.action",
         "action/DockAt.action",
         "action/FollowPerson.action",
         "action/FollowTag.action",

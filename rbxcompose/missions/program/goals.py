@@ -58,7 +58,7 @@ def skill_of(
     `choices` are the words that texts may be. A main argument that is a pose, a time or has a dimension is required
     unless it `may_lack`. With `entries`, those are arguments, too, and only a text with choices is the main one.
     """
-    asked, results = _asked(action.Goal, entries, measures, choices), typed_fields(action.Result)
+    asked, results = _asked(action.Goal, entries, measures, choices), result_fields(action.Result)
     if may_lack:
         asked = (*asked[:2], frozenset())
     return Skill(name, *asked, claims, restartable, pausable, dict(outcomes), results, entries)
@@ -78,7 +78,7 @@ def topic_skill(
 
     Without `end`, it has no results.
     """
-    results = typed_fields(end) if end is not None else {}
+    results = result_fields(end) if end is not None else {}
     asked = _asked(order, entries)
     return Skill(name, *asked, claims, restartable, outcomes=dict(outcomes), results=results, entries=entries)
 
@@ -87,7 +87,7 @@ def service_skill(service: type[Service[Any, Any]], name: str) -> Skill | None:
     """Return a service as a skill; None if its response does not report success."""
     if service.Response.FIELDS.get(SUCCESS) != "bool":
         return None
-    arguments, results = typed_fields(service.Request), typed_fields(service.Response)
+    arguments, results = typed_fields(service.Request), result_fields(service.Response)
     return Skill(name, arguments, next(iter(arguments), ""), results=results)
 
 
@@ -137,6 +137,12 @@ def _measured(ros: str, measure: Dimension | Measures | None) -> types.Type:
 def typed_fields(message: type[Message]) -> dict[str, types.Type]:
     """Return the types of the fields that missions understand, in order."""
     return {field: _TYPES[ros] for field, ros in message.FIELDS.items() if ros in _TYPES}
+
+
+def result_fields(message: type[Message]) -> dict[str, types.Type]:
+    """Return the types of the fields of a result that missions understand, in order: also lists of texts."""
+    known = {**_TYPES, "string[]": types.list_of(types.TEXT)}
+    return {field: known[ros] for field, ros in message.FIELDS.items() if ros in known}
 
 
 def goal_of(

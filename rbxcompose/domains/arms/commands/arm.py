@@ -33,6 +33,7 @@ from rbxcompose.commands.guest import Guest, visit, wanted
 from rbxcompose.commands.lookup import add_bus_options
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, put_robot_last
 from rbxcompose.domains.arms.arm_config import ArmWorks
+from rbxcompose.domains.arms.command_camera import add_camera_options, run_camera
 from rbxcompose.domains.arms.command_line import (
     NO_MOTION,
     KeepModel,
@@ -100,6 +101,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ),
         options.Subcommand("bench", bench, _bench, (add_bench_options, *of_arm)),
         options.Subcommand("setup", setup, run_setup, (add_options, *shared)),
+        options.Subcommand(
+            "calibrate-camera",
+            "measure where a camera of a running robot is, by a tag on the hand",
+            run_camera,
+            (add_camera_options,),
+        ),
         options.Subcommand(
             "go", "move an arm of a running robot, and print how that ends", run_go, (add_go_options, keep)
         ),

@@ -12,13 +12,14 @@ from pydantic import Field
 
 from rbxcompose import sdk
 from rbxcompose.base.geometry import Transform3, rotate
-from rbxcompose.domains.arms.motion.clouds import CloudError, SeenCells, SpaceFilter, points_of
+from rbxcompose.domains.arms.motion.clouds import SeenCells, SpaceFilter
 from rbxcompose.domains.arms.motion.collisions import readers_of
 from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.scene import SCENE_LIMITS, PlacedObject, mistake_among
 from rbxcompose.domains.arms.motion.scene_messages import object_message, placed_object
 from rbxcompose.domains.body.model import Geometry
 from rbxcompose.domains.body.urdf import body_of
+from rbxcompose.msgs.clouds import CloudError, points_of
 from rbxcompose.msgs.rbxcompose_msgs import SceneObject, SceneObjects
 from rbxcompose.msgs.sensor_msgs import JointState, PointCloud2
 from rbxcompose.msgs.stamps import NANOSECONDS, to_nanoseconds

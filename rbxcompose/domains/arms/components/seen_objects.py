@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
-from rbxcompose.base.geometry import Transform3, Vector3
+from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.arms.motion.scene import SCENE_LIMITS
@@ -23,6 +23,8 @@ from rbxcompose.msgs.vision_msgs import Detection3D, Detection3DArray
 
 DETECTIONS, LOOK = "detections", "look"  # ports that depend on the configuration
 SMALLEST, LARGEST = 1e-3, 10.0  # [m] of a side
+CYLINDER = "cylinder"  # the class of what stands upright in its box, and is round
+ROUND = 1.02  # times as wide as deep the box of that may be
 AT_ORIGIN = (0.0, 0.0, 0.0)
 
 
@@ -48,6 +50,8 @@ class SeenObjectsConfig(sdk.Config):
 @sdk.component("seen_objects")
 class SeenObjects(sdk.Component[SeenObjectsConfig]):
     """Puts boxes that a camera sees into the planning scene, moves them there, and takes them out when they are gone.
+
+    A box of the class `cylinder` whose x and y are alike is one about its z.
 
     An object has the id of its detection, else the class and a number: `cup_1`. The topics `nearest_object`, to
     the camera, and `newest_object` have the name of one for missions: `pick_arm: $seen`. What an arm holds is left
@@ -144,11 +148,13 @@ class SeenObjects(sdk.Component[SeenObjectsConfig]):
 
 def added(seen: SeenObject, frame: str) -> CollisionObject:
     """Return an object as MoveIt's scene takes it."""
-    size: Vector3 = seen.sighting.size
+    x, y, z = seen.sighting.size
+    is_round = seen.sighting.label == CYLINDER and max(x, y) <= ROUND * min(x, y)
+    kind = SolidPrimitive.CYLINDER if is_round else SolidPrimitive.BOX
     return CollisionObject(
         header=Header(frame_id=frame),
         id=seen.name,
         pose=pose_message(seen.sighting.pose),
-        primitives=(SolidPrimitive(type=SolidPrimitive.BOX, dimensions=np.array(size)),),
+        primitives=(SolidPrimitive(type=kind, dimensions=np.array((z, x / 2) if is_round else (x, y, z))),),
         operation=CollisionObject.ADD,
     )

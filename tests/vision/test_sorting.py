@@ -1,0 +1,43 @@
+"""A robot with an arm finds three things on a table by their shapes and a tag, and sorts them, in virtual time."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from rbxcompose.msgs.rbxcompose_msgs import SceneObjects
+from rbxcompose.sdk.robot_events import MissionOver
+from rbxcompose.testing import Bench
+from tests.shipped import ROOT, compiled
+
+pytestmark = pytest.mark.timeout(120)
+STOOD = {"tea": (0.64, 0.16, 0.65), "can": (0.62, -0.15, 0.635), "block": (0.64, 0.0, 0.64)}
+
+
+def test_what_carries_a_tag_is_put_to_the_left_and_all_else_to_the_right() -> None:
+    path, sets = str(ROOT / "robots/porter"), ("start=sort_table",)
+    bench = Bench(plan=compiled(path, profiles=["sorting"], sets=sets, environment={}).plan)
+    scenes = bench.collect("/scene", SceneObjects)
+
+    def there() -> dict[str, tuple[float, float, float]]:
+        return {
+            one.name: (one.pose.position.x, one.pose.position.y, one.pose.position.z)
+            for one in scenes[-1].objects
+            if one.name != "table" and one.link == "base_footprint"
+        }
+
+    bench.run_until(lambda: len(scenes) > 0 and len(there()) == 3, 30.0)
+    found = there()
+    assert {name for name in found if not name.startswith("thing_")} == {"tea"}
+    for where in STOOD.values():
+        assert min(math.dist(where, place) for place in found.values()) < 0.005
+    kinds = sorted(one.shapes[0].kind for one in scenes[-1].objects if one.name != "table")
+    assert kinds == ["box", "box", "cylinder"]
+    bench.run_until(lambda: any(isinstance(event, MissionOver) for event in bench.events), 120.0)
+    [over] = [event for event in bench.events if isinstance(event, MissionOver)]
+    assert over.outcome == "success", over.message
+    placed = there()
+    assert placed["tea"][1] == pytest.approx(0.4, abs=0.03)
+    others = sorted(y for name, (_, y, _) in placed.items() if name != "tea")
+    assert others == pytest.approx([-0.42, -0.3], abs=0.03)
