@@ -8,13 +8,21 @@ from typing import Any
 
 import pytest
 
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.plan.model import Instance
 from rbxcompose.domains.arms.motion.gaze import past
-from rbxcompose.msgs.geometry_msgs import Point, PointStamped
+from rbxcompose.domains.arms.section_models import HeadTracking
+from rbxcompose.msgs.control_msgs import PointHead
+from rbxcompose.msgs.geometry_msgs import Point, PointStamped, Pose, PoseStamped, Transform, TransformStamped, Vector3
 from rbxcompose.msgs.rbxcompose_msgs import LookAtPoint
+from rbxcompose.msgs.stamps import to_duration, to_time
 from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.msgs.visualization_msgs import Marker
 from rbxcompose.sdk.bound import Outcome
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
+from tests.conftest import ROOT
 from tests.shipped import robot_and_plan
 
 TYPES = ("head", "servo_bus", "scene", "transforms")
@@ -139,3 +147,120 @@ def test_a_point_that_moves_is_followed(parts: dict[str, Instance]) -> None:
     assert max(off[40:]) < math.radians(8)
     bench.publish("/head/target", PointStamped(header=Header(frame_id="nowhere")))
     assert any("a target is not followed: there is no link 'nowhere'" in text for text in bench.texts())
+
+
+@pytest.mark.parametrize("mode", ["position", "speed"])
+@pytest.mark.parametrize("rate", [20, 10])
+def test_a_target_at_30_degrees_a_second_is_kept_within_3_degrees(
+    parts: dict[str, Instance], mode: str, rate: int
+) -> None:
+    bench = robot(parts, tracks=HeadTracking.model_validate({"mode": mode}))
+    off = []
+
+    def place(time: float) -> tuple[float, float, float]:
+        angle = math.radians(40) * math.sin(0.75 * time)  # at 30 deg/s in the middle
+        return 1.5 * math.cos(angle), 1.5 * math.sin(angle), 1.0
+
+    for cycle in range(200):
+        if cycle % (20 // rate) == 0:
+            bench.publish("/head/target", PointStamped(header=Header(), point=Point(*place(cycle * 0.05))))
+        bench.advance(0.05)
+        off.append(angle_to(bench, place((cycle + 1) * 0.05)))
+    assert max(off[30:]) < math.radians(3)
+
+
+def head_that(*sets: str, profile: str = "") -> tuple[Bench, Any]:
+    """Return a head of two servos whose manifest is changed, and its component."""
+    profiles = [profile] if profile else []
+    plan = compile_robot(str(ROOT / "robots/head_only"), profiles=profiles, sets=sets, environment={}).plan
+    assert plan is not None
+    bench = Bench(plan=plan)
+    bench.advance(0.5)
+    return bench, bench.component("head")
+
+
+def past_point(head: Any, point: tuple[float, float, float]) -> float:
+    return past(head.body.poses(head.positions)["camera_depth_frame"].inverse().apply(point))
+
+
+def test_poses_on_a_topic_are_followed_until_they_are_lost() -> None:
+    bench, head = head_that("heads.head.tracks.topic=target_pose", "heads.head.tracks.recentre=500 ms")
+    for _ in range(40):
+        bench.publish("/target_pose", PoseStamped(Header(), Pose(Point(1.0, 0.5, 0.2))))
+        bench.advance(0.05)
+    assert past_point(head, (1.0, 0.5, 0.2)) < math.radians(1)
+    bench.advance(6.0)
+    assert head.positions == pytest.approx(dict.fromkeys(head.positions, 0.0), abs=0.05)
+
+
+def test_a_frame_is_followed_until_nobody_says_where_it_is() -> None:
+    bench, head = head_that("heads.head.tracks.frame=tag_box")
+    for _ in range(40):
+        at = Transform(Vector3(1.0, -0.5, 0.2))
+        placed = TransformStamped(Header(to_time(bench.clock.stamp()), head.body.root), "tag_box", at)
+        bench.publish("/tf", TFMessage(transforms=(placed,)), Qos.STATE)
+        bench.advance(0.05)
+    assert past_point(head, (1.0, -0.5, 0.2)) < math.radians(1)
+    bench.advance(1.5)
+    assert head.tracker.state != "follows"
+
+
+def test_the_target_of_the_book_is_followed() -> None:
+    bench, head = head_that(profile="tracking")
+    told = bench.collect("/target_pose", PoseStamped, Qos.COMMAND)
+    markers = bench.collect("/target_marker", Marker)
+    off = []
+    bench.advance(2.0)
+    for _ in range(200):
+        bench.advance(0.05)
+        at = told[-1].pose.position
+        link = head.body.poses(head.positions)[told[-1].header.frame_id]
+        off.append(past_point(head, link.apply((at.x, at.y, at.z))))
+    assert max(off) < math.radians(16)  # it turns around at once, twice in each round
+    assert sorted(off)[len(off) // 2] < math.radians(3)
+    assert markers[-1].pose.position == told[-1].pose.position
+    ys = [one.pose.position.y for one in told]
+    assert (min(ys), max(ys)) == pytest.approx((-0.2, 0.2), abs=0.01)
+
+
+def pointed(bench: Bench, **goal: Any) -> tuple[Outcome, str, float]:
+    """Return how a goal of `point_head` ends, what is said, and how long it took [s]."""
+    ends: list[Any] = []
+    goal = {"target": PointStamped(Header(), Point(1.0, 0.4, 1.0)), **goal}
+    bench.bus.action_client("me", "/head/point_head", PointHead)(PointHead.Goal(**goal), ends.append)
+    for cycle in range(200):
+        bench.advance(0.05)
+        if ends:
+            return ends[0].outcome, ends[0].message, cycle * 0.05
+    raise AssertionError("it does not end")
+
+
+def test_any_link_that_the_head_turns_is_pointed_along_any_axis(parts: dict[str, Instance]) -> None:
+    bench = robot(parts)
+    assert pointed(bench)[0] is Outcome.SUCCEEDED
+    assert angle_to(bench, (1.0, 0.4, 1.0)) < math.radians(1)
+    optical = {"pointing_frame": "camera_depth_optical_frame", "pointing_axis": Vector3(z=2.0)}
+    goal = PointStamped(Header(), Point(1.0, -0.4, 1.0))
+    assert pointed(bench, target=goal, **optical)[0] is Outcome.SUCCEEDED
+    assert angle_to(bench, (1.0, -0.4, 1.0)) < math.radians(1)
+
+
+def test_its_velocity_and_its_duration_are_kept(parts: dict[str, Instance]) -> None:
+    bench = robot(parts)
+    assert pointed(bench, min_duration=to_duration(2.0))[2] >= 2.0
+    assert pointed(bench, target=PointStamped(Header(), Point(1.0, -0.4, 1.0)), max_velocity=0.3)[2] >= 2.0
+
+
+@pytest.mark.parametrize(
+    ("goal", "outcome"),
+    [
+        ({"target": PointStamped(Header(), Point(math.nan, 0.0, 0.0))}, Outcome.REJECTED),
+        ({"pointing_frame": "nose"}, Outcome.REJECTED),
+        ({"pointing_frame": "base_link"}, Outcome.REJECTED),
+        ({"max_velocity": -1.0}, Outcome.REJECTED),
+        ({"target": PointStamped(Header(frame_id="nowhere"), Point(1.0, 0.0, 1.0))}, Outcome.ABORTED),
+        ({"target": PointStamped(Header(), Point(-5.0, 0.0, 0.8))}, Outcome.ABORTED),
+    ],
+)
+def test_what_cannot_be_pointed_at_fails(parts: dict[str, Instance], goal: dict[str, Any], outcome: Outcome) -> None:
+    assert pointed(robot(parts), **goal)[0] is outcome

@@ -17,7 +17,7 @@ from rbxcompose.manifest.section import OPTIONS
 WHOLE = "whole_"  # prefix of a definition that allows neither to remove keys nor to omit required ones
 SECTION = "section_"  # prefix of the definition of a section
 REMOVED = "removed"
-OR_REMOVED = "_or_removed"  # suffix of a definition to which that is added
+OR_REMOVED = "_or_no"  # suffix of a definition to which that is added
 PRESENT = "present"
 # No `enum` or `type`: editors would propose `null` and `""` as values of every key.
 _EMPTY: Schema = {"maxLength": 0, "not": {"type": ["number", "boolean", "object", "array"]}}
@@ -44,14 +44,10 @@ def laid_over(definitions: Mapping[str, Schema]) -> dict[str, Schema]:
 
 
 def _untyped(definitions: Mapping[str, Schema]) -> Schema:
-    """Return of which types the keys of a component are that does not repeat its type, one that users list."""
-    owners: dict[str, list[str]] = {}
-    for name in (name.removeprefix(COMPONENT) for name in definitions if name.startswith(COMPONENT)):
-        for key, schema in definitions[f"{COMPONENT}{name}"]["properties"].items():
-            if key not in (TYPE, *OPTIONS) and "description" in schema:  # a group of fields may have none
-                owners.setdefault(key, []).append(f"`{name}`")
-    keys = {key: {"description": f"Of {', '.join(names)}."} for key, names in sorted(owners.items())}
-    return {"if": {"not": {"anyOf": [{"required": [TYPE]}]}}, "then": {"properties": keys}}
+    """Return the keys of a component that does not repeat its type, one that users list, for completion."""
+    known = [name for name in definitions if name.startswith(COMPONENT)]
+    keys = {key for name in known for key in definitions[name]["properties"]} - {TYPE, *OPTIONS}
+    return {"if": {"not": {"anyOf": [{"required": [TYPE]}]}}, "then": {"properties": dict.fromkeys(sorted(keys), True)}}
 
 
 def or_removed(schema: Schema) -> Schema:
