@@ -94,6 +94,17 @@ def quaternion_about(axis: Vector3, angle: float) -> Quaternion:
     return (axis[0] * sine, axis[1] * sine, axis[2] * sine, math.cos(angle / 2))
 
 
+def quaternion_between(before: Vector3, after: Vector3) -> Quaternion:
+    """Return a rotation that turns one unit vector into another."""
+    (ax, ay, az), (bx, by, bz) = before, after
+    w = 1.0 + ax * bx + ay * by + az * bz
+    if w < 1e-9:  # opposite: half a turn about anything normal to it
+        return (0.0, 1.0, 0.0, 0.0) if abs(ay) < 0.9 else (1.0, 0.0, 0.0, 0.0)
+    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    return (x / length, y / length, z / length, w / length)
+
+
 def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
     """Return the rotation by `roll` about x, then `pitch` about y, then `yaw` about z [rad], as URDF has it."""
     about_x = quaternion_about((1.0, 0.0, 0.0), roll)

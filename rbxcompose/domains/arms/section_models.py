@@ -3,11 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, WithJsonSchema, field_validator
 
-from rbxcompose.base.config import LINK, OBJECT, Angle, Config, Frequency, Length, LinkName, Name, Refers, Time
+from rbxcompose.base.config import (
+    LINK,
+    OBJECT,
+    Angle,
+    AngularSpeed,
+    Config,
+    Frequency,
+    Length,
+    LinkName,
+    Live,
+    Name,
+    Refers,
+    Time,
+)
+from rbxcompose.domains.arms.motion.head_tracking import HeadTrackingSettings
 from rbxcompose.manifest.fields import TopicName
 
 AUTOMATIC, FAST = "automatic", "fast"
@@ -165,3 +179,39 @@ class SolverModel(Config):
     """How far it may be turned, if a goal does not say."""
     prefer: Name | None = None
     """The pose of the arm that its joints should be near to where several positions do, if a goal does not name one."""
+
+
+class HeadTracking(Config):
+    """What a head follows by itself while it has no goal, and how."""
+
+    frame: str = ""
+    """A frame, such as that of a tag with a name (`tag_box`)."""
+    topic: TopicName | None = None
+    """A topic with poses, such as `target_pose`. Points on `NAME/target` are followed in any case."""
+    mode: Annotated[Literal["position", "speed"], Live()] = "speed"
+    """`position`: it goes to where the target is; `speed`: at a speed by how far away that is."""
+    gain: Annotated[float, Field(gt=0), Live()] = 5.0
+    """Speed in rad/s for each radian that is missing; by positions, the part that it makes up for at once, up to 1."""
+    threshold: Annotated[Angle, Live()] = Field(0.0, ge=0)
+    """What it does not make up for."""
+    speed: Annotated[AngularSpeed, Live()] = Field(1.5, gt=0)
+    """Largest speed of a joint, in the mode `speed`."""
+    slowest: Annotated[AngularSpeed, Live()] = Field(0.001, ge=0)
+    """Smallest one, if it moves."""
+    ahead: Annotated[Angle, Live()] = Field(0.5, gt=0)
+    """How far ahead of its joints it sends them."""
+    delay: Annotated[Time, Live()] = Field(0.1, ge=0, le=1)
+    """How late joints are where they should be: the target is expected so far ahead."""
+    lost: Annotated[Time, Live()] = Field(0.5, gt=0)
+    """Without a target, after which that is lost, and the head slows down."""
+    recentre: Annotated[Time, Live()] = Field(2.0, ge=0)
+    """After which it looks ahead again; with 0, it does not."""
+    search: Annotated[Time, Live()] = Field(0.0, ge=0)
+    """How long it looks around before that."""
+    calm: Annotated[AngularSpeed, Live()] = Field(0.3, gt=0)
+    """How fast it looks around, and back."""
+
+    @property
+    def settings(self) -> HeadTrackingSettings:
+        """Return how it follows."""
+        return HeadTrackingSettings(**self.model_dump(exclude={"frame", "topic"}))

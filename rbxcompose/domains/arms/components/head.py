@@ -1,4 +1,4 @@
-"""Points the camera of a head at things, and follows a point with it."""
+"""Points the camera of a head at things, and follows what moves with it."""
 
 from __future__ import annotations
 
@@ -17,24 +17,28 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.units import ANGLE, LENGTH, TIME
 from rbxcompose.domains.arms.arm_config import ArmJointConfig
 from rbxcompose.domains.arms.motion.gaze import NEAREST, Aiming, Gaze
+from rbxcompose.domains.arms.motion.head_tracking import HeadTracker
 from rbxcompose.domains.arms.motion.scene import SCENE_LIMITS
 from rbxcompose.domains.arms.motion.scene_messages import placed_object
 from rbxcompose.domains.arms.reasons import REASONS, GraspReason, MotionReason
+from rbxcompose.domains.arms.section_models import HeadTracking
 from rbxcompose.domains.body.urdf import body_of
 from rbxcompose.domains.servos.limits import MotionLimits
-from rbxcompose.msgs.control_msgs import FollowJointTrajectory
-from rbxcompose.msgs.geometry_msgs import PointStamped
+from rbxcompose.msgs.control_msgs import FollowJointTrajectory, PointHead
+from rbxcompose.msgs.geometry_msgs import Point, PointStamped, PoseStamped
 from rbxcompose.msgs.rbxcompose_msgs import LookAtPoint, SceneObjects
 from rbxcompose.msgs.sensor_msgs import JointState
-from rbxcompose.msgs.stamps import to_duration
+from rbxcompose.msgs.stamps import to_duration, to_seconds
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
 
-LOOK, FOLLOW, SCENE, TARGET, STREAM = "look", "follow", "scene", "target", "stream"  # its ports
+LOOK, POINT, FOLLOW, SCENE, STREAM = "look", "point", "follow", "scene", "stream"  # its ports
+TARGET, POSE = "target", "pose"
+STATIONARY = 1.5  # times as fast as on average is a joint in the middle of a motion from rest to rest
 SETTLING = 3.0  # [s] in which joints, the scene and frames become known
 CLOSE = math.radians(1)  # [rad] by which it may look past a point, unless a goal says otherwise
 OUTCOMES = (*REASONS, str(GraspReason.UNKNOWN_OBJECT))
 MEASURES = {**dict.fromkeys(("x", "y", "z"), LENGTH), "tolerance": ANGLE, "duration": TIME}
-LookGoal = sdk.ServedGoal[LookAtPoint.Goal, LookAtPoint.Result, LookAtPoint.Feedback]
+HeadGoal = sdk.ServedGoal[Any, Any, Any]  # of `look_at` or of `point_head`
 LATER = (MotionReason.UNKNOWN_START, MotionReason.UNKNOWN_SCENE)  # may be known soon
 
 
@@ -69,14 +73,17 @@ class HeadConfig(Config):
     """Whether the robot has a scene whose objects it can look at."""
     frames: tuple[str, ...] = ()
     """Frames outside of the body in which points may be."""
+    tracks: HeadTracking = HeadTracking()
+    """What it follows by itself."""
 
 
 @sdk.component("head")
 class Head(sdk.Component[HeadConfig]):
     """Turns a head so that its camera looks at a point, or at the middle of an object of the scene.
 
-    The action is `NAME/look_at`. Points on the topic `NAME/target` are followed as they come. Where the head is, the
-    rest of the body is: it may not collide on its way, so nothing is examined.
+    The actions are `NAME/look_at`, and `NAME/point_head` as in `control_msgs`. Without a goal it follows points on the
+    topic `NAME/target`, or what `tracks` says. Where the head is, the rest of the body is: it may not collide on its
+    way, so nothing is examined.
 
     Example:
         neck: {type: head, name: neck, skill: look_at, camera: face, controller: look,
@@ -88,7 +95,6 @@ class Head(sdk.Component[HeadConfig]):
 
     made_by = "Each entry of `heads` runs one."
     rate = 20.0
-    steps_for_goals = True
     joint_states = sdk.In(JointState, "joint_states", is_open=True)
 
     @classmethod
@@ -104,6 +110,9 @@ class Head(sdk.Component[HeadConfig]):
         )
         found: dict[str, sdk.Port[Any]] = {
             LOOK: look.named(LOOK),
+            POINT: sdk.ServesAction(PointHead, f"{config.name}/point_head", claims=config.controller, skill=None).named(
+                POINT
+            ),
             FOLLOW: sdk.CallsAction(FollowJointTrajectory, config.follow).named(FOLLOW),
         }
         if config.sees_scene:
@@ -112,6 +121,8 @@ class Head(sdk.Component[HeadConfig]):
             topic = f"{config.name}/target"
             found[TARGET] = sdk.In(PointStamped, topic, qos="command", is_open=True, may_be_silent=True).named(TARGET)
             found[STREAM] = sdk.Out(JointTrajectory, config.stream).named(STREAM)
+            if (poses := config.tracks.topic) is not None:
+                found[POSE] = sdk.In(PoseStamped, poses, qos="command", may_be_silent=True).named(POSE)
         root = body_of(config.urdf).root
         looks = {_look(frame): sdk.Looks(source=frame, target=root).named(_look(frame)) for frame in config.frames}
         return super().ports(config) | found | looks
@@ -119,19 +130,21 @@ class Head(sdk.Component[HeadConfig]):
     def configure(self) -> None:
         """Read the body."""
         self.body = body_of(self.config.urdf)
-        limits = {name: MotionLimits(joint.lower, joint.upper) for name, joint in self.config.joints.items()}
-        self.gaze = Gaze(self.body, self.config.camera, limits)
+        self.limits = {name: MotionLimits(joint.lower, joint.upper) for name, joint in self.config.joints.items()}
+        self.gaze = Gaze(self.body, self.config.camera, self.limits)
+        self.tracker = HeadTracker(self.limits)
         self.positions: dict[str, float] = {}
         self.objects: Mapping[str, Vector3] | None = None  # middles in the frame of their links; None while unknown
         self.links: Mapping[str, str] = {}
-        self.goal: LookGoal | None = None
+        self.goal: HeadGoal | None = None
+        self.aimer = self.gaze  # of the goal
         self.sent: sdk.SentGoal | None = None
         self.began, self.said = 0.0, ""
 
     @property
     def occupation(self) -> str:
         """Return that it moves."""
-        return f"head {self.name} moves" if self.sent is not None else ""
+        return f"head {self.config.name} moves" if self.sent is not None else ""
 
     def on_joint_states(self, message: JointState) -> None:
         """Note where joints are."""
@@ -144,14 +157,45 @@ class Head(sdk.Component[HeadConfig]):
         self.links = {object_.name: object_.link for object_ in placed}
 
     def on_target(self, message: PointStamped) -> None:
-        """Look at a point that moves; goals come first."""
-        at = message.point
-        found = self.aimed((at.x, at.y, at.z), message.header.frame_id) if self.goal is None else None
+        """Follow a point; goals come first."""
+        self.see((message.point.x, message.point.y, message.point.z), message.header.frame_id)
+
+    def on_pose(self, message: PoseStamped) -> None:
+        """Follow where a pose is."""
+        at = message.pose.position
+        self.see((at.x, at.y, at.z), message.header.frame_id)
+
+    def see(self, point: Vector3, frame: str) -> None:
+        """Follow a point of a frame."""
+        found = self.aimed(point, frame)
         self.said, before = found.text if isinstance(found, NoAim) else "", self.said
         if self.said and self.said != before:
             self.warn(f"a target is not followed: {self.said}")
         if isinstance(found, Aiming):
-            self.bound[STREAM](trajectory(found, 0.0))
+            self.tracker.see(found.positions, self.now)
+
+    def watch_frame(self) -> None:
+        """Follow a frame, as long as somebody says where it is."""
+        lost = round(self.config.tracks.lost * 1e9)
+        frame = self.config.tracks.frame
+        try:
+            self.bound[_look(frame)].transform(at=self.stamp - lost)
+        except LookupError:
+            return  # it is lost, or was never seen
+        self.see((0.0, 0.0, 0.0), frame)
+
+    def track(self, dt: float) -> None:
+        """Send the joints after what is followed, if there is no goal."""
+        tracks = self.config.tracks
+        if tracks.frame and not self.body.links.keys() & {tracks.frame}:
+            self.watch_frame()
+        elif tracks.frame:
+            self.see((0.0, 0.0, 0.0), tracks.frame)
+        if self.positions.keys() < self.limits.keys():
+            return
+        told = self.tracker.update(tracks.settings, self.now, dt, self.positions)
+        if told is not None:
+            self.bound[STREAM](trajectory(told, 0.0))
 
     def accept_look(self, goal: LookAtPoint.Goal) -> str:
         """Refuse what is no goal."""
@@ -159,54 +203,112 @@ class Head(sdk.Component[HeadConfig]):
             return "the goal is not finite"
         return "its tolerance and its duration are not below 0" if min(goal.tolerance, goal.duration) < 0.0 else ""
 
+    def accept_point(self, goal: PointHead.Goal) -> str:
+        """Refuse what is no goal, and a frame that the head does not turn."""
+        at, axis = goal.target.point, goal.pointing_axis
+        if not all(map(math.isfinite, (at.x, at.y, at.z, axis.x, axis.y, axis.z, goal.max_velocity))):
+            return "the goal is not finite"
+        frame = goal.pointing_frame or self.config.camera
+        if frame not in self.body.links:
+            return f"there is no link '{plain(frame)}' that could point"
+        turned = {joint.name for joint in self.body.joints_above(frame)}
+        if not turned & self.limits.keys():
+            return f"the head does not turn '{plain(frame)}'"
+        return "its velocity is not below 0" if goal.max_velocity < 0.0 else ""
+
     def step(self, dt: float) -> None:
-        """Begin with a new goal; end one that was cancelled."""
-        goal = self.bound[LOOK].current
+        """Begin with a new goal; end one that was cancelled; follow what moves if there is none."""
+        goal = self.newest()
         if goal is not self.goal:
             self.let_go()
             self.goal, self.began = goal, self.now
+            self.aimer = self.aimer_of(goal.request) if goal is not None else self.gaze
         if goal is None:
+            if STREAM in self.bound:
+                self.track(dt)
             return
         if goal.cancel_requested:
             self.let_go()
-            goal.canceled(LookAtPoint.Result(outcome=MotionReason.INTERRUPTED, message="it was cancelled"))
+            if isinstance(goal.request, LookAtPoint.Goal):
+                goal.canceled(LookAtPoint.Result(outcome=MotionReason.INTERRUPTED, message="it was cancelled"))
+            else:
+                goal.canceled()
             self.goal = None
         elif self.sent is None:
             self.begin(goal)
         else:
-            goal.feedback(LookAtPoint.Feedback(angle=self.past(goal.request)))
+            angle = self.past(goal.request)
+            look = isinstance(goal.request, LookAtPoint.Goal)
+            goal.feedback(LookAtPoint.Feedback(angle=angle) if look else PointHead.Feedback(pointing_angle_error=angle))
 
-    def begin(self, goal: LookGoal) -> None:
+    def newest(self) -> HeadGoal | None:
+        """Return the goal to work at: of two, the newer one, which ends the other."""
+        ends: tuple[HeadGoal | None, ...] = (self.bound[LOOK].current, self.bound[POINT].current)
+        current = [one for one in ends if one is not None]
+        if len(current) == 2:
+            old = self.goal if self.goal in current else current[1]
+            if old is not None:
+                old.aborted("replaced by a newer goal")
+                current.remove(old)
+        return current[0] if current else None
+
+    def aimer_of(self, request: LookAtPoint.Goal | PointHead.Goal) -> Gaze:
+        """Return what aims for a goal: the camera along x, or another link along an axis."""
+        if isinstance(request, LookAtPoint.Goal):
+            return self.gaze
+        axis = (request.pointing_axis.x, request.pointing_axis.y, request.pointing_axis.z)
+        length = math.hypot(*axis)
+        unit = (axis[0] / length, axis[1] / length, axis[2] / length) if length else (1.0, 0.0, 0.0)
+        frame = request.pointing_frame or self.config.camera
+        above = {joint.name for joint in self.body.joints_above(frame)}
+        limits = {name: one for name, one in self.limits.items() if name in above}
+        return Gaze(self.body, frame, limits, unit)
+
+    def begin(self, goal: HeadGoal) -> None:
         """Send the head to where it looks at the point, or report why it cannot."""
-        found = self.aim(goal.request)
-        if isinstance(found, Aiming) and found.angle > (most := goal.request.tolerance or CLOSE):
+        request = goal.request
+        found = self.aim(request)
+        most = (request.tolerance if isinstance(request, LookAtPoint.Goal) else 0.0) or CLOSE
+        if isinstance(found, Aiming) and found.angle > most:
             words = ", ".join(f"'{name}'" for name in found.blocked) or "its joints"
             text = f"it would look {math.degrees(found.angle):.1f} deg past it, more than {math.degrees(most):.1f} deg"
             found = NoAim(MotionReason.GOAL_OUT_OF_REACH, f"{text}: {words} can go no farther")
         if isinstance(found, Aiming):
-            wanted = FollowJointTrajectory.Goal(trajectory=trajectory(found, goal.request.duration))
+            wanted = FollowJointTrajectory.Goal(trajectory=trajectory(found.positions, self.duration(request, found)))
             self.sent = self.bound[FOLLOW](wanted, lambda end: self.arrived(goal, end))
         elif found.reason not in LATER or self.now - self.began >= SETTLING:
             self.fail(goal, found)
 
-    def arrived(self, goal: LookGoal, end: sdk.Ended[FollowJointTrajectory.Result]) -> None:
+    def duration(self, request: LookAtPoint.Goal | PointHead.Goal, aim: Aiming) -> float:
+        """Return how long a motion shall take [s]; 0 is as short as possible."""
+        if isinstance(request, LookAtPoint.Goal):
+            return request.duration
+        farthest = max(abs(to - self.positions[name]) for name, to in aim.positions.items())
+        at_least = STATIONARY * farthest / request.max_velocity if request.max_velocity else 0.0
+        return max(to_seconds(request.min_duration), at_least)
+
+    def arrived(self, goal: HeadGoal, end: sdk.Ended[FollowJointTrajectory.Result]) -> None:
         """End the goal with the motion, if it is still wanted."""
         if goal is not self.goal:
             return
         self.sent = None
         if end.outcome is sdk.Outcome.SUCCEEDED:
             self.goal = None
-            goal.succeeded(LookAtPoint.Result(angle=self.past(goal.request)))
+            look = isinstance(goal.request, LookAtPoint.Goal)
+            goal.succeeded(LookAtPoint.Result(angle=self.past(goal.request)) if look else PointHead.Result())
         else:
             said = end.result.error_string if end.result is not None else ""
             text = said or end.message or f"its trajectory was {end.outcome}"
             self.fail(goal, NoAim(MotionReason.NOT_FOLLOWED, text))
 
-    def fail(self, goal: LookGoal, failure: NoAim) -> None:
+    def fail(self, goal: HeadGoal, failure: NoAim) -> None:
         """End the goal."""
         self.goal = None
-        result = LookAtPoint.Result(outcome=failure.reason, message=failure.text)
-        goal.aborted(f"{failure.reason}: {failure.text}", result)
+        text = f"{failure.reason}: {failure.text}"
+        if isinstance(goal.request, LookAtPoint.Goal):
+            goal.aborted(text, LookAtPoint.Result(outcome=failure.reason, message=failure.text))
+        else:
+            goal.aborted(text)
 
     def let_go(self) -> None:
         """Let the head come to rest."""
@@ -216,19 +318,22 @@ class Head(sdk.Component[HeadConfig]):
 
     # Where points are
 
-    def aim(self, request: LookAtPoint.Goal) -> Aiming | NoAim:
+    def aim(self, request: LookAtPoint.Goal | PointHead.Goal) -> Aiming | NoAim:
         """Return how to look at what a goal names."""
         point = self.point_of(request)
-        return point if isinstance(point, NoAim) else self.aimed(*point)
+        return point if isinstance(point, NoAim) else self.aimed(*point, self.aimer)
 
-    def past(self, request: LookAtPoint.Goal) -> float:
+    def past(self, request: LookAtPoint.Goal | PointHead.Goal) -> float:
         """Return by how much the camera looks past what a goal names now [rad]; nan if that is unknown."""
         found = self.point_of(request)
         point = found if isinstance(found, NoAim) else self.in_root(*found)
-        return math.nan if isinstance(point, NoAim) else self.gaze.angle(point, self.positions)
+        return math.nan if isinstance(point, NoAim) else self.aimer.angle(point, self.positions)
 
-    def point_of(self, request: LookAtPoint.Goal) -> tuple[Vector3, str] | NoAim:
+    def point_of(self, request: LookAtPoint.Goal | PointHead.Goal) -> tuple[Vector3, str] | NoAim:
         """Return a point, and its frame."""
+        if isinstance(request, PointHead.Goal):
+            at: Point = request.target.point
+            return (at.x, at.y, at.z), request.target.header.frame_id
         if not request.object:
             return (request.x, request.y, request.z), request.frame
         if self.objects is None:
@@ -240,16 +345,17 @@ class Head(sdk.Component[HeadConfig]):
             return NoAim(GraspReason.UNKNOWN_OBJECT, text)
         return self.objects[request.object], self.links[request.object]
 
-    def aimed(self, point: Vector3, frame: str) -> Aiming | NoAim:
-        """Return how to look at a point of a frame."""
+    def aimed(self, point: Vector3, frame: str, aimer: Gaze | None = None) -> Aiming | NoAim:
+        """Return how to look at a point of a frame with the camera, or with something else."""
+        aimer = aimer or self.gaze
         there = self.in_root(point, frame)
         if isinstance(there, NoAim):
             return there
         if missing := [name for name in self.config.joints if name not in self.positions]:
             return NoAim(MotionReason.UNKNOWN_START, f"nothing has reported where '{missing[0]}' is")
-        if self.gaze.distance(there, self.positions) < NEAREST:
+        if aimer.distance(there, self.positions) < NEAREST:
             return NoAim(MotionReason.GOAL_OUT_OF_REACH, "the point is within the camera")
-        return self.gaze.aimed(there, self.positions)
+        return aimer.aimed(there, self.positions)
 
     def in_root(self, point: Vector3, frame: str) -> Vector3 | NoAim:
         """Return where a point of a frame is in the body's root."""
@@ -266,11 +372,10 @@ class Head(sdk.Component[HeadConfig]):
             return NoAim(MotionReason.UNKNOWN_SCENE, str(error))
 
 
-def trajectory(aim: Aiming, duration: float) -> JointTrajectory:
-    """Return the way to an aim; a duration of 0 s is as fast as the joints can."""
-    positions = np.array([*aim.positions.values()])
-    point = JointTrajectoryPoint(positions=positions, time_from_start=to_duration(duration))
-    return JointTrajectory(joint_names=tuple(aim.positions), points=(point,))
+def trajectory(positions: Mapping[str, float], duration: float) -> JointTrajectory:
+    """Return the way to positions; a duration of 0 s is as fast as the joints can."""
+    point = JointTrajectoryPoint(positions=np.array([*positions.values()]), time_from_start=to_duration(duration))
+    return JointTrajectory(joint_names=tuple(positions), points=(point,))
 
 
 def _look(frame: str) -> str:

@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import Transform3, Vector3, composed
+from rbxcompose.base.geometry import Transform3, Vector3, composed, quaternion_between
 from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.servos.limits import MotionLimits
@@ -37,9 +37,15 @@ class Aiming:
 
 
 class Gaze:
-    """Aims a camera; `joints` are those of the head with their limits, all between the body's root and the camera."""
+    """Aims a camera; `joints` are those of the head with their limits, all between the body's root and the camera.
 
-    def __init__(self, body: Body, camera: str, joints: Mapping[str, MotionLimits]) -> None:
+    It may look along another unit vector than x of its frame: `axis`.
+    """
+
+    def __init__(
+        self, body: Body, camera: str, joints: Mapping[str, MotionLimits], axis: Vector3 = (1.0, 0.0, 0.0)
+    ) -> None:
+        self._turned = Transform3(rotation=quaternion_between((1.0, 0.0, 0.0), axis))
         self._body, self._chain, self._names = body, tuple(body.joints_above(camera)), tuple(joints)
         self._least = np.array([max(joint.least, -WIDEST) for joint in joints.values()])
         self._greatest = np.array([min(joint.greatest, WIDEST) for joint in joints.values()])
@@ -110,7 +116,8 @@ class Gaze:
 
     def _camera_at(self, positions: Mapping[str, float]) -> Transform3:
         body = self._body
-        return composed(item.at(body.position(item, positions)) if item.moves else item.origin for item in self._chain)
+        links = (item.at(body.position(item, positions)) if item.moves else item.origin for item in self._chain)
+        return composed(links).compose(self._turned)
 
 
 def past(point: Vector3) -> float:

@@ -9,6 +9,7 @@ from rbxcompose.base.config import CONTROLLER, Config, LinkName, Name, Refers
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import kind
 from rbxcompose.domains.arms.motion.groups import chain
+from rbxcompose.domains.arms.section_models import HeadTracking
 from rbxcompose.domains.arms.sections.arms import arms, joint_limits
 from rbxcompose.domains.arms.sections.scene import scene
 from rbxcompose.domains.body.sections.body import body
@@ -29,6 +30,8 @@ class HeadModel(Config):
     """The controller that leads its joints."""
     frames: list[Name] = []
     """Frames outside of the body in which points may be, beside those of `scene`."""
+    tracks: HeadTracking = HeadTracking()
+    """What it follows by itself while it has no goal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +50,8 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
     for name, head in found.items():
         one = head.model
         frames = dict.fromkeys((*one.frames, *contents.of(scene).frames))
+        if one.tracks.frame and one.tracks.frame not in description.body.links:
+            frames[one.tracks.frame] = None
         config = {
             "name": name,
             "skill": "look_at" if len(found) == 1 else f"look_at_{name}",
@@ -57,6 +62,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             "follow": follow_topic(contents, one.controller),
             "stream": stream_topic(contents, one.controller),
             "sees_scene": bool(contents.of(arms)),
+            "tracks": one.tracks,
             "frames": tuple(each for each in frames if each != description.body.frame),
         }
         yield WantedComponent(name, HEAD, config, ("heads", name))

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, quaternion_from_yaw
+from rbxcompose.base.geometry import Quaternion, Transform3, quaternion_between, quaternion_from_yaw
 from rbxcompose.domains.body.model import BodyJoint
 from rbxcompose.domains.worlds.contact import MAP
 from rbxcompose.domains.worlds.physics.actuators import Gains, add_actuators, add_followers
@@ -475,17 +475,6 @@ def _wxyz(rotation: Quaternion) -> Quaternion:
     """Return a quaternion in the order of MuJoCo."""
     x, y, z, w = rotation
     return (w, x, y, z)
-
-
-def quaternion_between(before: Vector3, after: Vector3) -> Quaternion:
-    """Return a rotation that turns one unit vector into another."""
-    (ax, ay, az), (bx, by, bz) = before, after
-    w = 1.0 + ax * bx + ay * by + az * bz
-    if w < 1e-9:  # opposite: half a turn about anything normal to it
-        return (0.0, 1.0, 0.0, 0.0) if abs(ay) < 0.9 else (1.0, 0.0, 0.0, 0.0)
-    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    length = math.sqrt(x * x + y * y + z * z + w * w)
-    return (x / length, y / length, z / length, w / length)
 
 
 def xyzw(rotation: Iterator[float]) -> Quaternion:
