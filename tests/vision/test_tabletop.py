@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Pose2, yaw_of
@@ -35,6 +35,7 @@ def errors(thing: TabletopThing, shape: WorldShape) -> tuple[float, float]:
     return math.dist(thing.pose.translation, at), max(abs(value - true) for value, true in sides)
 
 
+@settings(max_examples=8)
 @given(st.floats(0.75, 0.95), st.floats(-0.2, 0.2), st.floats(0.04, 0.1), st.floats(0.04, 0.1), st.floats(-3.1, 3.1))
 def test_a_box_is_found_to_millimetres(x: float, y: float, wide: float, deep: float, heading: float) -> None:
     shape = box(x, y, (wide, deep, 0.12), heading)
@@ -46,6 +47,7 @@ def test_a_box_is_found_to_millimetres(x: float, y: float, wide: float, deep: fl
     assert found.confidence > 0.5
 
 
+@settings(max_examples=8)
 @given(st.floats(0.75, 0.95), st.floats(-0.2, 0.2), st.floats(0.025, 0.06), st.floats(0.05, 0.2))
 def test_a_cylinder_is_found_to_millimetres(x: float, y: float, radius: float, height: float) -> None:
     shape = cylinder(x, y, radius, height)
@@ -122,6 +124,16 @@ def test_without_a_table_it_is_said_what_there_is_not(
 ) -> None:
     with pytest.raises(NothingFlatError, match=why.replace("^", r"\^").replace("(", r"\(")):
         find_things(points, eye())
+
+
+def test_a_larger_level_face_that_is_too_high_is_no_table() -> None:
+    shelf = WorldShape("shelf", WorldBox((0.7, 3.0, 0.05)), Pose2(1.25, 0.0), 1.0)
+    low, pose = TabletopSettings(highest=0.9), eye(height=1.5, pitch=0.7)
+    far = box(0.55, 0.1, (0.06, 0.06, 0.1))
+    table = WorldShape("table", WorldBox((0.6, 1.2, TOP)), Pose2(0.5, 0.0))
+    found = find_things(cloud((shelf, table, far), pose), pose, low)
+    assert found.table.pose.translation[2] == pytest.approx(TOP, abs=0.02)
+    assert len(found.things) == 1
 
 
 def test_a_table_without_an_end_has_nothing_on_it() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.vision.components.tabletop_detector import TabletopDetector
+from rbxcompose.domains.worlds.optics import cloud_message
 from rbxcompose.msgs.geometry_msgs import (
     Point,
     Pose,
@@ -26,6 +28,7 @@ from rbxcompose.msgs.poses import pose_of
 from rbxcompose.msgs.rbxcompose_msgs import FindObjects
 from rbxcompose.msgs.sensor_msgs import PointCloud2
 from rbxcompose.msgs.shape_msgs import SolidPrimitive
+from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.msgs.vision_msgs import (
@@ -39,6 +42,7 @@ from rbxcompose.sdk.bound import Ended, Outcome
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 from tests.navigation.test_robot import Room
+from tests.vision import tables
 
 pytestmark = pytest.mark.timeout(120)
 OPTICAL = "eye_optical_frame"
@@ -197,3 +201,30 @@ def test_what_is_round_comes_into_the_planning_scene_as_a_cylinder(round_: bool)
     [shape] = added[-1].primitives
     assert shape.type == (SolidPrimitive.CYLINDER if round_ else SolidPrimitive.BOX)
     assert shape.dimensions == pytest.approx([0.1, 0.035] if round_ else [0.07, 0.09, 0.1])
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+def test_a_cloud_waits_until_it_is_known_where_the_camera_was_and_not_for_ever(is_known: bool) -> None:
+    settings = {"points": "points", "frame": "eye", "rate": "5 Hz", "pictures": 2}
+    bench = Bench(instance("finder", "tabletop_detector", settings))
+    ends: list[Ended[FindObjects.Result]] = []
+    pose, black = tables.eye(), np.zeros((240, 320, 3), np.uint8)
+    depths = tables.cloud((tables.TABLE, tables.box(0.8, 0.0, (0.06, 0.06, 0.1))), pose)[..., 2].astype(np.float32)
+    message = cloud_message(Header(), tables.CAMERA.rays, depths, black)
+    bench.bus.action_client("me", "/find_objects", FindObjects)(FindObjects.Goal(duration=2.0), ends.append)
+    at = Transform(Vector3(*pose.translation), Quaternion(*pose.rotation))
+    for _ in range(25):
+        seen = Header(to_time(bench.clock.stamp()), "eye")
+        bench.publish("/points", replace(message, header=seen), Qos.BULK)
+        bench.advance(0.1)
+        if is_known:  # half a picture late
+            placed = TransformStamped(Header(seen.stamp, "base_footprint"), "eye", at)
+            bench.publish("/tf", TFMessage(transforms=(placed,)))
+    [end] = ends
+    assert end.result is not None
+    if is_known:
+        assert end.result.names == ("thing_1",)
+    else:
+        assert end.result.outcome == "not_seen"
+        assert "a cloud is not used: " in end.result.message
+        assert "there is no frame" in end.result.message

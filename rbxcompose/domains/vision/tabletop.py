@@ -27,8 +27,8 @@ BROKEN = 0.08  # parts of a table are so near to each other [m]
 ALONG = 2.0  # times as wide as others a gap along the sight may be
 EDGE = 0.005  # by which a thing may reach over what is seen of the table [m]
 FLAT = 0.1  # sine of the angle below which a surface is not measured well
+NARROW = 0.2  # the same for what is beside a point, as sides of things are
 PLATE = 0.02  # thickness that is made up for a table [m]
-NARROW = 0.2  # the same for sides of things
 FAR_OFF = 0.006  # how far a cell counts as off a side at most, so that few of them do not turn a box [m]
 MANY, FINE = 20, 0.004  # cells, and how far these are off a shape [m]: each halves the confidence
 SURE = 5  # cells that show where a side is
@@ -144,8 +144,9 @@ def find_things(
         raise NothingFlatError("the cloud has no points")
     is_near = np.hypot(*(points[:, :2] - eye[:2]).T) <= settings.farthest
     cells = cells_of(points[is_near & (points[:, 2] >= settings.lowest)], settings.voxel)
-    plane, is_table = table_plane(cells, settings, np.random.default_rng(seed))
-    top = cells[is_table]
+    low = cells[cells[:, 2] <= settings.highest]
+    plane, is_table = table_plane(low, settings, np.random.default_rng(seed))
+    top = low[is_table]
     over = plane.over(cells)
     bounds = _hull(top[:, :2])
     clear = max(settings.clear, 4 * plane.off)
@@ -226,9 +227,6 @@ def table_plane(cells: Numbers, settings: TabletopSettings, random: np.random.Ge
         raise NothingFlatError(f"there is no level plane of {settings.area * 1e4:g} cm^2 {where}")
     plane, is_of = best
     whole = parts_of(cells_of(cells[is_of], 4 * settings.voxel), max(BROKEN, settings.gap))
-    middle = whole[0].mean(0)
-    if not settings.lowest <= (height := float(plane.heights(middle[None])[0])) <= settings.highest:
-        raise NothingFlatError(f"the largest level plane is {height:.2f} m high, and none is {where}")
     bounds = _hull(whole[0][:, :2])
     is_of[is_of] = (cells[is_of, :2] @ bounds[:, :2].T + bounds[:, 2] <= EDGE).all(1)
     return plane, is_of

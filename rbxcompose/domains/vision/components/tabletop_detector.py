@@ -158,9 +158,9 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
         self.began, self.why = 0.0, ""
         self.steady = self.make_look(config.pictures, config.still)
         self.found: list[NamedThing] = []
-        self.newest: PointCloud2 | None = None  # that is not used yet
+        self.newest: PointCloud2 | None = None  # one that is to be used
         self.newest_tags: Detection3DArray | None = None
-        self.came_at, self.used_at, self.tags_at = self.now, -math.inf, -math.inf
+        self.came_at, self.newest_at, self.used_at, self.tags_at = self.now, -math.inf, -math.inf, -math.inf
         self.problem, self.outcome, self.said = "", NOT_SEEN, ""
 
     @property
@@ -171,8 +171,9 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
     def on_cloud(self, message: PointCloud2) -> None:
         """Use a cloud, if it is time for one."""
         self.came_at = self.now
-        if self.is_looking and self.now - self.used_at >= 1 / self.config.rate - SOON:
-            self.newest = message
+        is_due = self.newest is None and self.now - self.used_at >= 1 / self.config.rate - SOON
+        if self.is_looking and is_due:
+            self.newest, self.newest_at = message, self.now
             self.take_cloud()
 
     def on_tags(self, message: Detection3DArray) -> None:
@@ -206,7 +207,7 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
         return found
 
     def take_cloud(self) -> None:
-        """Use the newest cloud, now or as soon as it is known from where it was taken."""
+        """Use a cloud, now or as soon as it is known from where it was taken."""
         if (message := self.newest) is None:
             return
         found = None
@@ -215,13 +216,15 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
             found = self.find_things(rows_of(message), camera, self.settings)
             self.problem = ""
         except (LookupError, CloudError) as error:
-            if not isinstance(error, (WrongFrameError, CloudError)) and self.now - self.came_at <= LATE:
+            if not isinstance(error, (WrongFrameError, CloudError)) and self.now - self.newest_at <= LATE:
                 return
             self.problem, self.outcome = f"a cloud is not used: {error}", NOT_SEEN
         except self.nothing_flat as error:
             self.problem, self.outcome = str(error), NO_TABLE
         self.newest, self.used_at, self.found = None, self.now, []
         if found is None:
+            if self.goal is not None:
+                self.goal.feedback(FindObjects.Feedback(message=self.problem))
             return
         self.found = self.names.take(self.now, found.things, self.tags_seen())
         to_camera = camera.inverse()
@@ -271,8 +274,9 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
                 goal.canceled()
             elif self.now - self.began >= (goal.request.duration or self.config.patience):
                 why = no_cloud or self.problem or self.why or "no cloud could be used"
+                outcome = NOT_SEEN if no_cloud else self.outcome
                 self.goal = None
-                goal.aborted(f"{self.outcome}: {why}", FindObjects.Result(outcome=self.outcome, message=why))
+                goal.aborted(f"{outcome}: {why}", FindObjects.Result(outcome=outcome, message=why))
         self.report(no_cloud or self.problem)
 
     def report(self, problem: str) -> None:
