@@ -17,7 +17,14 @@ TWO_SIDES = {  # what a component sees, as a protocol of the SDK, and the bus's 
     "ServedGoal",
     "Window",
 }
-NOUNS = {"driving", "ray_casting", "wiring"}  # modules with a noun in `ing` as their name
+NOUNS = {
+    "docking",
+    "driving",
+    "head_tracking",
+    "ray_casting",
+    "tag_docking",
+    "wiring",
+}  # modules with a noun in `ing` as their name
 
 
 def defined(path: Path) -> Iterator[tuple[str, bool]]:

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.vision.following import ASIDE, Following, FollowingSettings, wanted
+from rbxcompose.domains.vision.tag_pursuit import ASIDE, Following, FollowingSettings, wanted
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseWithCovariance, Twist
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.rbxcompose_msgs import FollowTag

@@ -11,7 +11,7 @@ from rbxcompose import sdk
 from rbxcompose.base.geometry import Vector3, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.base.units import LENGTH, TIME
-from rbxcompose.domains.vision.following import Following, FollowingSettings
+from rbxcompose.domains.vision.tag_pursuit import Following, FollowingSettings
 from rbxcompose.domains.vision.tag_watcher import TagWatcher, TagWatcherConfig, WatchedTag
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.rbxcompose_msgs import FollowTag
