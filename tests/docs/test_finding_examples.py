@@ -30,7 +30,9 @@ NOT_SHOWN = {
         [f"RBX20{n:02}" for n in (*range(1, 16), *range(21, 24))],
         "the mistake is in a URDF file; tests of these try the examples",
     ),
-    **dict.fromkeys(("RBX2017", "RBX2018", "RBX3640", "RBX3641", "RBX3710"), "the mistake is on the command line"),
+    **dict.fromkeys(
+        ("RBX2017", "RBX2018", "RBX3640", "RBX3641", "RBX3710", "RBX3720"), "the mistake is on the command line"
+    ),
     "RBX2020": "the mistake needs a xacro file; a test of it has one",
     "RBX7003": "the example would be too large to read",
     "RBX4115": "the example is cut short: nobody wants to read 40 levels",

@@ -6,7 +6,7 @@ import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from rbxcompose.domains.worlds.tag_pictures import tag_picture
+from rbxcompose.domains.worlds.tag_pictures import tag_picture, with_margin
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -31,21 +31,12 @@ def sheets(numbers: Sequence[int], family: str, size: float, paper: str) -> list
     from PIL import Image, ImageDraw, ImageFont
 
     cells = {number: tag_picture(number, family) for number in numbers}
-    page_size = PAPERS[paper]
-    across = next(iter(cells.values())).shape[0]
-    side = size * across / (across - 2)  # with its margin
-    columns, rows = (
-        int((room - 2 * MARGIN) / (side + below) + 1e-9) for room, below in zip(page_size, (0.0, LABEL), strict=True)
-    )
-    if not (columns and rows):
-        raise ValueError(f"a tag of {size * 100:g} cm needs a paper of {(side + 2 * MARGIN) * 100:g} cm at least")
+    page_size, side = PAPERS[paper], with_margin(size, family)
     pages = []
-    for first in range(0, len(numbers), columns * rows):
+    for places in tag_places(numbers, family, size, paper):
         page = Image.new("1", (pixels_of(page_size[0]), pixels_of(page_size[1])), 1)
         pen, font = ImageDraw.Draw(page), ImageFont.load_default(pixels_of(LABEL * 0.6))
-        for place, number in enumerate(numbers[first : first + columns * rows]):
-            row, column = divmod(place, columns)
-            left, top = MARGIN + column * side, MARGIN + row * (side + LABEL)
+        for number, (left, top) in places.items():
             wide = pixels_of(side)
             painted = Image.fromarray(cells[number]).resize((wide, wide), Image.Resampling.NEAREST)
             page.paste(painted, (pixels_of(left), pixels_of(top)))
@@ -58,6 +49,29 @@ def sheets(numbers: Sequence[int], family: str, size: float, paper: str) -> list
             pen.text((pixels_of(left + MARK), pixels_of(top + side + LABEL * 0.2)), words, 0, font)
         pages.append(page)
     return pages
+
+
+def tag_places(numbers: Sequence[int], family: str, size: float, paper: str) -> list[dict[int, tuple[float, float]]]:
+    """Return where the upper left corner of each tag with its margin is, on each page [m].
+
+    Raises:
+        KeyError: if there is no such family or paper.
+        ValueError: if one does not fit on the paper.
+    """
+    side = with_margin(size, family)
+    columns, rows = (
+        int((room - 2 * MARGIN) / (side + below) + 1e-9)
+        for room, below in zip(PAPERS[paper], (0.0, LABEL), strict=True)
+    )
+    if not (columns and rows):
+        raise ValueError(f"a tag of {size * 100:g} cm needs a paper of {(side + 2 * MARGIN) * 100:g} cm at least")
+    return [
+        {
+            number: (MARGIN + place % columns * side, MARGIN + place // columns * (side + LABEL))
+            for place, number in enumerate(numbers[first : first + columns * rows])
+        }
+        for first in range(0, len(numbers), columns * rows)
+    ]
 
 
 def pixels_of(length: float) -> int:

@@ -137,12 +137,13 @@ class Intrinsics:
 def info_message(header: Header, camera: Intrinsics) -> CameraInfo:
     """Return what a camera tells about itself."""
     projection = np.column_stack((camera.matrix, np.zeros(3)))
+    bent = camera.distortion
     return CameraInfo(
         header,
         camera.height,
         camera.width,
-        "plumb_bob",
-        np.array((*camera.distortion, *(0.0,) * 5)[:5]),
+        "plumb_bob" if len(bent) <= 5 else "rational_polynomial",
+        np.array(bent if len(bent) > 5 else (*bent, *(0.0,) * 5)[:5]),
         camera.matrix.ravel(),
         np.eye(3).ravel(),
         projection.ravel(),

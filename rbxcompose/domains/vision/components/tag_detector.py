@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
-
-from pydantic import Field, model_validator
+from typing import TYPE_CHECKING, Any
 
 from rbxcompose import sdk
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import Transform3, Vector3, quaternion_from_rpy
+from rbxcompose.base.geometry import Transform3, Vector3
 from rbxcompose.base.levels import Level
+from rbxcompose.domains.vision.known_tags import KnownTags
 from rbxcompose.domains.vision.tags import SeenTag, TagFinder, board_pose
 from rbxcompose.domains.worlds.optics import Intrinsics
-from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, TAG_FAMILIES
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.builtin_interfaces import Time
@@ -34,7 +32,8 @@ from rbxcompose.msgs.vision_msgs import (
 from rbxcompose.sdk.ports import BULK
 
 if TYPE_CHECKING:
-    from rbxcompose.domains.vision.tags import Numbers
+    from rbxcompose.domains.vision.known_tags import KnownTags
+from rbxcompose.domains.vision.tags import Numbers
 
 THICK = 0.001  # of the box that stands for a tag [m]
 SILENCE = 2.0  # [s] without a picture after which diagnostics say so
@@ -42,47 +41,7 @@ AHEAD = 0.5  # [s] a picture of a time so far in the future has a wrong clock
 FRAME = "tag_"  # begins the frame of a tag with a name
 
 
-class BoardTag(sdk.Config):
-    """A tag of a board, and where it is in the frame of that: x to its right, y up, z out of it."""
-
-    number: int = Field(ge=0)
-    """Its number."""
-    x: sdk.Length = 0.0
-    """Position along x."""
-    y: sdk.Length = 0.0
-    """Position along y."""
-    z: sdk.Length = 0.0
-    """Position along z."""
-    roll: sdk.Angle = 0.0
-    """Rotation about x, then pitch about y and yaw about z."""
-    pitch: sdk.Angle = 0.0
-    """Rotation about y."""
-    yaw: sdk.Angle = 0.0
-    """Rotation about z."""
-
-
-class TagBoard(sdk.Config):
-    """A board: tags that are fixed to each other."""
-
-    tags: list[BoardTag] = Field(min_length=1)
-    """Its tags."""
-
-    @model_validator(mode="after")
-    def _has_each_once(self) -> TagBoard:
-        if len({tag.number for tag in self.tags}) < len(self.tags):
-            raise ValueError("a board has each tag once")
-        return self
-
-    @property
-    def places(self) -> dict[int, Transform3]:
-        """Return where its tags are, by number."""
-        return {
-            tag.number: Transform3((tag.x, tag.y, tag.z), quaternion_from_rpy(tag.roll, tag.pitch, tag.yaw))
-            for tag in self.tags
-        }
-
-
-class TagDetectorConfig(sdk.Config):
+class TagDetectorConfig(KnownTags):
     """Where the pictures come from, and what is known about the tags."""
 
     image: TopicName = "image_raw"
@@ -91,28 +50,8 @@ class TagDetectorConfig(sdk.Config):
     """The topic of the camera's calibration."""
     frame: str = "camera_optical_frame"
     """The optical frame of the camera: z is ahead, x to the right of the picture."""
-    family: TAG_FAMILIES = DEFAULT_FAMILY
-    """The family of the tags."""
-    size: sdk.Length | None = Field(None, gt=0)
-    """The side of the black square of a tag; without it, tags have no pose."""
-    names: dict[sdk.Name, Annotated[int, Field(ge=0)]] = {}
-    """Numbers of tags by name."""
-    sizes: dict[sdk.Name, sdk.Length] = {}
-    """Sizes of tags with another `size`, by name."""
-    boards: dict[sdk.Name, TagBoard] = {}
-    """Boards by name."""
     topic: TopicName = "tags"
     """Where what is seen is published."""
-
-    @model_validator(mode="after")
-    def _are_told_apart(self) -> TagDetectorConfig:
-        if wrong := self.sizes.keys() - self.names:
-            raise ValueError(f"'sizes' names tags that 'names' does not have: {', '.join(sorted(wrong))}")
-        if len({*self.names.values()}) < len(self.names):
-            raise ValueError("two 'names' have the same number")
-        if wrong := self.names.keys() & self.boards.keys():
-            raise ValueError(f"a tag and a board have the same name: {', '.join(sorted(wrong))}")
-        return self
 
 
 @dataclass(frozen=True)

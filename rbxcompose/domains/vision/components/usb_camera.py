@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
 from rbxcompose import sdk
 from rbxcompose.base.levels import Level
+from rbxcompose.domains.vision.camera_file import CameraFile
+from rbxcompose.domains.worlds.optics import TO_OPTICAL, info_message, optical_frame
 from rbxcompose.manifest.fields import TopicName
-from rbxcompose.msgs.sensor_msgs import Image
+from rbxcompose.msgs.geometry_msgs import TransformStamped
+from rbxcompose.msgs.poses import transform_message
+from rbxcompose.msgs.sensor_msgs import CameraInfo, Image
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.sdk import TaskStatus
 
 if TYPE_CHECKING:
@@ -35,7 +41,14 @@ class UsbCameraConfig(sdk.Config):
     topic: TopicName = "image_raw"
     """Where they are published."""
     frame: str = "camera_link"
-    """The frame of the camera."""
+    """The frame of the camera: x is ahead, or z if its name ends in `optical_frame`, as REP 103 has it."""
+    calibration: str = ""
+    """The whole path of its calibration, by `rbxcompose camera calibrate`; with it, `camera_info` is published. The
+    section `cameras` has it relative to the manifest."""
+    info: TopicName = "camera_info"
+    """Where that is."""
+    exposure: sdk.Time = Field(0.0, ge=0, le=1)
+    """For how long a picture is exposed; 0 leaves that to the camera."""
 
 
 @sdk.component("usb_camera")
@@ -58,16 +71,29 @@ class UsbCamera(sdk.Component[UsbCameraConfig]):
     @classmethod
     def ports(cls, config: UsbCameraConfig) -> dict[str, sdk.Port[Any]]:
         """Return the topic of the pictures."""
-        return {"image": sdk.Out(Image, config.topic, qos="bulk", rate=config.rate).named("image")}
+        found: dict[str, sdk.Port[Any]] = {
+            "image": sdk.Out(Image, config.topic, qos="bulk", rate=config.rate).named("image")
+        }
+        if config.calibration:
+            found["info"] = sdk.Out(CameraInfo, config.info, rate=config.rate).named("info")
+        if optical_frame(config.frame) != config.frame:
+            found["tf"] = sdk.Out(TFMessage, "/tf").named("tf")
+        return found
 
     @classmethod
     def capabilities(cls, config: UsbCameraConfig) -> tuple[sdk.Capability, ...]:
-        """Declare what it needs."""
-        return (sdk.NeedsExtra(sdk.Setting("cv2"), sdk.Setting("vision")),)
+        """Declare what it needs, and its optical frame."""
+        extra, optical = sdk.NeedsExtra(sdk.Setting("cv2"), sdk.Setting("vision")), optical_frame(config.frame)
+        if optical == config.frame:
+            return (extra,)
+        frame = sdk.Setting(config.frame, "frame")
+        return extra, sdk.WritesFrame("tf", frame, sdk.Setting(optical), needs_parent=True)
 
     def configure(self) -> None:
         """Open the camera; if that fails, it is tried again."""
         self.camera: cv2.VideoCapture | None = None
+        file = self.config.calibration
+        self.known = CameraFile.read(Path(file)) if file else None
         self.tried = -math.inf  # [s]
         self.state = TaskStatus(Level.STALE, "no picture yet")
         self.add_diagnostic("pictures", lambda now: self.state)
@@ -93,6 +119,8 @@ class UsbCamera(sdk.Component[UsbCameraConfig]):
             cv2.CAP_PROP_FPS: config.rate,
             cv2.CAP_PROP_BUFFERSIZE: 1,  # the newest picture, not one that has waited
         }
+        if config.exposure:
+            wanted |= {cv2.CAP_PROP_AUTO_EXPOSURE: 1, cv2.CAP_PROP_EXPOSURE: config.exposure * 1e4}  # of V4L: 0.1 ms
         for what, value in wanted.items():
             camera.set(what, value)
         self.camera = camera
@@ -109,9 +137,21 @@ class UsbCamera(sdk.Component[UsbCameraConfig]):
             self.fail(f"{self.config.device} gives no more pictures")
             return
         height, width, _ = picture.shape
-        header = Header(stamp=to_time(self.stamp), frame_id=self.config.frame)
+        header = Header(stamp=to_time(self.stamp), frame_id=optical_frame(self.config.frame))
         self.image(Image(header, height, width, "bgr8", 0, 3 * width, picture.tobytes()))
         self.state = TaskStatus(Level.OK, f"{width} x {height}", {"device": self.config.device})
+        if "tf" in self.bound:
+            mounted = TransformStamped(
+                Header(header.stamp, self.config.frame), header.frame_id, transform_message(TO_OPTICAL)
+            )
+            self.bound["tf"](TFMessage(transforms=(mounted,)))
+        if (known := self.known) is None:
+            return
+        if (known.width, known.height) == (width, height):
+            self.bound["info"](info_message(header, known.intrinsics))
+        else:
+            size = f"{known.width} x {known.height}"
+            self.state = TaskStatus(Level.ERROR, f"pictures are {width} x {height}, and the calibration is of {size}")
 
     def fail(self, why: str) -> None:
         """Report that there are no pictures."""

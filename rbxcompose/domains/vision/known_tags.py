@@ -1,0 +1,76 @@
+"""What is known about tags: their family, their sizes, their names, and boards of several."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from rbxcompose.base.config import Angle, Config, Length, Name
+from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
+from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, TAG_FAMILIES
+
+
+class BoardTag(Config):
+    """A tag of a board, and where it is in the frame of that: x to its right, y up, z out of it."""
+
+    number: int = Field(ge=0)
+    """Its number."""
+    x: Length = 0.0
+    """Position along x."""
+    y: Length = 0.0
+    """Position along y."""
+    z: Length = 0.0
+    """Position along z."""
+    roll: Angle = 0.0
+    """Rotation about x, then pitch about y and yaw about z."""
+    pitch: Angle = 0.0
+    """Rotation about y."""
+    yaw: Angle = 0.0
+    """Rotation about z."""
+
+
+class TagBoard(Config):
+    """A board: tags that are fixed to each other."""
+
+    tags: list[BoardTag] = Field(min_length=1)
+    """Its tags."""
+
+    @model_validator(mode="after")
+    def _has_each_once(self) -> TagBoard:
+        if len({tag.number for tag in self.tags}) < len(self.tags):
+            raise ValueError("a board has each tag once")
+        return self
+
+    @property
+    def places(self) -> dict[int, Transform3]:
+        """Return where its tags are, by number."""
+        return {
+            tag.number: Transform3((tag.x, tag.y, tag.z), quaternion_from_rpy(tag.roll, tag.pitch, tag.yaw))
+            for tag in self.tags
+        }
+
+
+class KnownTags(Config):
+    """What is known about tags."""
+
+    family: TAG_FAMILIES = DEFAULT_FAMILY
+    """The family of the tags."""
+    size: Length | None = Field(None, gt=0)
+    """The side of the black square of a tag; without it, tags have no pose."""
+    names: dict[Name, Annotated[int, Field(ge=0)]] = {}
+    """Numbers of tags by name."""
+    sizes: dict[Name, Length] = {}
+    """Sizes of tags with another `size`, by name."""
+    boards: dict[Name, TagBoard] = {}
+    """Boards by name."""
+
+    @model_validator(mode="after")
+    def _are_told_apart(self) -> KnownTags:
+        if wrong := self.sizes.keys() - self.names:
+            raise ValueError(f"'sizes' names tags that 'names' does not have: {', '.join(sorted(wrong))}")
+        if len({*self.names.values()}) < len(self.names):
+            raise ValueError("two 'names' have the same number")
+        if wrong := self.names.keys() & self.boards.keys():
+            raise ValueError(f"a tag and a board have the same name: {', '.join(sorted(wrong))}")
+        return self

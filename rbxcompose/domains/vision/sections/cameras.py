@@ -1,0 +1,116 @@
+"""The section `cameras`: simulated or real, with the same topics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from rbxcompose.base.config import Angle, Config, Frequency, Length, Time
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Finding, kind
+from rbxcompose.domains.worlds.sections.world import world
+from rbxcompose.manifest.fields import FileName
+from rbxcompose.manifest.files import resolve
+from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring
+from rbxcompose.manifest.tree import at
+
+CAMERA = "camera"
+NO_CALIBRATION = kind("RBX3721")
+Side = Annotated[int, Field(ge=16, le=8192)]
+
+
+class CameraModel(Config):
+    """Where a camera is, and what its pictures are like."""
+
+    frame: str
+    """The link that looks along its x, or along its z if the name ends in `optical_frame`."""
+    size: tuple[Side, Side] = (640, 480)
+    """Width and height of its pictures in pixels."""
+    rate: Frequency = Field(15.0, gt=0, le=100)
+    """Pictures a second."""
+    calibration: FileName | None = None
+    """Its calibration, by `rbxcompose camera calibrate`; a simulated camera has the same lens."""
+    device: str = "/dev/video0"
+    """The real camera, better one of `/dev/v4l/by-id`."""
+    exposure: Time = Field(0.0, ge=0, le=1)
+    """For how long the real one exposes a picture; 0 leaves that to it."""
+    view: Angle = Field(math.radians(60), gt=0.01, lt=3)
+    """Of the simulated one without a calibration: from its left to its right edge."""
+    depth: bool = False
+    """Whether the simulated one measures depth."""
+    noise: Length = Field(0.0, ge=0, le=1)
+    """Standard deviation of its depths at 1 m."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraOfRobot:
+    """A camera as it is written, and the file of its calibration."""
+
+    model: CameraModel
+    file: Path | None
+
+
+def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
+    for name, camera in contents.of(cameras).items():
+        model, file = camera.model, camera.file
+        config: dict[str, object] = {"frame": model.frame, "rate": model.rate}
+        if contents.is_simulated and contents.of(world) is not None:
+            config |= {"size": model.size, "topic": name, "depth": model.depth, "noise": model.noise}
+            config["view"] = f"{model.view!r} rad"
+            if file is not None:
+                from rbxcompose.domains.vision.camera_file import CameraFile  # imports numpy
+
+                known = CameraFile.read(file)
+                plain = known.distortion if len(known.distortion) <= 5 else ()
+                config |= {"view": f"{known.intrinsics.view!r} rad", "distortion": list(plain)}
+            yield WantedComponent(name, "camera_sim", config, ("cameras", name))
+            continue
+        width, height = model.size
+        config |= {"width": width, "height": height, "device": model.device, "exposure": model.exposure}
+        config |= {"topic": f"{name}/image_raw", "info": f"{name}/camera_info", "calibration": str(file or "")}
+        yield WantedComponent(name, "usb_camera", config, ("cameras", name))
+
+
+@section("cameras", CameraModel, order=64, names=CAMERA, runs=True, wires=True, entry="camera", components=_components)
+def cameras(reading: Reading[CameraModel]) -> dict[str, CameraOfRobot]:
+    """Cameras by name, simulated in a `world` or real; pictures are at `NAME/image_raw`.
+
+    Example:
+        cameras:
+          front: {frame: base_footprint, size: [640, 480], view: 70 deg}
+    """
+    found = dict[str, CameraOfRobot]()
+    for name, model in reading.entries().items():
+        file: Path | None = None
+        if model.calibration is not None:
+            where = reading.value("cameras", name, "calibration")
+            node = reading.node
+            writer = reading.writer(at(node, (name, "calibration")) or node) if node is not None else Path()
+            named = resolve(model.calibration, writer, where)
+            if isinstance(named, Finding):
+                reading.report.add(named)
+                continue
+            if why := _unlike(named, model.size):
+                reading.report.add(NO_CALIBRATION.at(where, f"'{model.calibration}' is no calibration of it: {why}"))
+                continue
+            file = named
+        found[name] = CameraOfRobot(model, file)
+    return found
+
+
+def _unlike(file: Path, size: tuple[int, int]) -> str:
+    """Return why a file is no calibration of a camera with pictures of a size, or nothing."""
+    from rbxcompose.domains.vision.camera_file import CameraFile, CameraFileError  # imports numpy
+
+    try:
+        known = CameraFile.read(file)
+    except CameraFileError as error:
+        return str(error)
+    if (known.width, known.height) != size:
+        return f"it is of {known.width} x {known.height} pixels, and its pictures have {size[0]} x {size[1]}"
+    return ""

@@ -1,0 +1,84 @@
+"""`cameras` and `tags` in manifests: what they make, simulated and real, and what is wrong with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.domains.vision.camera_file import CameraFile
+from rbxcompose.domains.vision.components.usb_camera import UsbCameraConfig
+from rbxcompose.domains.worlds.components.camera_sim import CameraSimConfig
+from rbxcompose.msgs.vision_msgs import Detection3DArray
+from rbxcompose.testing import Bench
+from tests.parts.project import Project
+
+ROBOT = """world: ../../room.yaml
+components:
+  base: {type: diff_drive_sim}
+cameras:
+  front: {frame: base_footprint, size: [320, 240], rate: 10 Hz}
+tags: {size: 16 cm, names: {box: 7}}
+"""
+WORLD = """rbx: 1
+kind: World
+name: room
+objects: {crate: {box: [20 cm, 20 cm, 20 cm], at: {x: 1 m}, tags: {back: {number: 7, size: 16 cm}}}}
+"""
+LENS = CameraFile(320, 240, 300.0, 300.0, 159.5, 119.5, (-0.1, 0.02, 0.0, 0.0, 0.0))
+
+
+def project(folder: Path) -> Project:
+    (folder / "room.yaml").write_text(WORLD)
+    (folder / "front.yaml").write_text(LENS.text)
+    return Project(folder)
+
+
+def test_a_simulated_camera_finds_a_named_tag(tmp_path: Path) -> None:
+    pytest.importorskip("cv2", reason="OpenCV is not installed")
+    plan = project(tmp_path).check(ROBOT).compilation.plan
+    assert plan is not None
+    bench = Bench(plan=plan)
+    seen = bench.collect("/tags", Detection3DArray)
+    bench.advance(1.0)
+    assert [one.id for one in seen[-1].detections] == ["box"]
+
+
+def test_a_calibrated_camera_has_its_lens_in_the_simulation(tmp_path: Path) -> None:
+    text = ROBOT.replace("rate: 10 Hz", "rate: 10 Hz, calibration: ../../front.yaml")
+    checked = project(tmp_path).check(text)
+    assert checked.compilation.plan is not None, checked.text
+    (config,) = (one.config for one in checked.compilation.plan.instances if one.type == "camera_sim")
+    assert isinstance(config, CameraSimConfig)
+    assert config.distortion == pytest.approx(LENS.distortion)
+    assert config.intrinsics.fx == pytest.approx(300.0)
+
+
+def test_without_a_world_it_is_the_real_one_with_the_same_topics(tmp_path: Path) -> None:
+    text = ROBOT.replace("world: ../../room.yaml\n", "").replace("rate: 10 Hz", "calibration: ../../front.yaml")
+    checked = project(tmp_path).check(text)
+    assert checked.compilation.plan is not None, checked.text
+    (config,) = (one.config for one in checked.compilation.plan.instances if one.type == "usb_camera")
+    assert isinstance(config, UsbCameraConfig)
+    assert (config.topic, config.info) == ("front/image_raw", "front/camera_info")
+    assert Path(config.calibration).is_absolute()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code", "said"),
+    [
+        ("rate: 10 Hz", "calibration: ../../back.yaml", "RBX1301", "back.yaml"),
+        ("rate: 10 Hz", "calibration: ../../room.yaml", "RBX3721", "its 'image_width' is no number of pixels"),
+        ("size: [320, 240], rate: 10 Hz", "calibration: ../../front.yaml", "RBX3721", "it is of 320 x 240 pixels"),
+        ("size: 16 cm, names", "camera: back, size: 16 cm, names", "RBX1004", "back"),
+        ("  front: {frame", "  back: {frame: base_footprint}\n  front: {frame", "RBX3722", "one of back, front"),
+        ("names: {box: 7}", "names: {box: 7, dock: 7}", "RBX1003", "the same number"),
+    ],
+)
+def test_mistakes_are_findings_at_their_place(tmp_path: Path, old: str, new: str, code: str, said: str) -> None:
+    checked = project(tmp_path).check(ROBOT.replace(old, new))
+    found = [finding for finding in checked.compilation.report if finding.code == code]
+    assert found, checked.text
+    assert said in checked.text
+    assert found[0].span is not None
+    assert found[0].span.file.endswith("robot.yaml")
