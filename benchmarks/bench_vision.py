@@ -40,9 +40,9 @@ world: world.yaml
 bus: {{port: {port}}}
 components:
   base: {{type: diff_drive_sim}}
-  camera: {{type: camera_sim, frame: base_footprint, size: [640, 480], rate: 10 Hz}}
-  tags: {{type: tag_detector, image: camera/image_raw, info: camera/camera_info, frame: base_footprint_optical_frame,
-    size: 15 cm}}
+cameras:
+  camera: {{frame: base_footprint, size: [640, 480], rate: 10 Hz}}
+tags: {{size: 15 cm}}
 """
 WORLD = """rbx: 1
 kind: World

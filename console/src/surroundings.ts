@@ -2,13 +2,15 @@
 import type { Component } from "./description";
 import { h } from "./dom";
 import type { RobotScene } from "./elements/robot_scene";
-import { applied, frameOf, Frames, poseOf, readScan, readTransforms } from "./map";
+import { applied, composed, frameOf, Frames, poseOf, readScan, readTransforms } from "./map";
 import { remember, wasOn } from "./remembered";
 import type { Message, Rosbridge } from "./rosbridge";
+import { readThings } from "./seen";
 import { movedTopicOf, readRobots, readWorld, robotsTopicOf, worldTopicOf, type World } from "./world";
 
 const SWITCH = "model.world";
 const SCAN = "sensor_msgs/msg/LaserScan";
+const THINGS = "vision_msgs/msg/Detection3DArray";
 const ROBOTS = "rbxcompose_msgs/msg/WorldRobots";
 const TRANSFORMS = "tf2_msgs/msg/TFMessage";
 const SCANS = 100; // [ms] between two scans
@@ -21,7 +23,7 @@ export class Surroundings {
   readonly #scene: RobotScene;
   readonly #isOn = h("input", { id: "world", type: "checkbox" });
   readonly #whole = h("button", { type: "button", "aria-label": "All of the world" }, "All");
-  #topics: { world: string; moved: string; robots: string; scans: string[] } = { world: "", moved: "", robots: "", scans: [] };
+  #topics = { world: "", moved: "", robots: "", scans: [] as string[], things: [] as string[] };
   #frames = new Frames();
   #world: World | null = null;
   #closers: (() => void)[] = [];
@@ -42,8 +44,10 @@ export class Surroundings {
   learn(components: readonly Component[]): void {
     const lasers = components.flatMap(({ ports }) => ports.filter(({ kind, type }) => kind === "out" && type === SCAN));
     const scans = lasers.map(({ topic }) => topic);
+    const seeing = components.flatMap(({ ports }) => ports.filter(({ kind, type }) => kind === "out" && type === THINGS));
+    const things = seeing.map(({ topic }) => topic);
     const robots = robotsTopicOf(components);
-    const topics = { world: worldTopicOf(components), moved: movedTopicOf(components), robots, scans };
+    const topics = { world: worldTopicOf(components), moved: movedTopicOf(components), robots, scans, things };
     if (JSON.stringify(topics) === JSON.stringify(this.#topics)) return;
     this.#topics = topics;
     const field = h("div", { class: "field check" }, this.#isOn, h("label", { for: this.#isOn.id }, "World"));
@@ -64,13 +68,16 @@ export class Surroundings {
     this.#frames = new Frames();
     if (this.#world) this.#show(null);
     if (!isOn) return;
-    const { world, moved, robots, scans } = this.#topics;
+    const { world, moved, robots, scans, things } = this.#topics;
     const type = { type: TRANSFORMS };
     this.#closers.push(
       this.#link.subscribe(world, (message) => this.#show(readWorld(message)), { type: "rbxcompose_msgs/msg/World" }),
       ...(robots ? [this.#link.subscribe(robots, (message) => this.#met(message), { type: ROBOTS, throttle: SCANS })] : []),
       ...["/tf_static", "/tf"].map((topic) => this.#link.subscribe(topic, (message) => this.#moved(message, topic), type)),
       ...(moved ? [this.#link.subscribe(moved, (message) => this.#pushed(message), { ...type, throttle: SCANS })] : []),
+      ...things.map((topic) =>
+        this.#link.subscribe(topic, (seen) => this.#recognised(topic, seen), { type: THINGS, throttle: SCANS }),
+      ),
       ...scans.map((topic) =>
         this.#link.subscribe(topic, (scan) => this.#saw(topic, scan), { type: SCAN, throttle: SCANS }),
       ),
@@ -114,6 +121,14 @@ export class Surroundings {
     this.#scene.place(place);
     const { x, y, heading } = poseOf(place);
     this.#scene.element.dataset.place = JSON.stringify([x, y, heading]);
+  }
+
+  #recognised(topic: string, message: Message): void {
+    const place = this.#world && this.#frames.lookUp(MAP, frameOf(message));
+    if (!place) return;
+    const things = readThings(message).map((thing) => ({ ...thing, pose: composed(place, thing.pose) }));
+    this.#scene.setSeen(topic, things);
+    this.#scene.element.dataset.seen = things.map(({ name }) => name).join(" ");
   }
 
   #saw(topic: string, scan: Message): void {

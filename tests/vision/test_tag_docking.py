@@ -116,11 +116,11 @@ def test_a_tag_that_somebody_moves_is_where_it_is_now() -> None:
 ROBOT = """body: {urdf: eye.urdf}
 world: ../../room.yaml
 simulator: SIMULATOR
+cameras:
+  front: {frame: camera_link, size: [320, 240], rate: 10 Hz}
+tags: {size: 16 cm, names: {dock: 3}}
 components:
   base: {type: diff_drive_sim}
-  camera: {type: camera_sim, frame: camera_link, size: [320, 240], topic: front}
-  tags: {type: tag_detector, image: front/image_raw, info: front/camera_info, frame: camera_optical_frame, size: 16 cm,
-    names: {dock: 3}}
   dock_at: {type: tag_docking, frame: camera_optical_frame, distance: 60 cm}
 """
 WORLD = """rbx: 1

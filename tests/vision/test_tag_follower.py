@@ -83,11 +83,11 @@ def test_it_comes_to_its_distance_and_faces_the_tag(x: float, y: float) -> None:
 ROBOT = """body: {urdf: eye.urdf}
 world: ../../room.yaml
 simulator: SIMULATOR
+cameras:
+  front: {frame: camera_link, size: [320, 240], rate: 10 Hz}
+tags: {size: 24 cm, names: {walker: 7}}
 components:
   base: {type: diff_drive_sim}
-  camera: {type: camera_sim, frame: camera_link, size: [320, 240], topic: front}
-  tags: {type: tag_detector, image: front/image_raw, info: front/camera_info, frame: camera_optical_frame, size: 24 cm,
-    names: {walker: 7}}
   follower: {type: tag_follower, frame: camera_optical_frame, tag: walker, always: true, distance: 1 m}
 """
 WORLD = """rbx: 1

@@ -81,11 +81,11 @@ def test_who_turns_faces_where_it_goes_also_while_it_waits() -> None:
 ROBOT = """body: {urdf: eye.urdf}
 world: ../../room.yaml
 simulator: SIMULATOR
+cameras:
+  front: {frame: camera_link, size: [320, 240], rate: 10 Hz}
+tags: {size: 16 cm, names: {walker: 7}, sizes: {walker: 24 cm}}
 components:
   base: {type: diff_drive_sim}
-  camera: {type: camera_sim, frame: camera_link, size: [320, 240], topic: front}
-  tags: {type: tag_detector, image: front/image_raw, info: front/camera_info, frame: camera_optical_frame, size: 16 cm,
-    names: {walker: 7}, sizes: {walker: 24 cm}}
 """
 WORLD = """rbx: 1
 kind: World

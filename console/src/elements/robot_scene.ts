@@ -8,6 +8,7 @@ import { STLLoader } from "three/examples/jsm/loaders/STLLoader.js";
 import URDFLoader, { type URDFJoint, type URDFRobot } from "urdf-loader";
 import { IDENTITY, type Point, type Transform, type Vector } from "../map";
 import type { JointLimits, RosPose, Shape, Thing } from "../model";
+import type { SeenThing } from "../seen";
 import { heightOf, placeAt, wallMesh, type World, type WorldLight, type WorldShape } from "../world";
 
 export interface Pose {
@@ -26,6 +27,7 @@ const WALL = new three.MeshStandardMaterial({ color: 0x7d8a99, transparent: true
 const FLOOR = new three.MeshBasicMaterial({ color: 0x9aa6b3, transparent: true, opacity: 0.2, depthWrite: false });
 const LINE = new three.LineBasicMaterial({ color: 0x808890, transparent: true, opacity: 0.3 });
 const SEEN = new three.PointsMaterial({ color: 0xd8262c, size: 4, sizeAttenuation: false });
+const TAG = new three.MeshBasicMaterial({ color: 0x146ebe, transparent: true, opacity: 0.6, side: three.DoubleSide });
 const HOLE = 0x181818;
 const LAMP = 12; // candela of a lamp of full strength
 const GREY = "#8a94a0"; // of shapes without a colour
@@ -57,6 +59,7 @@ export class RobotScene {
   #things: three.Mesh[] = [];
   readonly #ground = new three.GridHelper(20 * SQUARE, 20, 0x808890, 0x808890);
   readonly #scans = new Map<string, three.Points>();
+  readonly #seen = new Map<string, three.Group>();
   #world: three.Group | null = null;
   #shapes: { shape: WorldShape; mesh: three.Mesh }[] = [];
   #robots = new Map<string, three.Mesh>(); // others in the same world
@@ -178,6 +181,7 @@ export class RobotScene {
     this.#world?.traverse((object) => "geometry" in object && (object.geometry as three.BufferGeometry).dispose());
     this.#world?.removeFromParent();
     for (const topic of this.#scans.keys()) this.setScan(topic, []);
+    for (const topic of this.#seen.keys()) this.setSeen(topic, []);
     this.#shapes = (world?.shapes ?? []).map((shape) => ({ shape, mesh: standing(shape) }));
     this.#robots = new Map((world?.robots ?? []).map((robot) => [robot.name, standing(robot)]));
     const meshes = [...this.#shapes.map(({ mesh }) => mesh), ...this.#robots.values()];
@@ -232,6 +236,23 @@ export class RobotScene {
     }
     scan.geometry.dispose();
     scan.geometry = new three.BufferGeometry().setFromPoints(points.map(({ x, y, z }) => new three.Vector3(x, y, z)));
+    this.#draw();
+  }
+
+  /** Shows tags and things that a camera sees, in the frame of the world, in place of those before. */
+  setSeen(topic: string, things: readonly SeenThing[]): void {
+    this.#seen.get(topic)?.removeFromParent();
+    const group = new three.Group();
+    for (const { name, pose, size } of things) {
+      const mesh = new three.Mesh(new three.BoxGeometry(size.x, size.y, Math.max(size.z, SAME)), TAG);
+      const { translation: at, rotation } = pose;
+      mesh.position.set(at.x, at.y, at.z);
+      mesh.quaternion.set(rotation.x, rotation.y, rotation.z, rotation.w);
+      mesh.add(label(name));
+      group.add(mesh);
+    }
+    this.#seen.set(topic, group);
+    this.#scene.add(group);
     this.#draw();
   }
 

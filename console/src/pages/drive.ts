@@ -5,6 +5,7 @@ import { drive, parked, PERIOD, STILL, wanted, type Direction, type DriveEvent, 
 import { BatteryGauge } from "../elements/battery_gauge";
 import { CameraView } from "../elements/camera_view";
 import { DrivePad } from "../elements/drive_pad";
+import { SeenOverlay } from "../elements/seen_overlay";
 import { formatNumber, formatValue } from "../format";
 import type { Page, Robot } from "../page";
 import { isMessage, type Json, type Message } from "../rosbridge";
@@ -74,6 +75,8 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
   const speeds = speedCard(limits, state.speeds, (next) => dispatch({ is: "speeds", speeds: next }));
   const velocity = velocityCard(limits);
   const camera = robot.config.camera ? new CameraView(robot.config.camera) : null;
+  const overlay = robot.config.camera ? new SeenOverlay(link, robot.config.camera) : null;
+  if (overlay) camera?.element.append(overlay.element);
   const batteries = batteryCard(robot);
 
   const dispatch = (event: DriveEvent) => {
@@ -251,6 +254,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
 
   const stick = h("section", { class: "card stick", "aria-label": "Pad" }, pad, hint);
   if (camera) cleanups.push(() => camera.close());
+  if (overlay) cleanups.push(() => overlay.close());
   host.append(h("div", { class: "drive" }, lease, ...(camera ? [camera.element] : []), stick, velocity.element, speeds, batteries.element));
   paint();
   return () => {

@@ -28,6 +28,7 @@ import {
 } from "../map";
 import type { Page, Robot } from "../page";
 import { remember, wasOn } from "../remembered";
+import { thingMarkers } from "../seen";
 import { isMessage, type Json, type Message, type Rosbridge } from "../rosbridge";
 import { Trip, type TripState } from "../trip";
 import { outlineOf, readWorld, type World } from "../world";
@@ -97,6 +98,11 @@ const LAYERS: Record<string, Layer> = {
     throttle: 200,
     only: /zone|people/,
     read: (message) => ({ is: "markers", ...readMarkers(message) }),
+  },
+  Detection3DArray: {
+    words: "Seen things: blue, with names",
+    throttle: 200,
+    read: (message) => ({ is: "markers", ...thingMarkers(message) }),
   },
   World: {
     words: "World: thin outlines",

@@ -365,7 +365,7 @@ def _missions(read: NavigationOfRobot | None) -> Mapping[str, Mapping[str, objec
     "navigation",
     NavigationModel,
     files=(ROBOT, OVERLAY),
-    order=64,
+    order=66,
     brings=(MAP_SERVER, LOCALISATION, GO_TO, PEOPLE, FOLLOW),
     outputs={one: {"cmd_vel": "cmd_vel"} for one in (GO_TO, FOLLOW, LOCALISATION)},
     wires=True,

@@ -73,7 +73,7 @@ class TagDetector(sdk.Component[TagDetectorConfig]):
     ones are from afar.
 
     Example:
-        tags: {type: tag_detector, frame: camera_optical_frame, size: 12 cm, names: {box: 7}}
+        finder: {type: tag_detector, frame: camera_optical_frame, size: 12 cm, names: {box: 7}}
     """
 
     process = "vision"

@@ -30,7 +30,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
 
     camera = contents.of(cameras)[found.camera].model
     config = {
-        **found.model_dump(exclude={"camera"}),
+        **{name: getattr(found, name) for name in KnownTags.model_fields},
         "image": f"{found.camera}/image_raw",
         "info": f"{found.camera}/camera_info",
         "frame": optical_frame(camera.frame),
