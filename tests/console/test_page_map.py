@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import math
 import re
 from collections.abc import Callable
 from typing import Any
 
+import PIL.Image
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
@@ -430,3 +432,27 @@ def test_it_fits_the_window_and_the_finger(open_page: Callable[..., Page], rolli
     for size in (WIDE, PHONE):
         page.set_viewport_size(size)
         expect_fit(page)
+
+
+def test_what_a_camera_sees_is_over_its_picture_until_it_is_old(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    gateway.config = CONFIG | {"camera": "/camera/image_raw"}
+    drawn = io.BytesIO()
+    PIL.Image.new("RGB", (64, 48)).save(drawn, "PNG")
+    gateway.files["/stream"] = drawn.getvalue()
+    things = "vision_msgs/msg/Detection3DArray"
+    ports = [{"name": "seen", "kind": "out", "topic": "/tags", "type": things}]
+    gateway.windows["robot/DescribeRobot"] = [component("tags", ports, {})]
+    header = {"frame_id": "eye"}
+    matrix = [500, 0, 320, 0, 500, 240, 0, 0, 1]
+    gateway.latched["/camera/camera_info"] = {"header": header, "width": 640, "height": 480, "k": matrix}
+    centre = {"position": {"x": 0.0, "y": 0.0, "z": 2.0}, "orientation": {"x": 1.0, "y": 0.0, "z": 0.0, "w": 0.0}}
+    result = {"hypothesis": {"class_id": "left_box", "score": 0.9}}
+    tag = {"id": "left_box", "results": [result], "bbox": {"center": centre, "size": {"x": 0.2, "y": 0.2, "z": 0.001}}}
+    gateway.latched["/tags"] = {"header": header, "detections": [tag]}
+    page = open_page(page_name="drive")
+    overlay = page.locator(".seen")
+    expect(overlay).to_have_attribute("data-seen", "left box")
+    expect(overlay.locator("polygon")).to_have_attribute("points", "295.0,215.0 345.0,215.0 345.0,265.0 295.0,265.0")
+    expect(overlay).to_have_attribute("data-seen", "")
