@@ -61,7 +61,7 @@ def shot(board: np.ndarray[Any, np.dtype[np.uint8]], pose: Transform3) -> np.nda
     edge = {"borderMode": cv2.BORDER_CONSTANT, "borderValue": 128}
     seen: np.ndarray[Any, Any] = cv2.remap(blurred, x, y, cv2.INTER_LINEAR, **edge)
     noise = np.random.default_rng(1).normal(0, 1.5, seen.shape)
-    return np.clip(seen + noise, 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(seen + noise, 0, 255), np.uint8)
 
 
 def poses(distance: float) -> list[Transform3]:

@@ -179,8 +179,8 @@ class LocalisationModel(Config):
 
     @model_validator(mode="after")
     def _knows_tags(self) -> LocalisationModel:
-        if (self.type == "tags") != bool(self.tags):
-            raise ValueError("'type: tags' and 'tags' belong together: the places of tags by which the robot is found")
+        if self.type == "tags" and not self.tags:
+            raise ValueError("'type: tags' needs 'tags': the places of tags by which the robot is found")
         return self
 
 
