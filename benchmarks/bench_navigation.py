@@ -199,7 +199,9 @@ def _long_drives() -> Iterator[Row]:
 def _mapping() -> Row:
     with TemporaryDirectory() as folder:
         Path(folder, "mapped.yaml").write_text(MAPPED, encoding="utf-8")
-        found = compile_robot(str(ROOT / "robots/house"), overlays=[f"{folder}/mapped.yaml"], environment={})
+        robot, overlay, sets = str(ROOT / "robots/house"), f"{folder}/mapped.yaml", ("start=clean_house",)
+        # A profile, since the overlay changes what another one builds upon.
+        found = compile_robot(robot, profiles=["watchman"], overlays=[overlay], sets=sets, environment={})
     if found.robot is None or found.plan is None:
         raise ValueError("the house does not compile with a mapper")
     mapper, around = run_robot(found.plan).bench.component("mapper"), found.robot.manifest.contents.of(world)
