@@ -52,7 +52,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/navigation": Cost(code=3984, files=30, small=3, imports=378),
     "domains/power": Cost(code=461, files=6, small=0, imports=37),
     "domains/servos": Cost(code=7907, files=52, small=1, imports=583),
-    "domains/vision": Cost(code=2606, files=31, small=1, imports=352),
+    "domains/vision": Cost(code=2610, files=31, small=1, imports=354),
     "domains/worlds": Cost(code=4601, files=42, small=6, imports=562),
     "manifest": Cost(code=3477, files=27, small=1, imports=278),
     "missions": Cost(code=9841, files=121, small=17, imports=1076),
@@ -65,10 +65,10 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 97983,
+    "lines of code": 97987,
     "files": 825,
     "files of 1 to 30 lines of code": 74,
-    "lines of imports": 9525,
+    "lines of imports": 9527,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 320,

@@ -14,11 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import read_regular
 from rbxcompose.domains.vision.camera_file import CameraFile
 
 Numbers = NDArray[np.float64]
 GreyPicture = NDArray[np.uint8]
 
+LARGEST = 100_000_000  # [bytes] of a picture
 LEAST_VIEWS, LEAST_CORNERS = 8, 12
 SAME = 0.03  # of the diagonal of a picture, by which corners have moved at least in a new view
 TILTED = math.radians(12)  # between the normals of two views at least: views from one side do not tell the focal length
@@ -193,7 +195,7 @@ def picture_files(paths: Sequence[Any]) -> list[tuple[str, GreyPicture | None]]:
     found: list[tuple[str, GreyPicture | None]] = []
     for path in paths:
         try:
-            data = np.frombuffer(path.read_bytes(), np.uint8)
+            data = np.frombuffer(read_regular(path, LARGEST), np.uint8)
             picture = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if len(data) else None
         except (OSError, cv2.error):
             picture = None

@@ -9,8 +9,10 @@ from typing import Any
 import yaml
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import read_regular
 from rbxcompose.domains.worlds.optics import Intrinsics
 
+LARGEST = 100_000  # [bytes]
 MODELS = {"plumb_bob": (0, 4, 5), "rational_polynomial": (8,)}
 """Models of distortion, and how many coefficients each may have."""
 
@@ -40,7 +42,7 @@ class CameraFile:
             CameraFileError: if it cannot be read, or is no calibration.
         """
         try:
-            read = yaml.safe_load(path.read_text(encoding="utf-8"))
+            read = yaml.safe_load(read_regular(path, LARGEST).decode("utf-8"))
         except OSError as error:
             raise CameraFileError(f"it cannot be read: {error.strerror}") from error
         except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
