@@ -25,6 +25,7 @@ from rbxcompose.msgs.tf2_msgs import TFMessage
 
 NOT_SEEN = "not_seen"
 ENOUGH, AROUND, PAUSE = 5, 1.15 * math.tau, 0.5  # tags that agree; [rad] that it turns; [s] that it looks at a tag
+ODD = 3  # tags, one after the other, that are not where they should be, from which on diagnostics warn
 UNSURE = 0.5  # [m] of error from which on diagnostics warn
 GIVEN = 0.5, math.radians(15)  # standard deviations of a pose that comes without any [m], [rad]
 ServedLocalise = sdk.ServedGoal[Localise.Goal, Localise.Result, Localise.Feedback]
@@ -169,9 +170,10 @@ class TagLocalisation(TagWatcher[TagLocalisationConfig]):
         seen = self.now - self.recognised
         last = f"a tag was seen {seen:.0f} s ago" if seen < math.inf else "no tag has been seen yet"
         words = f"{last}, known to {self.filter.error:.2f} m"
-        if self.filter.rejected:
-            words = f"{self.filter.rejected} tags are not where they should be; {words}"
-        is_well = self.filter.error < UNSURE and not self.filter.rejected and not trouble
+        is_odd = self.filter.rejected >= ODD
+        if is_odd:
+            words = f"{self.filter.rejected} tags, one after the other, are not where they should be; {words}"
+        is_well = self.filter.error < UNSURE and not is_odd and not trouble
         return (Level.OK if is_well else Level.WARN), f"{trouble}; {words}" if trouble else words
 
     def tell(self) -> None:
