@@ -49,7 +49,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/devices": Cost(code=741, files=9, small=0, imports=80),
     "domains/diagnostics": Cost(code=2349, files=24, small=4, imports=214),
     "domains/muxes": Cost(code=2023, files=15, small=1, imports=122),
-    "domains/navigation": Cost(code=3984, files=30, small=3, imports=378),
+    "domains/navigation": Cost(code=3986, files=30, small=3, imports=378),
     "domains/power": Cost(code=461, files=6, small=0, imports=37),
     "domains/servos": Cost(code=7907, files=52, small=1, imports=583),
     "domains/vision": Cost(code=2610, files=31, small=1, imports=354),
@@ -65,7 +65,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 97987,
+    "lines of code": 97989,
     "files": 825,
     "files of 1 to 30 lines of code": 74,
     "lines of imports": 9527,
