@@ -191,7 +191,7 @@ class Head(sdk.Component[HeadConfig]):
             self.watch_frame()
         elif tracks.frame:
             self.see((0.0, 0.0, 0.0), tracks.frame)
-        if self.positions.keys() < self.limits.keys():
+        if not self.limits.keys() <= self.positions.keys():
             return
         told = self.tracker.update(tracks.settings, self.now, dt, self.positions)
         if told is not None:
