@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import random
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.measuring import ROOT, Row, Samples
+from benchmarks.measuring import ROOT, Row, Samples, timed
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot
@@ -92,19 +92,9 @@ def rows() -> list[Row]:
     ]
 
 
-def _times(function: Callable[[], object], count: int) -> Samples:
-    function()
-    found = []
-    for _ in range(count):
-        began = time.perf_counter()
-        function()
-        found.append(time.perf_counter() - began)
-    return Samples(tuple(found))
-
-
 def _lasers() -> Iterator[Row]:
     rays = Rays(read_map(HOUSE))
-    times = _times(lambda: rays.cast((4.8, 2.5), ANGLES, 10.0), 200)
+    times = timed(lambda: rays.cast((4.8, 2.5), ANGLES, 10.0), 200)
     yield Row(
         name="navigation: a laser of 360 rays of 10 m in the house",
         unit="ms",
@@ -121,7 +111,7 @@ def _plans() -> Iterator[Row]:
     maze[333, :800] = maze[666, 200:] = 100
     for name, grid in {"an open map": open_map, "two walls across it": GridMap(maze, 0.05)}.items():
         costs = LayeredCosts(grid, CostSettings())
-        times = _times(partial(plan, costs, Pose2(1, 1), Pose2(49, 49), 0.1), 15)
+        times = timed(partial(plan, costs, Pose2(1, 1), Pose2(49, 49), 0.1), 15)
         yield Row(
             name=f"navigation: a plan on 1,000 x 1,000 cells, {name}",
             unit="ms",
@@ -274,7 +264,7 @@ def _filters() -> Iterator[Row]:
             core.move(places[turn])
             core.see(Pose2(), ANGLES, scans[turn])
 
-        times = _times(update, 100)
+        times = timed(update, 100)
         yield Row(
             name=f"navigation: a scan in a particle filter of {count:,} particles",
             unit="ms",

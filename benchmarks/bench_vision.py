@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.bench_robot import up
 from benchmarks.bus_ends import Ours
-from benchmarks.measuring import Row, Samples
+from benchmarks.measuring import Row, Samples, timed
 from benchmarks.peers import free_port
 from rbxcompose.base.geometry import Pose2, Transform3, quaternion_from_yaw
 from rbxcompose.domains.vision.tags import TagFinder
@@ -72,27 +72,17 @@ def _grey(view: WorldView, at: Transform3) -> GreyPicture:
     return np.asarray(cv2.cvtColor(colours, cv2.COLOR_RGB2GRAY), np.uint8)
 
 
-def _times(function: Callable[[], object], count: int = 100) -> Samples:
-    function()
-    found = []
-    for _ in range(count):
-        began = time.perf_counter()
-        function()
-        found.append(time.perf_counter() - began)
-    return Samples(tuple(found))
-
-
 def _pictures() -> Iterator[Row]:
     at = Transform3((0.0, 0.0, 0.2))
     for count, name in ((1, "a tag"), (10, "ten tags")):
         view, finder = WorldView(_world(count)), TagFinder(size=SIZE)
-        drawn = _times(partial(_grey, view, at))
+        drawn = timed(partial(_grey, view, at), 100)
         how = "640 x 480 pixels, tags on boxes on the ground"
         yield Row(f"vision: a picture with {name}", "ms", how, drawn.median * 1e3, drawn.p99 * 1e3, most=10.0)
         picture = _grey(view, at)
         if len(finder.find(picture, CAMERA)) != count:
             raise ValueError(f"not all of {name} are found")
-        found = _times(partial(finder.find, picture, CAMERA))
+        found = timed(partial(finder.find, picture, CAMERA), 100)
         how = "640 x 480 pixels, with poses and covariances; OpenCV"
         yield Row(f"vision: finding {name}", "ms", how, found.median * 1e3, found.p99 * 1e3, most=15.0)
 

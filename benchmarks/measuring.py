@@ -98,6 +98,11 @@ def in_turns(*jobs: Callable[[], object], rounds: int, clock: Callable[[], float
     return [Samples(tuple(found)) for found in times]
 
 
+def timed(job: Callable[[], object], rounds: int) -> Samples:
+    """Return the wall times of a job alone [s]."""
+    return in_turns(job, rounds=rounds, clock=time.perf_counter)[0]
+
+
 def program(command: Sequence[str], environment: dict[str, str] | None = None) -> Callable[[], object]:
     """Return a job that runs a program to its end.
 

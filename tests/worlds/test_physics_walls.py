@@ -6,8 +6,7 @@ import numpy as np
 from hypothesis import given
 
 from rbxcompose.base.geometry import Pose2
-from rbxcompose.domains.worlds.grid_map import SOLID, GridMap
-from rbxcompose.domains.worlds.physics.walls import wall_rectangles
+from rbxcompose.domains.worlds.grid_map import SOLID, GridMap, wall_rectangles
 from tests.worlds.scenes import grids
 
 

@@ -12,19 +12,17 @@ from rbxcompose import sdk
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.navigation.companion import SURE
+from rbxcompose.domains.navigation.markers import people_markers
 from rbxcompose.domains.navigation.people import TrackedPerson
 from rbxcompose.domains.worlds.poses import message_of
 from rbxcompose.domains.worlds.world import MAP_FRAME
-from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Vector3
+from rbxcompose.msgs.geometry_msgs import Point, PoseStamped
 from rbxcompose.msgs.people_msgs import People, Person
 from rbxcompose.msgs.stamps import to_time
-from rbxcompose.msgs.std_msgs import Bool, ColorRGBA, Float32, Header
-from rbxcompose.msgs.visualization_msgs import Marker, MarkerArray
+from rbxcompose.msgs.std_msgs import Bool, Float32, Header
+from rbxcompose.msgs.visualization_msgs import MarkerArray
 
-RADIUS, SIDES = 0.25, 16  # [m] and corners of the circle that stands for a person
-LINE, TEXT = 0.04, 0.25  # [m] widths of lines and heights of texts
 BLIND = 2.0  # [s] without anything that can be used
-SURE_COLOUR, UNSURE_COLOUR = ColorRGBA(r=0.1, g=0.45, b=0.9, a=1.0), ColorRGBA(r=0.5, g=0.5, b=0.5, a=1.0)
 
 
 class PeopleConfig(sdk.Config):
@@ -86,33 +84,3 @@ class TellsPeople(sdk.Component[C]):
 def person_message(one: TrackedPerson) -> Person:
     """Return somebody as ROS's people stack does."""
     return Person(one.name, Point(x=one.x, y=one.y), Point(x=one.vx, y=one.vy), one.reliability, tagnames=(), tags=())
-
-
-def people_markers(found: Sequence[TrackedPerson], header: Header) -> MarkerArray:
-    """Return markers in place of all that were there before: a circle and a name for each, grey if it has not moved."""
-    drawn = [Marker(header=header, action=Marker.DELETEALL)]
-    corners = [math.tau * (side % SIDES) / SIDES for side in range(SIDES + 1)]
-    for number, one in enumerate(found):
-        colour = SURE_COLOUR if one.reliability >= SURE else UNSURE_COLOUR
-        circle = tuple(Point(one.x + RADIUS * math.cos(at), one.y + RADIUS * math.sin(at), 0.0) for at in corners)
-        outline = Marker(
-            header=header,
-            ns="people",
-            id=2 * number,
-            type=Marker.LINE_STRIP,
-            points=circle,
-            scale=Vector3(x=LINE),
-            color=colour,
-        )
-        name = Marker(
-            header=header,
-            ns="people",
-            id=2 * number + 1,
-            type=Marker.TEXT_VIEW_FACING,
-            pose=Pose(position=Point(one.x, one.y, 0.0)),
-            scale=Vector3(z=TEXT),
-            color=colour,
-            text=one.name.replace("_", " "),
-        )
-        drawn += [outline, name]
-    return MarkerArray(markers=tuple(drawn))

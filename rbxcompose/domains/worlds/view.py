@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
-from rbxcompose.domains.worlds.grid_map import GridMap
+from rbxcompose.domains.worlds.grid_map import GridMap, wall_rectangles
 from rbxcompose.domains.worlds.optics import Intrinsics
 from rbxcompose.domains.worlds.physics.conversion import WALL
 from rbxcompose.domains.worlds.physics.looks import WALLS, colour_of
 from rbxcompose.domains.worlds.physics.solids import rotation_matrix
-from rbxcompose.domains.worlds.physics.walls import wall_rectangles
 from rbxcompose.domains.worlds.shapes import (
     WorldBox,
     WorldCylinder,

@@ -28,8 +28,8 @@ from rbxcompose.domains.navigation.costs import (
 )
 from rbxcompose.domains.navigation.follower import FollowerSettings, FollowState, PathFollower
 from rbxcompose.domains.navigation.manoeuvres import BackUpManoeuvre, Manoeuvre, ManoeuvreState, SpinManoeuvre
+from rbxcompose.domains.navigation.markers import zone_markers
 from rbxcompose.domains.navigation.planner import NoPathError, PlannedPath, plan
-from rbxcompose.domains.navigation.zone_markers import zone_markers
 from rbxcompose.domains.worlds.grid_map import GridMap
 from rbxcompose.domains.worlds.poses import message_of, pose_in, rays_of
 from rbxcompose.domains.worlds.shapes import PolygonFootprint

@@ -11,9 +11,9 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.navigation.frames import BASE, ODOM, odom_in_map
 from rbxcompose.domains.navigation.localisation import LocalisationSettings, ParticleFilter
-from rbxcompose.domains.worlds.poses import message_of, pose_in, rays_of
+from rbxcompose.domains.navigation.localiser import BASE, ODOM, Localiser, given_pose
+from rbxcompose.domains.worlds.poses import message_of, rays_of
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_of
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import OccupancyGrid
@@ -21,11 +21,9 @@ from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.std_srvs import Empty
-from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.sdk.ports import BULK
 
 LOST = 0.3  # share of a scan that the map explains below which the robot is probably elsewhere
-GIVEN = 0.5, math.radians(15)  # standard deviations of a pose that comes without any [m], [rad]
 
 
 class LocalisationConfig(sdk.Config):
@@ -52,7 +50,7 @@ class LocalisationConfig(sdk.Config):
 
 
 @sdk.component("particle_localisation")
-class ParticleLocalisation(sdk.Component[LocalisationConfig]):
+class ParticleLocalisation(Localiser[LocalisationConfig]):
     """Finds the robot in its map by a laser, with a particle filter, and publishes where `odom` is in `map`.
 
     Example:
@@ -61,8 +59,6 @@ class ParticleLocalisation(sdk.Component[LocalisationConfig]):
 
     made_by = "The section `navigation` runs it."
     rate = 10.0
-    tf = sdk.Out(TFMessage, "/tf")
-    estimate = sdk.Out(geometry.PoseWithCovarianceStamped, "amcl_pose", qos="latched")
     cloud = sdk.Out(geometry.PoseArray, "particle_cloud")
     map = sdk.In(OccupancyGrid, "map", qos="latched", limits=BULK)
     initialpose = sdk.In(
@@ -81,9 +77,9 @@ class ParticleLocalisation(sdk.Component[LocalisationConfig]):
 
     @classmethod
     def capabilities(cls, config: LocalisationConfig) -> tuple[sdk.Capability, ...]:
-        """Declare the frame that it places."""
+        """Declare the frame that it places, and what it imports."""
         extra = sdk.NeedsExtra(sdk.Setting("scipy"), sdk.Setting("navigation"))
-        return sdk.WritesFrame("tf", sdk.Setting(MAP_FRAME), sdk.Setting(ODOM)), extra
+        return (*super().capabilities(config), extra)
 
     def configure(self) -> None:
         """Know no map yet."""
@@ -118,9 +114,7 @@ class ParticleLocalisation(sdk.Component[LocalisationConfig]):
 
     def on_initialpose(self, message: geometry.PoseWithCovarianceStamped) -> None:
         """Begin again at a pose that somebody pointed at in a viewer."""
-        covariance = np.asarray(message.pose.covariance, float).reshape(6, 6)
-        spread, turn_spread = math.sqrt(max(0.0, covariance[0, 0])), math.sqrt(max(0.0, covariance[5, 5]))
-        self.begin(pose_in(message.pose.pose), spread or GIVEN[0], turn_spread or GIVEN[1])
+        self.begin(*given_pose(message))
 
     def on_anywhere(self, request: Empty.Request) -> Empty.Response:
         """Begin again with no idea."""
@@ -163,16 +157,13 @@ class ParticleLocalisation(sdk.Component[LocalisationConfig]):
         self.take_scan()
         if self.filter is not None:
             self.correction = self.filter.correction
-        self.tf(odom_in_map(self.correction, self.stamp))
+        self.place(self.correction)
 
     def tell(self, found: ParticleFilter, of: Header) -> None:
         """Publish the pose and, for viewers, the particles."""
-        header = Header(stamp=of.stamp, frame_id=MAP_FRAME)
-        covariance = np.zeros((6, 6))
-        covariance[np.ix_((0, 1, 5), (0, 1, 5))] = found.covariance
-        pose = geometry.PoseWithCovariance(message_of(found.pose), covariance.ravel())
-        self.estimate(geometry.PoseWithCovarianceStamped(header, pose))
+        self.publish_pose(found.pose, found.covariance, of.stamp)
         if self.cloud.is_wanted:
+            header = Header(stamp=of.stamp, frame_id=MAP_FRAME)
             self.cloud(geometry.PoseArray(header, tuple(message_of(Pose2(*one)) for one in found.poses.tolist())))
 
 

@@ -11,23 +11,18 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.geometry import Pose2, Transform3, rotate
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.navigation.frames import ODOM, odom_in_map
+from rbxcompose.domains.navigation.localiser import Localiser, given_pose
 from rbxcompose.domains.navigation.tag_filter import PlacedTag, TagFilter
 from rbxcompose.domains.vision.tag_watcher import SQUARE, TagWatcher, TagWatcherConfig, WatchedTag
 from rbxcompose.domains.worlds.physics.solids import rotation_matrix
-from rbxcompose.domains.worlds.poses import message_of, pose_in
-from rbxcompose.domains.worlds.world import MAP_FRAME
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.rbxcompose_msgs import Localise
 from rbxcompose.msgs.stamps import to_time
-from rbxcompose.msgs.std_msgs import Header
-from rbxcompose.msgs.tf2_msgs import TFMessage
 
 NOT_SEEN = "not_seen"
 ENOUGH, AROUND, PAUSE = 5, 1.15 * math.tau, 0.5  # tags that agree; [rad] that it turns; [s] that it looks at a tag
 ODD = 3  # tags, one after the other, that are not where they should be, from which on diagnostics warn
 UNSURE = 0.5  # [m] of error from which on diagnostics warn
-GIVEN = 0.5, math.radians(15)  # standard deviations of a pose that comes without any [m], [rad]
 ServedLocalise = sdk.ServedGoal[Localise.Goal, Localise.Result, Localise.Feedback]
 LYING = math.sin(math.radians(60))  # upwards part of the direction out of a tag, from which on it shows no heading
 
@@ -50,7 +45,7 @@ class TagLocalisationConfig(TagWatcherConfig):
 
 
 @sdk.component("tag_localisation")
-class TagLocalisation(TagWatcher[TagLocalisationConfig]):
+class TagLocalisation(Localiser[TagLocalisationConfig], TagWatcher[TagLocalisationConfig]):
     """Finds the robot in its map by tags of known places, and publishes where `odom` is in `map`.
 
     Between tags it goes by odometry. Who has carried it elsewhere need not say so: after a few pictures it knows. The
@@ -62,8 +57,6 @@ class TagLocalisation(TagWatcher[TagLocalisationConfig]):
 
     made_by = "The section `navigation` runs it."
     rate = 10.0
-    tf = sdk.Out(TFMessage, "/tf")
-    estimate = sdk.Out(geometry.PoseWithCovarianceStamped, "amcl_pose", qos="latched")
     initialpose = sdk.In(
         geometry.PoseWithCovarianceStamped, "initialpose", qos="event", is_open=True, may_be_silent=True
     )
@@ -75,7 +68,7 @@ class TagLocalisation(TagWatcher[TagLocalisationConfig]):
     def capabilities(cls, config: TagLocalisationConfig) -> tuple[sdk.Capability, ...]:
         """Declare the frame that it places, and how fast it turns."""
         turns = sdk.CommandsMotion("cmd_vel", None, sdk.Setting(config.turn_rate, "turn_rate"))
-        return sdk.WritesFrame("tf", sdk.Setting(MAP_FRAME), sdk.Setting(ODOM)), turns
+        return (*super().capabilities(config), turns)
 
     def configure(self) -> None:
         """Begin at the start, if there is one."""
@@ -91,11 +84,9 @@ class TagLocalisation(TagWatcher[TagLocalisationConfig]):
 
     def on_initialpose(self, message: geometry.PoseWithCovarianceStamped) -> None:
         """Begin again at a pose that somebody pointed at in a viewer."""
-        covariance = np.asarray(message.pose.covariance, float).reshape(6, 6)
-        spread, turn_spread = math.sqrt(max(0.0, covariance[0, 0])), math.sqrt(max(0.0, covariance[5, 5]))
-        at = pose_in(message.pose.pose)
-        if math.isfinite(at.x + at.y + at.heading):
-            self.filter.start(at, spread or GIVEN[0], turn_spread or GIVEN[1])
+        pose, spread, turn_spread = given_pose(message)
+        if math.isfinite(pose.x + pose.y + pose.heading):
+            self.filter.start(pose, spread, turn_spread)
         else:
             self.warn("an initial pose is not finite")
 
@@ -108,7 +99,8 @@ class TagLocalisation(TagWatcher[TagLocalisationConfig]):
             if tag.name in self.filter.tags and self.filter.see(placed(tag, self.base_then)):
                 self.recognised = self.now
                 self.agreed += 1
-        self.tell()
+        if (pose := self.filter.pose) is not None:
+            self.publish_pose(pose, self.filter.covariance, to_time(self.stamp))
 
     def step(self, dt: float) -> None:
         """Publish where `odom` is in `map`, and report how well that is known."""
@@ -116,7 +108,7 @@ class TagLocalisation(TagWatcher[TagLocalisationConfig]):
         if (base := self.bound["base"].now()) is not None:
             self.filter.move(base)
         if (correction := self.filter.correction) is not None:
-            self.tf(odom_in_map(correction, self.stamp))
+            self.place(correction)
         self.status(*self.state())
         self.look_around(dt)
 
@@ -175,16 +167,6 @@ class TagLocalisation(TagWatcher[TagLocalisationConfig]):
             words = f"{self.filter.rejected} tags, one after the other, are not where they should be; {words}"
         is_well = self.filter.error < UNSURE and not is_odd and not trouble
         return (Level.OK if is_well else Level.WARN), f"{trouble}; {words}" if trouble else words
-
-    def tell(self) -> None:
-        """Publish the pose."""
-        if (pose := self.filter.pose) is None:
-            return
-        covariance = np.zeros((6, 6))
-        covariance[np.ix_((0, 1, 5), (0, 1, 5))] = self.filter.covariance
-        header = Header(stamp=to_time(self.stamp), frame_id=MAP_FRAME)
-        known = geometry.PoseWithCovariance(message_of(pose), covariance.ravel())
-        self.estimate(geometry.PoseWithCovarianceStamped(header, known))
 
 
 def placed(tag: WatchedTag, base: Pose2) -> PlacedTag:

@@ -20,6 +20,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Quaternion, Transform3, quaternion_between, quaternion_from_yaw
 from rbxcompose.domains.body.model import BodyJoint
 from rbxcompose.domains.worlds.contact import MAP
+from rbxcompose.domains.worlds.grid_map import wall_rectangles
 from rbxcompose.domains.worlds.physics.actuators import Gains, add_actuators, add_followers
 from rbxcompose.domains.worlds.physics.looks import (
     WALLS,
@@ -42,7 +43,6 @@ from rbxcompose.domains.worlds.physics.robot import (
     placed_parts,
 )
 from rbxcompose.domains.worlds.physics.solids import THIN, BodyRepair, BodyRepairs, PhysicalShape, apply
-from rbxcompose.domains.worlds.physics.walls import wall_rectangles
 from rbxcompose.domains.worlds.shapes import WorldBox, WorldCylinder, WorldHull, WorldMesh, WorldShape
 from rbxcompose.domains.worlds.world import SimulatedWorld
 
