@@ -1,4 +1,4 @@
-"""What all have in common that find a robot in its map: they place `odom` in `map`, and publish the pose as AMCL does."""
+"""What every localiser shares: it places `odom` in `map` and publishes the pose as AMCL does."""
 
 from __future__ import annotations
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from rbxcompose import sdk
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, Transform3
+from rbxcompose.domains.worlds.poses import NewestMessage
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.poses import pose_of
-from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.vision_msgs import Detection3DArray
 
 BASE, ODOM = "base_footprint", "odom"
@@ -68,30 +68,22 @@ class TagWatcher(sdk.Component[C]):
 
     def configure(self) -> None:
         """Know no tags yet."""
-        self.newest: Detection3DArray | None = None  # that is not taken yet
+        self.newest = NewestMessage[Detection3DArray](self.config.frame, "tags are in '{}', and expected in '{}'")
         self.heard = self.taken = -math.inf  # when something came, and could be used [s]
-        self.problem = ""
         self.base_then = Pose2()  # where the robot was in that frame when the newest picture was taken
 
     def on_tags(self, message: Detection3DArray) -> None:
         """Take what the camera sees, now or in a later step."""
-        self.newest, self.heard = message, self.now
+        self.heard = self.now
+        self.newest.put(message)
         self.take_tags()
 
     def take_tags(self) -> None:
         """Take the newest tags, unless that has been done."""
-        if (message := self.newest) is None:
+        if (placed := self.newest.take(self.bound["camera"], self.bound["base"])) is None:
             return
-        if (frame := message.header.frame_id.lstrip("/")) not in ("", self.config.frame):
-            self.problem = f"tags are in '{frame}', and expected in '{self.config.frame}'"
-            return
-        try:
-            time = to_nanoseconds(message.header.stamp) or None
-            at, base = (self.bound[name].transform(at=time) for name in ("camera", "base"))
-        except LookupError as error:
-            self.problem = str(error)
-            return
-        self.newest, self.problem, self.taken = None, "", self.now
+        message, (at, base) = placed
+        self.taken = self.now
         self.base_then = base.to_pose2()
         found = []
         for one in message.detections:
@@ -117,4 +109,4 @@ class TagWatcher(sdk.Component[C]):
         if self.silent > silence:
             told = f"nothing for {self.silent:.1f} s" if self.silent < math.inf else "nothing yet"
             return f"the camera has told {told}"
-        return self.problem
+        return self.newest.problem

@@ -1,12 +1,15 @@
-"""Planar poses as messages, and the rays of scans."""
+"""Planar poses as messages, the rays of scans, and messages of sensors with the poses at which they measured."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
-from rbxcompose.base.geometry import Pose2, quaternion_from_rpy, yaw_of
+from rbxcompose.base.geometry import Pose2, Transform3, quaternion_from_rpy, yaw_of
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.sensor_msgs import LaserScan
+from rbxcompose.msgs.stamps import to_nanoseconds
+from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.sdk.bound import Look
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,3 +38,49 @@ def rays_of(scan: LaserScan) -> tuple[Numbers, Numbers]:
     with np.errstate(invalid="ignore", over="ignore"):
         angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges), dtype=np.float64)
     return angles, ranges
+
+
+class WithHeader(Protocol):
+    """A message with a header."""
+
+    @property
+    def header(self) -> Header:
+        """Return when and in which frame it was measured."""
+        ...
+
+
+M = TypeVar("M", bound=WithHeader)
+
+
+class NewestMessage(Generic[M]):
+    """The newest message of a sensor, until it is known where that was when it measured.
+
+    Transforms of that time may come later than the message.
+    """
+
+    def __init__(self, frame: str = "", wrong: str = "it is in '{}', not in '{}'") -> None:
+        """Take messages in a frame, or in any; `wrong` says what is wrong with those in another one."""
+        self._frame, self._wrong = frame, wrong
+        self._message: M | None = None
+        self.problem = ""
+        """Why it cannot be used so far."""
+
+    def put(self, message: M) -> None:
+        """Take a message in place of the one before."""
+        self._message = message
+
+    def take(self, *looks: Look) -> tuple[M, list[Transform3]] | None:
+        """Return the message with the poses of frames at its time, once; None as long as there is none."""
+        if (message := self._message) is None:
+            return None
+        frame, stamp = message.header.frame_id.lstrip("/"), to_nanoseconds(message.header.stamp) or None
+        if self._frame and frame not in ("", self._frame):
+            self.problem = self._wrong.format(frame, self._frame)
+            return None
+        try:
+            poses = [look.transform(at=stamp) for look in looks]
+        except LookupError as error:
+            self.problem = str(error)
+            return None
+        self._message, self.problem = None, ""
+        return message, poses

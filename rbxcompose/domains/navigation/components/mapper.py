@@ -9,11 +9,11 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.navigation.occupancy import MappingSettings, OccupancyMapper
-from rbxcompose.domains.worlds.poses import rays_of
+from rbxcompose.domains.worlds.poses import NewestMessage, rays_of
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_message
 from rbxcompose.msgs.nav_msgs import OccupancyGrid
 from rbxcompose.msgs.sensor_msgs import LaserScan
-from rbxcompose.msgs.stamps import to_nanoseconds, to_time
+from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.std_srvs import Trigger
 
@@ -58,7 +58,7 @@ class Mapper(sdk.Component[MapperConfig]):
     def configure(self) -> None:
         """Know nothing yet."""
         self.mapper = OccupancyMapper(MappingSettings(self.config.resolution, self.config.farthest))
-        self.scan: LaserScan | None = None  # that is not taken yet
+        self.scan = NewestMessage[LaserScan]()
         self.trouble = ""
         self.changed, self.shown = False, 0.0  # since the last map; [s] at which that was
 
@@ -82,20 +82,16 @@ class Mapper(sdk.Component[MapperConfig]):
 
     def on_scan(self, message: LaserScan) -> None:
         """Take a scan as soon as it is known from where it was taken."""
-        self.scan = message
+        self.scan.put(message)
         self.take_scan()
 
     def take_scan(self) -> None:
         """Take the newest scan, unless that has been done."""
-        if (message := self.scan) is None:
-            return
-        try:
-            sensor = self.bound["laser"].transform(at=to_nanoseconds(message.header.stamp) or None).to_pose2()
-        except LookupError:
+        if (placed := self.scan.take(self.bound["laser"])) is None:
             return  # diagnostics of transforms say so
-        self.scan = None
+        message, (at,) = placed
         try:
-            self.changed |= self.mapper.see(sensor, *rays_of(message), message.range_max)
+            self.changed |= self.mapper.see(at.to_pose2(), *rays_of(message), message.range_max)
             self.trouble = ""
         except ValueError as error:
             if not self.trouble:

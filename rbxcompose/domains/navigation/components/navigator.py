@@ -31,7 +31,7 @@ from rbxcompose.domains.navigation.manoeuvres import BackUpManoeuvre, Manoeuvre,
 from rbxcompose.domains.navigation.markers import zone_markers
 from rbxcompose.domains.navigation.planner import NoPathError, PlannedPath, plan
 from rbxcompose.domains.worlds.grid_map import GridMap
-from rbxcompose.domains.worlds.poses import message_of, pose_in, rays_of
+from rbxcompose.domains.worlds.poses import NewestMessage, message_of, pose_in, rays_of
 from rbxcompose.domains.worlds.shapes import PolygonFootprint
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_message, grid_of
 from rbxcompose.msgs import geometry_msgs as geometry
@@ -41,7 +41,7 @@ from rbxcompose.msgs.nav2_msgs import NavigateThroughPoses, NavigateToPose, Spin
 from rbxcompose.msgs.nav_msgs import OccupancyGrid, Path
 from rbxcompose.msgs.rbxcompose_msgs import BackUp, RunMission
 from rbxcompose.msgs.sensor_msgs import LaserScan
-from rbxcompose.msgs.stamps import to_nanoseconds, to_time
+from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.msgs.visualization_msgs import MarkerArray
@@ -191,7 +191,8 @@ class Navigator(sdk.Component[NavigatorConfig]):
         self.approaches = False  # whether the way ends near a goal where something is
         self.yields = -math.inf  # until when it stands after a recovery [s]
         self.came = math.inf  # how near to it such ways have led [m]
-        self.scan: LaserScan | None = None  # that is not taken yet
+        wrong = "it is in '{}', not in '{}': set 'frame' of 'obstacles'"
+        self.scan = NewestMessage[LaserScan](self.config.scan_frame, wrong)
         self.unusable = ""  # why the newest scan cannot be used
         self.began = self.seen = self.looked = self.waits = self.shown = self.turned = -math.inf  # [s]
         self.recoveries = self.attempts = 0  # for this goal, and since it got on last
@@ -227,22 +228,18 @@ class Navigator(sdk.Component[NavigatorConfig]):
 
     def on_scan(self, message: LaserScan) -> None:
         """Take a scan, now or as soon as it is known from where it was taken."""
-        self.scan = message
+        self.scan.put(message)
         self.take_scan()
 
     def take_scan(self) -> None:
         """Take the newest scan, unless that has been done; one that cannot be used is as good as none."""
-        if (message := self.scan) is None or self.costs is None:
+        if self.costs is None or "laser" not in self.bound:
             return
-        if (frame := message.header.frame_id.lstrip("/")) not in ("", self.config.scan_frame):
-            self.unusable = f"it is in '{frame}', not in '{self.config.scan_frame}': set 'frame' of 'obstacles'"
+        placed = self.scan.take(self.bound["laser"])
+        self.unusable = self.scan.problem or self.unusable
+        if placed is None:
             return
-        try:
-            at = self.bound["laser"].transform(at=to_nanoseconds(message.header.stamp) or None)
-        except LookupError as error:
-            self.unusable = str(error)
-            return
-        self.scan = None
+        message, (at,) = placed
         sensor = at.to_pose2()
         if self.costs.see(sensor, *rays_of(message), min(self.config.sees, message.range_max), self.now):
             self.seen, self.unusable = self.now, ""

@@ -13,12 +13,11 @@ from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.navigation.localisation import LocalisationSettings, ParticleFilter
 from rbxcompose.domains.navigation.localiser import BASE, ODOM, Localiser, given_pose
-from rbxcompose.domains.worlds.poses import message_of, rays_of
+from rbxcompose.domains.worlds.poses import NewestMessage, message_of, rays_of
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_of
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import OccupancyGrid
 from rbxcompose.msgs.sensor_msgs import LaserScan
-from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.std_srvs import Empty
 from rbxcompose.sdk.ports import BULK
@@ -84,7 +83,7 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
     def configure(self) -> None:
         """Know no map yet."""
         self.filter: ParticleFilter | None = None
-        self.scan: LaserScan | None = None  # that is not taken yet
+        self.scan = NewestMessage[LaserScan]()
         self.correction = Pose2()  # of `odom` in `map`, until the map is known
 
     def activate(self) -> None:
@@ -133,19 +132,14 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
 
     def on_scan(self, message: LaserScan) -> None:
         """Weigh a scan, now or as soon as it is known from where it was taken."""
-        self.scan = message
+        self.scan.put(message)
         self.take_scan()
 
     def take_scan(self) -> None:
         """Weigh the newest scan, unless that has been done."""
-        if (message := self.scan) is None or self.filter is None:
-            return
-        try:
-            laser = self.bound["laser"].transform(at=to_nanoseconds(message.header.stamp) or None)
-            base = self.odometry.transform(at=to_nanoseconds(message.header.stamp) or None)
-        except LookupError:
+        if self.filter is None or (placed := self.scan.take(self.bound["laser"], self.odometry)) is None:
             return  # diagnostics of transforms say so
-        self.scan = None
+        message, (laser, base) = placed
         self.filter.move(base.to_pose2())
         angles, ranges = rays_of(message)
         ranges = np.where(ranges <= message.range_max, ranges, math.inf)

@@ -10,12 +10,11 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.domains.navigation.people import KnownWalls, PeopleTracks, sightings
 from rbxcompose.domains.navigation.people_reports import PeopleConfig, TellsPeople
-from rbxcompose.domains.worlds.poses import rays_of
+from rbxcompose.domains.worlds.poses import NewestMessage, rays_of
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_of
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.nav_msgs import OccupancyGrid
 from rbxcompose.msgs.sensor_msgs import LaserScan
-from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.sdk.ports import BULK
 
 
@@ -62,8 +61,7 @@ class PeopleTracker(TellsPeople[PeopleTrackerConfig]):
         """Know nobody yet."""
         self.tracks = PeopleTracks(self.config.forget)
         self.walls: KnownWalls | None = None
-        self.newest: LaserScan | None = None  # that is not taken yet
-        self.problem = ""
+        self.scan = NewestMessage[LaserScan](self.config.frame, "scans are in '{}', and expected in '{}'")
         self.taken = -math.inf  # when a scan was taken last [s]
 
     def on_map(self, message: OccupancyGrid) -> None:
@@ -73,22 +71,15 @@ class PeopleTracker(TellsPeople[PeopleTrackerConfig]):
 
     def on_scan(self, message: LaserScan) -> None:
         """Take a scan, now or as soon as it is known from where it was taken."""
-        self.newest = message
+        self.scan.put(message)
         self.take_scan()
 
     def take_scan(self) -> None:
         """Take the newest scan, unless that has been done."""
-        if (message := self.newest) is None:
+        if (placed := self.scan.take(self.bound["laser"])) is None:
             return
-        if (frame := message.header.frame_id.lstrip("/")) not in ("", self.config.frame):
-            self.problem = f"scans are in '{frame}', and expected in '{self.config.frame}'"
-            return
-        try:
-            at = self.bound["laser"].transform(at=to_nanoseconds(message.header.stamp) or None)
-        except LookupError as error:
-            self.problem = str(error)
-            return
-        self.newest, self.problem, self.taken = None, "", self.now
+        message, (at,) = placed
+        self.taken = self.now
         most = min(self.config.farthest, message.range_max)
         found = sightings(at.to_pose2(), *rays_of(message), most, self.walls)
         self.tracks.see(found, self.now)
@@ -97,4 +88,4 @@ class PeopleTracker(TellsPeople[PeopleTrackerConfig]):
     def step(self, dt: float) -> None:
         """Publish what missions read."""
         self.take_scan()
-        self.report(self.tracks.people(self.now), self.problem, self.taken)
+        self.report(self.tracks.people(self.now), self.scan.problem, self.taken)

@@ -17,7 +17,7 @@ from rbxcompose.domains.navigation.costs import CostSettings, CostZone, LayeredC
 from rbxcompose.domains.navigation.follower import FollowerSettings
 from rbxcompose.domains.navigation.people import TrackedPerson
 from rbxcompose.domains.worlds.grid_map import GridMap
-from rbxcompose.domains.worlds.poses import pose_in, rays_of
+from rbxcompose.domains.worlds.poses import NewestMessage, pose_in, rays_of
 from rbxcompose.domains.worlds.shapes import PolygonFootprint
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_of
 from rbxcompose.manifest.fields import TopicName
@@ -26,7 +26,6 @@ from rbxcompose.msgs.nav_msgs import OccupancyGrid
 from rbxcompose.msgs.people_msgs import People
 from rbxcompose.msgs.rbxcompose_msgs import FollowPerson
 from rbxcompose.msgs.sensor_msgs import LaserScan
-from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.sdk.ports import BULK
 
 BLANK, CELL = 16.0, 0.05  # [m] sides of the area around a robot without a map, and of its cells
@@ -119,7 +118,7 @@ class PersonFollower(sdk.Component[PersonFollowerConfig]):
         self.costs: LayeredCosts | None = None
         self.goal: ServedPerson | None = None
         self.companion: PersonCompanion | None = None
-        self.newest: LaserScan | None = None  # that is not taken yet
+        self.scan = NewestMessage[LaserScan](self.config.frame)
         self.unusable = ""  # why the newest scan cannot be used
         self.began = self.seen = -math.inf  # [s]
         self.told: tuple[float, list[TrackedPerson]] = -math.inf, []
@@ -146,22 +145,18 @@ class PersonFollower(sdk.Component[PersonFollowerConfig]):
 
     def on_scan(self, message: LaserScan) -> None:
         """Take a scan, now or as soon as it is known from where it was taken."""
-        self.newest = message
+        self.scan.put(message)
         self.take_scan()
 
     def take_scan(self) -> None:
         """Take the newest scan, unless that has been done or nobody is followed."""
-        if (message := self.newest) is None or self.costs is None or self.goal is None:
+        if self.costs is None or self.goal is None:
             return
-        if (frame := message.header.frame_id.lstrip("/")) not in ("", self.config.frame):
-            self.unusable = f"it is in '{frame}', not in '{self.config.frame}'"
+        placed = self.scan.take(self.bound["laser"])
+        self.unusable = self.scan.problem or self.unusable
+        if placed is None:
             return
-        try:
-            at = self.bound["laser"].transform(at=to_nanoseconds(message.header.stamp) or None)
-        except LookupError as error:
-            self.unusable = str(error)
-            return
-        self.newest = None
+        message, (at,) = placed
         if self.costs.see(at.to_pose2(), *rays_of(message), min(self.config.sees, message.range_max), self.now):
             self.seen, self.unusable = self.now, ""
         else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -207,6 +208,7 @@ class Eyes:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawing)
         self._drawing.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
         self._scene: Any = mujoco.MjvScene(model, maxgeom=model.ngeom + 100)
+        self._free = weakref.finalize(self, _free, self._context, self._drawing)  # also if nobody closes it
         self._options: Any = mujoco.MjvOption()
         self._options.geomgroup[:] = [group in (0, LOOKS) for group in range(6)]
         self._view: Any = mujoco.MjvCamera()
@@ -230,6 +232,11 @@ class Eyes:
 
     def close(self) -> None:
         """Free what OpenGL holds."""
-        self._context.make_current()
-        self._drawing.free()
-        self._context.free()
+        self._free()
+
+
+def _free(context: Any, drawing: Any) -> None:
+    """Free a drawing in its own context: in another one, OpenGL would free what has the same numbers there."""
+    context.make_current()
+    drawing.free()
+    context.free()
