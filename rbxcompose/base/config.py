@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
@@ -322,6 +323,17 @@ def _secret(value: object) -> Secret:
     return value
 
 
+FOLDER = "folder"
+"""What validators of configurations know the folder of the manifest's file by."""
+
+
+def _in_folder(value: object, info: pydantic.ValidationInfo) -> object:
+    there = (info.context or {}).get(FOLDER)
+    return os.path.normpath(os.path.join(str(there), value)) if there and isinstance(value, str) else value
+
+
+FolderName = Annotated[str, pydantic.BeforeValidator(_in_folder)]
+"""A field that names a folder, relative to that of the file; it holds the whole path."""
 PlaceName = Annotated[Place, Refers(PLACE)]
 """A field that names one of the robot's `places` and holds the place itself."""
 LinkName = Annotated[str, Refers(LINK)]

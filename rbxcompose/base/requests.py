@@ -169,6 +169,10 @@ Taken = TypeVar("Taken")
 _MARK = "__answers__"
 
 
+class Failed(Exception):
+    """Raised by a component that cannot go on for a reason outside of its code; the text says which, in plain words."""
+
+
 class Refused(Exception):  # noqa: N818 - it is an answer, not an error of ours
     """Raised to refuse a request or a command; its text is the reason."""
 

@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import field
+from typing import Any
 
 import zenoh
 
@@ -94,6 +95,24 @@ def peer_settings(router: str) -> dict[str, object]:
         "connect/timeout_ms": -1,  # retries forever, in the background; 0 would mean once
         "connect/exit_on_failure": False,
     }
+
+
+def guest_settings(router: str, session: str) -> dict[str, object]:
+    """Return the configuration of a program of others: a peer with this id, whose admin space says what it declares."""
+    admin = {"enabled": True, "permissions": {"read": True, "write": False}}
+    return {**peer_settings(router), "id": session, "adminspace": admin}
+
+
+def as_file(settings: Mapping[str, object]) -> str:
+    """Return a configuration as the text of a file that every Zenoh reads."""
+    whole: dict[str, Any] = {}
+    for path, value in settings.items():
+        *groups, name = path.split("/")
+        place = whole
+        for group in groups:
+            place = place.setdefault(group, {})
+        place[name] = value
+    return json.dumps(whole, indent=2)
 
 
 def lone_settings(router: str) -> dict[str, object]:

@@ -25,7 +25,7 @@ from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.graph import Graph, GraphEnd, GraphName, WireType, find
 from rbxcompose.bus.local import Inbox
 from rbxcompose.bus.names import Attachment, data_key, decode_attachment
-from rbxcompose.bus.tokens import SPACE
+from rbxcompose.bus.tokens import SPACE, EntityKind, NodeToken, parse_token
 from rbxcompose.bus.transport import Arrival
 from rbxcompose.bus.zenoh_session import open_client, open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
@@ -42,6 +42,7 @@ NAME = "_rbxcompose"  # node name; tools do not list names that begin with `_`
 LONGEST_QUEUE = 1000  # messages waiting to be shown
 PATIENCE = 2.0  # [s] to wait for an answer of the router
 _EACH = zenoh.ConsolidationMode.NONE
+_DECLARED = ("publisher", "subscriber", "queryable", "querier")
 _PAUSE = 0.01  # [s] between two looks for the router
 NO_HASHES = "TypeHashNotSupported"  # ROS 2 Humble writes this in place of a hash
 NO_ROUTER = kind("RBX9020")
@@ -110,17 +111,46 @@ class Guest:
 
     def graph(self) -> Graph:
         """Return the graph of all participants at this moment."""
-        replies: Iterator[zenoh.Reply] = iter(
-            self._session.liveliness().get(f"{SPACE}/{self.domain}/**", timeout=PATIENCE)
-        )
-        return Graph.of(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
+        return Graph.of(self.tokens(f"{SPACE}/{self.domain}/**"))
+
+    def tokens(self, pattern: str) -> list[str]:
+        """Return the liveliness tokens that a key expression matches."""
+        replies: Iterator[zenoh.Reply] = iter(self._session.liveliness().get(pattern, timeout=PATIENCE))
+        return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
 
     def ask(self, key: str, seconds: float) -> list[bytes]:
         """Return all answers to a query at a key within `seconds`."""
+        return [sample.payload.to_bytes() for sample in self._answers(key, seconds)]
+
+    def declared_by(self, session: str, seconds: float) -> list[tuple[str, str]]:
+        """Return what a session declares, if its admin space answers within `seconds`: kinds and keys.
+
+        The kinds are `publisher`, `subscriber`, `queryable` and `querier`.
+        """
+        start, found = f"@/{session}/", list[tuple[str, str]]()
+        for sample in self._answers(f"{start}**", seconds):
+            _mode, _, rest = str(sample.key_expr).removeprefix(start).partition("/")
+            kind, _, key = rest.partition("/")
+            # The same space has what others declare and this session has learnt of.
+            if kind in _DECLARED and session in json.loads(sample.payload.to_bytes())["clients"]:
+                found.append((kind, key))
+        return found
+
+    def _answers(self, key: str, seconds: float) -> Iterator[zenoh.Sample]:
         replies: Iterator[zenoh.Reply] = iter(
             self._session.get(key, target=zenoh.QueryTarget.ALL, consolidation=_EACH, timeout=seconds)
         )
-        return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
+        return (reply.ok for reply in replies if reply.ok is not None)
+
+    def is_linked(self, session: str, seconds: float) -> bool | None:
+        """Return whether a session is linked with those of all components; None if its admin space does not answer."""
+        tokens = map(parse_token, self.tokens(f"{SPACE}/{self.domain}/*/*/*/{EntityKind.NODE}/**"))
+        nodes = (token for token in tokens if isinstance(token, NodeToken) and not token.name.startswith("_"))
+        peers = {node.session for node in nodes} - {session}
+        for sample in self._answers(f"@/{session}/peer", seconds):
+            linked = {link["peer"] for link in json.loads(sample.payload.to_bytes())["sessions"]}
+            return peers <= linked
+        return None
 
     def bus(self, kind: WireType | None = None) -> Bus:
         """Return the bus for sending, in the wire profile of those who use this `kind`; the same one each time."""

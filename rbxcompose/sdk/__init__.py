@@ -21,7 +21,7 @@ from rbxcompose.base.config import (
 )
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.levels import Level
-from rbxcompose.base.requests import Command, Query, Refused, answers
+from rbxcompose.base.requests import Command, Failed, Query, Refused, answers
 from rbxcompose.msgs.fields import ArrayEntries
 from rbxcompose.sdk.bound import Ended, Later, Outcome, Reply, SentGoal, ServedGoal
 from rbxcompose.sdk.capabilities import (
@@ -85,6 +85,7 @@ __all__ = [
     "Drains",
     "Drives",
     "Ended",
+    "Failed",
     "Forwards",
     "Frequency",
     "FrequencyTask",

@@ -258,6 +258,16 @@ class NeedsExtra(Capability):
 
 
 @dataclass(frozen=True, slots=True)
+class RunsProgram(Capability):
+    """It runs a program of others in real time; `up` looks for that before anything starts."""
+
+    executable: Setting[str]
+    """A path from `folder`, or the name of one in PATH."""
+    folder: Setting[str] = Setting("")
+    """Where it runs."""
+
+
+@dataclass(frozen=True, slots=True)
 class ServesPage(Capability):
     """It serves a page for browsers; `up` shows the link."""
 

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, get_args
 
 from rbxcompose.base.clock import Clock
 from rbxcompose.base.config import Config
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Command, Query, Refused, Request, Requests, answering, requests
 from rbxcompose.sdk.bound import Window
@@ -19,6 +20,21 @@ A = TypeVar("A")
 C = TypeVar("C", bound=Config)
 
 
+@dataclass(frozen=True, slots=True)
+class BusAddress:
+    """Where a robot is on the bus, for what joins it from within: its router, ROS domain and namespace.
+
+    There is no router where robot time is stepped: nothing outside keeps up with that.
+    """
+
+    robot: str
+    router: str
+    domain: int
+    namespace: str
+    wire: str
+    """The distribution of ROS 2 whose format is on the wire."""
+
+
 class Context(Protocol):
     """What the runtime provides to a component besides its ports."""
 
@@ -27,6 +43,11 @@ class Context(Protocol):
     @property
     def is_stopped(self) -> bool:
         """Return whether the robot is held by a stop."""
+        ...
+
+    @property
+    def address(self) -> BusAddress:
+        """Return where the robot is on the bus."""
         ...
 
     def log(self, level: Level, text: str) -> None:
@@ -84,7 +105,7 @@ class Component(Generic[C]):
     steps_for_goals: ClassVar[bool] = False  # steps only while an action that it serves has a goal, and once after it
     process: ClassVar[str] = "robot"  # default process group
     blocking: ClassVar[bool] = False  # may wait or compute for a long time: runs in a thread of its own
-    configures_within: ClassVar[float] = 30.0  # [s] in which a blocking one is configured; after them it has failed
+    configures_within: ClassVar[float] = 30.0  # [s] for a blocking one to be configured, or active; else it has failed
     simulated: ClassVar[bool] = False  # exists only in simulation
     made_by: ClassVar[str] = ""  # says which section creates it, for a type that users do not list themselves
     type_name: ClassVar[str] = ""  # set by the decorator

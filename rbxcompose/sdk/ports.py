@@ -66,6 +66,7 @@ class Port(Generic[B]):
 
     kind: ClassVar[str]
     interface: type[Any] | None = None  # message, service or action
+    is_elsewhere = False  # a program of others has the end of the wire; nothing is bound here
 
     def __init__(self, topic: str) -> None:
         self.topic = topic
@@ -89,6 +90,11 @@ class Port(Generic[B]):
     def named(self, name: str) -> Self:
         """Set the name of a port that is not an attribute of a class."""
         self.name = name
+        return self
+
+    def elsewhere(self) -> Self:
+        """Declare that a program of others, which the component runs, has this end of the wire."""
+        self.is_elsewhere = True
         return self
 
 

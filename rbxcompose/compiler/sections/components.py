@@ -3,9 +3,10 @@
 from collections.abc import Collection, Iterable, Iterator, Mapping, Set
 from dataclasses import replace
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
-from rbxcompose.base.config import COMPONENT, Config, Name
+from rbxcompose.base.config import COMPONENT, FOLDER, Config, Name
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import (
     DID_YOU_MEAN,
@@ -158,7 +159,8 @@ def component_class(node: TreeNode) -> type[Component[Any]] | None:
 
 def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> ComponentEntry | None:
     """Return one component, as far as it could be read; None if its type is missing or unknown."""
-    report, known = reading.report, reading.contents.known
+    folder = Path(entry.key.span.file).absolute().parent
+    report, known = reading.report, {**reading.contents.known, FOLDER: str(folder)}
     node, path = entry.value, ("components", name)
     if is_broken(node):
         return None

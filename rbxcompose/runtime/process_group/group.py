@@ -345,6 +345,7 @@ class ProcessGroup:
             is_restart=self._is_restart,
             **({"on_order": tape.order} if tape else {}),
             post=self._inbox.put if isinstance(self._clock, MonotonicClock) else None,
+            router="" if self._options.is_stepped else router,
             deciders=Deciders(rules=self._rules) if self._options.is_stepped else Deciders(self._channel.send),
         )
         if isinstance(self._driver, ExternalDriver):

@@ -115,13 +115,14 @@ class Host:
         on_order: OnOrder = _nobody,
         post: Post | None = None,
         deciders: Deciders = NOBODY_ELSE,
+        router: str = "",
     ) -> None:
         """Take `on_order`, which is called with each order carried out, so that a recording can be replayed.
 
         With `post`, other threads reach the scheduler's; without it, components that may block run in the scheduler's.
         """
         self.plan, self.clock, self.bus, self.scheduler = plan, clock, bus, scheduler
-        self.notify = notify
+        self.notify, self.router = notify, router
         self._on_order = on_order
         self.is_stopped = is_stopped
         self.is_restart = is_restart

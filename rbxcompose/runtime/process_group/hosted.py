@@ -25,9 +25,9 @@ from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.runtime.channel import Repeated
 from rbxcompose.runtime.process_group.live_ports import Frames, bind, subscribe
-from rbxcompose.runtime.process_group.worker import CONFIGURE, HandedOver, Worker, handed_over
+from rbxcompose.runtime.process_group.worker import ACTIVATE, CONFIGURE, HandedOver, Worker, handed_over
 from rbxcompose.sdk.bound import Window
-from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.component import BusAddress, Component
 from rbxcompose.sdk.ports import In, Port, Qos, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.sdk.robot_events import RobotEvent, RobotHeld
@@ -242,6 +242,7 @@ class InstanceHome(Protocol):
     scheduler: Scheduler
     statuses: Statuses
     frames: Frames | None
+    router: str
     is_stopped: bool
     is_held: bool
     is_braking: bool
@@ -316,7 +317,9 @@ class Hosted:
         self._ends = dict(made.bound)
         ports = cls.ports(self.config)
         self._claiming = [
-            end for name, end in made.bound.items() if isinstance(port := ports[name], ServesAction) and port.claims
+            end
+            for name, end in made.bound.items()
+            if isinstance(port := ports[name], ServesAction) and port.claims and not port.is_elsewhere
         ]
         if self.worker is not None:
             made.bound = {name: handed_over(end, ports[name], self.worker) for name, end in self._ends.items()}
@@ -346,7 +349,7 @@ class Hosted:
         """Activate the component; like the others, it learns that the robot has started, is stopped or goes down."""
         component = self._made()
         self.host.statuses.set(self.instance.name, Level.OK, "active", {})
-        self.do("activate", component.activate, then=self._activated)
+        self.do(ACTIVATE, component.activate, then=self._activated)
 
     def _activated(self) -> None:
         component = self._made()
@@ -476,6 +479,12 @@ class Hosted:
     def is_stopped(self) -> bool:
         """Return whether the robot is held by a stop."""
         return self.host.is_stopped
+
+    @property
+    def address(self) -> BusAddress:
+        """Return where the robot is on the bus."""
+        bus = self.host.plan.bus
+        return BusAddress(self.host.plan.robot, self.host.router, bus.domain, bus.namespace, bus.wire)
 
     def log(self, level: Level, text: str) -> None:
         """Write one event of the robot's story."""

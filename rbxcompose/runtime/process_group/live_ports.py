@@ -188,8 +188,14 @@ class Handling(Protocol):
 
 
 def bind(component: Component[Any], instance: Instance, bus: Bus, frames: Frames | None, handling: Handling) -> None:
-    """Fill `component.bound`; incoming data go to its handlers unless there is a reason to refuse them."""
+    """Fill `component.bound`; incoming data go to its handlers unless there is a reason to refuse them.
+
+    Of an end that a program of others has, there is only the absolute name.
+    """
     for name, port in type(component).ports(component.config).items():
+        if port.is_elsewhere:
+            component.bound[name] = instance.topic(name)
+            continue
         component.bound[name] = _end(component, instance, name, port, bus, frames, handling)
 
 

@@ -15,14 +15,14 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Command, Query
 from rbxcompose.sdk.bound import Window
-from rbxcompose.sdk.component import Context
+from rbxcompose.sdk.component import BusAddress, Context
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, ServesAction
 from rbxcompose.sdk.robot_events import RobotEvent
 from rbxcompose.sdk.updater import DiagnosticTask
 
 LONG = 1.0  # [s] in one call, after which diagnostics report it
 LONGEST = 30.0  # [s] in one call, after which the component has failed and its thread is left behind
-CONFIGURE = "configure"  # the call that may take as long as the component says
+CONFIGURE, ACTIVATE = "configure", "activate"  # the calls that may take as long as the component says
 
 Call = Callable[[], None]
 Post = Callable[[str, Call], None]
@@ -51,7 +51,7 @@ class Worker:
     ) -> None:
         """Take `post`, with which any thread can run a callback in the scheduler's thread for `owner`.
 
-        The call `configure` may take `configures_within` [s], all others take at most `LONGEST`.
+        The calls `configure` and `activate` may take `configures_within` [s], all others take at most `LONGEST`.
         """
         self._configures_within = configures_within
         self.skipped = 0  # calls dropped in favour of newer ones
@@ -92,7 +92,7 @@ class Worker:
     def look(self) -> str:
         """Return in words which call takes long, empty if none does; a call that takes too long is a failure."""
         label, seconds = self.busy_for()
-        most = self._configures_within if label == CONFIGURE else LONGEST
+        most = self._configures_within if label in (CONFIGURE, ACTIVATE) else LONGEST
         if seconds > most and not self._is_closed:
             error = HungError(f"{label} has not returned for {most:g} s")
             error.add_note(self._stack())
@@ -139,6 +139,8 @@ class Worker:
 def handed_over(end: Any, port: Port[Any], worker: Worker) -> Any:
     """Return an end of the bus for use in the worker's thread."""
     match port:
+        case Port(is_elsewhere=True):
+            return end
         case Out():
             return _Sender(end, worker)
         case Calls():
@@ -277,6 +279,11 @@ class HandedOver:
     def is_stopped(self) -> bool:
         """Return whether the robot is held by a stop."""
         return self._context.is_stopped
+
+    @property
+    def address(self) -> BusAddress:
+        """Return where the robot is on the bus."""
+        return self._context.address
 
     def log(self, level: Level, text: str) -> None:
         """Write one event of the robot's story."""

@@ -1,0 +1,1 @@
+"""Programs of others: executables, containers and ROS 2 nodes as components."""

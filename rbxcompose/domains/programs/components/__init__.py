@@ -1,0 +1,1 @@
+"""Types of components that run programs of others."""

@@ -1,0 +1,540 @@
+"""A program of others: started, watched and stopped as a component, its ports as the manifest declares them."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar, cast
+from uuid import uuid4
+
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.base.config import Config, FolderName, Time
+from rbxcompose.base.files import replace_file
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Failed
+from rbxcompose.bus.names import ActionNames, data_key, dds_type
+from rbxcompose.bus.tokens import SPACE, EndpointToken, EntityKind, NodeToken, parse_token
+from rbxcompose.bus.transport import Closable
+from rbxcompose.bus.wire import WireProfile, ros_qos
+from rbxcompose.bus.zenoh_session import as_file, guest_settings
+from rbxcompose.commands.guest import Guest
+from rbxcompose.commands.lookup import BusPlace
+from rbxcompose.domains.programs.child import (
+    Child,
+    Deaf,
+    LeftBehind,
+    Line,
+    NotStarted,
+    Order,
+    ProgramEnd,
+    Started,
+    memory_of,
+)
+from rbxcompose.domains.programs.declaration import DeclaredPorts
+from rbxcompose.domains.programs.output import OutputLog
+from rbxcompose.domains.programs.watch import DeclaredKey, EndKind, KeyOnBus, ProgramWatch
+from rbxcompose.msgs.action_msgs import CancelGoal
+from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.runtime.processes import describe_exit
+from rbxcompose.sdk import Capability, Component, component
+from rbxcompose.sdk.capabilities import RunsProgram, Setting
+from rbxcompose.sdk.ports import Calls, In, Out, Port, Qos, Serves, ServesAction
+from rbxcompose.sdk.updater import FrequencyTask, TaskStatus
+
+LOOKS = 1.0  # [s] between two looks at what its session declares, and at its memory
+_ANSWERS = 0.3  # [s] for its admin space to answer
+_LINKS = 2.0  # [s] for it to be linked with the robot's processes
+_STRANGER = 0.5  # [s] after which it does not seem to use the configuration that it was given
+_PAUSE = 0.05  # [s] between two looks at a program that is not ready yet
+_TOKENS = {EndKind.PUBLISHER: EntityKind.PUBLISHER, EndKind.SUBSCRIBER: EntityKind.SUBSCRIPTION}
+_TOKENS |= {EndKind.QUERYABLE: EntityKind.SERVER}
+_MEGABYTE = 1_000_000
+
+
+def _words(value: Any) -> Any:
+    if isinstance(value, str):
+        words = value.split()
+        help_text = f"no shell reads it; write its words: [{', '.join(words)}]"
+        raise PydanticCustomError("command", "a command is a list of words", {"help": help_text})
+    return value
+
+
+def _is_pattern(text: str) -> str:
+    try:
+        re.compile(text)
+    except re.error as error:
+        raise ValueError(f"is not a regular expression: {error}") from error
+    return text
+
+
+Pattern = Annotated[str, Field(min_length=1, max_length=500), AfterValidator(_is_pattern)]
+Command = Annotated[
+    tuple[str, ...], BeforeValidator(_words, json_schema_input_type=tuple[str, ...]), Field(min_length=1)
+]
+
+
+class ReadyModel(Config):
+    """When a program is ready; components that start after it wait for that."""
+
+    topic: str = ""
+    """When the first message of this topic has come, one of those that it publishes."""
+    output: Pattern | None = None
+    """When it writes a line in which this regular expression is found."""
+    token: str = ""
+    """When there is a liveliness token of Zenoh that this key expression matches."""
+    ended: bool = False
+    """When it has ended with the exit code 0: it prepares something, and does not run on."""
+    within: Time = Field(10.0, gt=0, le=600)
+    """Otherwise it has failed."""
+
+    @model_validator(mode="after")
+    def _is_one(self) -> ReadyModel:
+        if sum(map(bool, (self.topic, self.output, self.token, self.ended))) != 1:
+            raise ValueError("needs one of 'topic', 'output', 'token' and 'ended'")
+        return self
+
+
+class StopModel(Config):
+    """How a program is stopped."""
+
+    signal: Literal["SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGUSR1", "SIGUSR2"] = "SIGTERM"
+    """The signal that it gets, with all that it started."""
+    within: Time = Field(3.0, gt=0, le=30)
+    """How long it may take; then it is killed."""
+
+
+class ProgramLimits(Config):
+    """What a program may use."""
+
+    memory: float | None = Field(None, gt=0)
+    """Resident memory of all its processes in MB; with more it is stopped, and has failed."""
+    open_files: int | None = Field(None, ge=8)
+    """Open files."""
+    nice: int = Field(0, ge=-20, le=19)
+    """Added to its niceness; more is lower priority."""
+    cores: tuple[Annotated[int, Field(ge=0)], ...] = ()
+    """The processors that it may use; empty for all."""
+
+
+class LevelsModel(Config):
+    """How lines of its output are known to be warnings and errors; without, by the words that loggers write."""
+
+    warn: Pattern | None = None
+    """A warning has this."""
+    error: Pattern | None = None
+    """An error has this."""
+
+
+class RunConfig(DeclaredPorts):
+    """How a program is run, whatever kind it is of."""
+
+    environment: dict[str, str] = {}
+    """Variables of its environment, besides those of `up`."""
+    ready: ReadyModel | None = None
+    """When it is ready; without it, as soon as it runs."""
+    stop: StopModel = StopModel()
+    """How it is stopped."""
+    limits: ProgramLimits = ProgramLimits()
+    """What it may use."""
+    levels: LevelsModel = LevelsModel()
+    """How its output is read."""
+
+    @model_validator(mode="after")
+    def _waits_for_its_own(self) -> RunConfig:
+        if self.ready is not None and self.ready.topic and self.ready.topic not in self.publishes:
+            raise ValueError(f"'ready' waits for the topic '{self.ready.topic}', which 'publishes' does not have")
+        return self
+
+
+R = TypeVar("R", bound=RunConfig)
+
+
+class Runner(Component[R]):
+    """Runs a program of others: what all types that do so have in common."""
+
+    blocking = True  # a program may take its time to get ready
+    configures_within = 620.0
+    process = "programs"
+    rate = 10.0
+
+    @classmethod
+    def ports(cls, config: R) -> dict[str, Port[Any]]:
+        """Return the ports that the manifest declares; the program has their ends."""
+        return config.ports()
+
+    @classmethod
+    def capabilities(cls, config: R) -> tuple[Capability, ...]:
+        """Return what the manifest says that it can do."""
+        return tuple(config.declared_capabilities())
+
+    @classmethod
+    def rest_time(cls, config: R) -> float:
+        """Return how long it may take to end."""
+        drives = config.capabilities.drives
+        coasting = (drives.stops_after or 0.0) if drives is not None else 0.0
+        return coasting + config.stop.within + 1.0
+
+    def order(self, environment: Mapping[str, str]) -> Order:
+        """Return what to start, with these variables beside its own."""
+        raise NotImplementedError
+
+    @property
+    def joins_bus(self) -> bool:
+        """Return whether it speaks Zenoh itself."""
+        return True
+
+    # Lifecycle
+
+    def configure(self) -> None:
+        """Prepare to hear it; on a stepped clock nothing runs, since no program keeps up with that."""
+        self.child: Child | None = None
+        self.guest: Guest | None = None
+        self.is_over = True
+        self.is_ending = self.has_left = False
+        self.ends_at: float | None = None
+        self.looked = -LOOKS
+        self.tokens: dict[KeyOnBus, Closable] = {}
+        self.heard: dict[str, Closable] = {}
+        self.session = ""
+        self.output = OutputLog({level: text for level, text in self._levels() if text})
+        self.is_inert = isinstance(self.context.clock, SteppedClock)
+        self.ends = {} if self.is_inert else {end.port: end for end in self._declared()}
+        actions = {str(self.bound[name]) for name, port in self._elsewhere() if isinstance(port, ServesAction)}
+        self.watched = ProgramWatch(self.ends.values(), actions, self.now)
+        for end in self.ends.values():
+            if end.rate is not None:
+                self.add_diagnostic(end.key.name.lstrip("/"), self._frequency(end))
+        self.add_diagnostic("program", lambda now: self.state)
+        self.state = TaskStatus(Level.OK, "not started yet")
+
+    def activate(self) -> None:
+        """Start it, and wait until it is ready."""
+        if self.is_inert:
+            self.warn("does not run: robot time is stepped, and programs of others keep real time")
+            return
+        address = self.context.address
+        self.guest = guest = Guest(BusPlace(address.router, address.domain), stays=True)
+        environment = {**os.environ, **self._joining()}
+        self.is_over = False
+        self.child = Child(self.order(environment))
+        self._listen(guest)
+        self._wait_until_ready(guest)
+        self.watched.began(self.now)
+
+    def step(self, dt: float) -> None:
+        """Hear what it writes, whether it still runs, and compare what it does with what it declares."""
+        if self.child is None:
+            return
+        self._hear()
+        if self.ends_at is not None and self.now >= self.ends_at:
+            self.child.ask_to_end()
+        if self.is_over or self.now - self.looked < LOOKS:
+            return
+        self.looked = self.now
+        self._mind_memory(self.child)
+        if self.joins_bus and self.guest is not None:
+            self._compare(self.guest)
+
+    def stop(self) -> None:
+        """Cancel the goals of actions that claim a part of the robot."""
+        self._cancel_goals()
+
+    def brake(self) -> None:
+        """End it; a base first gets the time in which it brakes by itself."""
+        self._cancel_goals()
+        drives = self.config.capabilities.drives
+        self.is_ending, self.ends_at = True, self.now + ((drives.stops_after or 0.0) if drives else 0.0)
+        if self.child is not None and self.ends_at <= self.now:
+            self.child.ask_to_end()
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Return whether it has ended, once the robot goes down."""
+        return self.is_over or not self.is_ending
+
+    def deactivate(self) -> None:
+        """End it if it still runs."""
+        if self.child is not None and not self.is_over:
+            self.is_ending = True
+            self.child.ask_to_end()
+            deadline = self.now + self.config.stop.within + _ANSWERS
+            while not self.is_over and self.now < deadline:
+                self.child.wait(_PAUSE)
+                self._hear()
+
+    def cleanup(self) -> None:
+        """Leave nothing of it behind."""
+        self._release()
+
+    # Starting
+
+    def _joining(self) -> dict[str, str]:
+        """Return the variables by which a program joins the robot."""
+        address = self.context.address
+        self.session = f"{uuid4().int % 15 + 1:x}{uuid4().hex[1:]}"
+        file = RobotFolder.of(address.robot).path / f"{self.name}.zenoh.json5"
+        replace_file(file, as_file(guest_settings(address.router, self.session)).encode())
+        keys = {
+            f"RBXCOMPOSE_KEY_{name.upper()}": self._key(str(self.bound[name]), port)
+            for name, port in self._elsewhere()
+            if isinstance(port, Out | In | Serves | Calls)
+        }
+        return {
+            "ZENOH_CONFIG": str(file),
+            "ZENOH_SESSION_CONFIG_URI": str(file),
+            "ROS_DOMAIN_ID": str(address.domain),
+            "RBXCOMPOSE_ROBOT": address.robot,
+            "RBXCOMPOSE_COMPONENT": self.name,
+            "RBXCOMPOSE_NAMESPACE": address.namespace,
+            "RBXCOMPOSE_ROUTER": address.router,
+            **keys,
+            **self.config.environment,
+        }
+
+    def _key(self, name: str, port: Port[Any]) -> str:
+        address, interface = self.context.address, cast(Any, port.interface)
+        return data_key(address.domain, name, interface.TYPE, WireProfile(address.wire).hash_of(interface))
+
+    def _elsewhere(self) -> Iterator[tuple[str, Port[Any]]]:
+        return ((name, port) for name, port in self.ports(self.config).items() if port.is_elsewhere)
+
+    def _declared(self) -> Iterator[DeclaredKey]:
+        kinds = {Out: EndKind.PUBLISHER, In: EndKind.SUBSCRIBER, Serves: EndKind.QUERYABLE, Calls: EndKind.QUERIER}
+        wire = WireProfile(self.context.address.wire)
+        for name, port in self._elsewhere():
+            if (kind := kinds.get(type(port))) is not None and (interface := port.interface) is not None:
+                key = KeyOnBus(kind, str(self.bound[name]), dds_type(interface.TYPE), wire.hash_of(interface))
+                yield DeclaredKey(name, key, port.rate if isinstance(port, Out) else None)
+
+    def _listen(self, guest: Guest) -> None:
+        """Count the messages of its topics: of those with a rate all, of the others until one has come."""
+        for name, port in self._elsewhere():
+            if isinstance(port, Out):
+                key = self._key(str(self.bound[name]), port)
+                self.heard[name] = guest.transport.subscribe(key, port.qos, partial(self._arrived, name))
+
+    def _arrived(self, name: str, arrival: object) -> None:
+        self.watched.arrived(name)  # in a thread of Zenoh's
+
+    def _wait_until_ready(self, guest: Guest) -> None:
+        ready = self.config.ready
+        deadline = self.now + (ready.within if ready is not None else 10.0)
+        self.is_ready = False
+        while not self._is_ready(ready, guest):
+            if self.now >= deadline:
+                self._release()
+                raise Failed(f"is not ready after {ready.within if ready is not None else 10.0:g} s")
+            if self.child is not None:
+                self.child.wait(_PAUSE)
+            self._hear()
+        if self.joins_bus:
+            self._wait_until_linked(guest)
+
+    def _wait_until_linked(self, guest: Guest) -> None:
+        """Wait until what it publishes reaches every process of the robot."""
+        began = self.now
+        while not (is_linked := guest.is_linked(self.session, _ANSWERS)):
+            if self.now - began > (_STRANGER if is_linked is None else _LINKS):
+                break
+            guest.run(lambda: False, _PAUSE)
+
+    def _is_ready(self, ready: ReadyModel | None, guest: Guest) -> bool:
+        if ready is None or ready.output is not None or ready.ended:
+            return self.is_ready  # as its events say
+        if ready.topic:
+            return self.watched.count(_port_of(ready.topic)) > 0
+        return bool(guest.tokens(ready.token))
+
+    # Running
+
+    def _hear(self) -> None:
+        """Log what it writes, and take note of its end."""
+        if self.child is None:
+            return
+        lines, ready = list[str](), self.config.ready
+        for event in self.child.events():
+            match event:
+                case Line(text):
+                    lines.append(text)
+                    if ready is not None and ready.output is not None and re.search(ready.output, text):
+                        self.is_ready = True
+                case Started():
+                    self.is_ready = self.is_ready or ready is None
+                    self.state = TaskStatus(Level.OK, "runs")
+                case _:
+                    self._log(lines)
+                    lines = []
+                    self._happened(event)
+        self._log(lines)
+        if self.child is not None and self.child.is_over and not self.is_over:
+            self._ended("ended without a word: its keeper is gone")
+
+    def _happened(self, event: object) -> None:
+        match event:
+            case NotStarted(why):
+                self._ended(f"cannot be started: {why}")
+            case Deaf():
+                within, name = self.config.stop.within, self.config.stop.signal
+                self.warn(f"did not end within {within:g} s of {name}, and was killed")
+            case LeftBehind(number):
+                processes = "process" if number == 1 else "processes"
+                self.warn(f"left {number} {processes} in the background, which were killed: it must stay in front")
+            case ProgramEnd(status) if self.config.ready is not None and self.config.ready.ended and not status:
+                self.is_over = self.is_ready = True
+                self.state = TaskStatus(Level.OK, "has ended, as it should")
+            case ProgramEnd(status):
+                self._ended(describe_exit(status))
+
+    def _ended(self, how: str) -> None:
+        self.is_over = True
+        self.state = TaskStatus(Level.ERROR, how)
+        if self.is_ending:
+            self.info(how)
+            return
+        while self.child is not None and not self.child.is_over:  # it ends what was left behind
+            self.child.wait(_PAUSE)
+            for event in self.child.events():
+                self._happened(event)
+        self._release()
+        raise Failed(how)
+
+    def _log(self, lines: Iterable[str]) -> None:
+        for level, text in self.output.take(lines, self.now):
+            self.context.log(level, text)
+
+    def _levels(self) -> Iterator[tuple[Level, str | None]]:
+        yield Level.ERROR, self.config.levels.error
+        yield Level.WARN, self.config.levels.warn
+
+    def _mind_memory(self, child: Child) -> None:
+        most = self.config.limits.memory
+        if most is None or child.pid is None or self.is_ending:
+            return
+        if (used := memory_of(child.pid) / _MEGABYTE) > most:
+            self._release()
+            raise Failed(f"uses {used:.0f} MB, and may use {most:g}")
+
+    def _compare(self, guest: Guest) -> None:
+        """Find what its session has, name it to the others, and report what does not fit."""
+        keys = (KeyOnBus.of(*end, guest.domain) for end in guest.declared_by(self.session, _ANSWERS))
+        found = {key for key in keys if key is not None}
+        self._announce(guest, found)
+        for name in [name for name in self.heard if self.watched.count(name) and self.ends[name].rate is None]:
+            self.heard.pop(name).close()
+        status = self.watched.look(found, self.now)
+        for text in self.watched.news(status):
+            self.warn(text)
+        self.state = TaskStatus(status.level, f"runs; {status.message}", status.values)
+
+    def _announce(self, guest: Guest, found: set[KeyOnBus]) -> None:
+        """Declare tokens for the ends that have none, so that tools and clients find them as those of ROS 2."""
+        tokens = map(parse_token, guest.tokens(f"{SPACE}/{guest.domain}/{self.session}/**") if found else ())
+        own = {(token.kind, token.name) for token in tokens if isinstance(token, EndpointToken)}
+        own -= {(_TOKENS[key.kind], key.name) for key in self.tokens if key != _NODE}
+        qos = {str(self.bound[name]): port.qos for name, port in self._elsewhere() if isinstance(port, Out | In)}
+        address = self.context.address
+        node = NodeToken(
+            address.domain, self.session, 0, self.name, f"/{address.namespace}" if address.namespace else ""
+        )
+        if found and not own and not self.tokens:
+            self.tokens[_NODE] = guest.transport.announce(node.key)
+        for number, key in enumerate(sorted(found - self.tokens.keys(), key=str), len(self.tokens) + 1):
+            if (kind := _TOKENS.get(key.kind)) is None or (kind, key.name) in own:
+                continue
+            words = WireProfile(address.wire).qos_text(ros_qos(qos.get(key.name, Qos.EVENT)))
+            token = node.endpoint_key(kind, number, key.name, key.type, key.hash, words)
+            self.tokens[key] = guest.transport.announce(token)
+        for gone in [key for key in self.tokens if key not in found and key != _NODE]:
+            self.tokens.pop(gone).close()
+
+    def _cancel_goals(self) -> None:
+        if self.guest is None:
+            return
+        for name, port in self._elsewhere():
+            if isinstance(port, ServesAction) and port.claims:
+                service = ActionNames.of(str(self.bound[name])).cancel_goal
+                client = self.guest.bus().client(self.name, service, CancelGoal)
+                client(CancelGoal.Request(), lambda reply: None)  # no goal in particular: all
+                self.guest.run(lambda: False, _ANSWERS)
+
+    def _frequency(self, end: DeclaredKey) -> Any:
+        task, counted = FrequencyTask(end.rate or 0.0), 0
+
+        def status(now: float) -> TaskStatus:
+            nonlocal counted
+            for _ in range(self.watched.count(end.port) - counted):
+                task.tick()
+            counted = self.watched.count(end.port)
+            return task.status(now)
+
+        return status
+
+    def _release(self) -> None:
+        """End what is left of it, and leave the bus."""
+        self.is_over = True
+        if self.child is not None:
+            self.child.close()
+            self.child = None
+        for closable in (*self.tokens.values(), *self.heard.values()):
+            closable.close()
+        self.tokens, self.heard = {}, {}
+        if self.guest is not None:
+            self.guest.__exit__(None, None, None)
+            self.guest = None
+
+
+_NODE = KeyOnBus(EndKind.QUERIER, "", "", "")  # stands for the token of the node
+
+
+def _port_of(topic: str) -> str:
+    return topic.strip("/").replace("/", "_")
+
+
+class ProgramConfig(RunConfig):
+    """What is run."""
+
+    command: Command
+    """Its words: an executable, found in `folder` if it begins with `./`, else by PATH, and its arguments. No shell
+    reads them."""
+    folder: FolderName = Field(".", validate_default=True)
+    """Where it runs, relative to the manifest's file."""
+
+
+@component("program")
+class Program(Runner[ProgramConfig]):
+    """Runs a program of others that speaks Zenoh, with the ports that the manifest declares for it.
+
+    Example:
+        talker: {type: program, command: [./talker, --fast], publishes: {chatter: std_msgs/String}}
+    """
+
+    @classmethod
+    def capabilities(cls, config: ProgramConfig) -> tuple[Capability, ...]:
+        """Return what the manifest says that it can do, and what `up` looks for."""
+        found = RunsProgram(Setting(config.command[0], "command"), Setting(config.folder, "folder"))
+        return (*config.declared_capabilities(), found)
+
+    def order(self, environment: Mapping[str, str]) -> Order:
+        """Return the command."""
+        return order_of(self.config, self.config.command, self.config.folder, environment)
+
+
+def order_of(config: RunConfig, command: Iterable[str], folder: str, environment: Mapping[str, str]) -> Order:
+    """Return what to start, with the limits of a configuration."""
+    return Order(
+        tuple(command),
+        str(Path(folder)),
+        environment,
+        int(signal.Signals[config.stop.signal]),
+        config.stop.within,
+        config.limits.open_files,
+        config.limits.nice,
+        config.limits.cores,
+    )

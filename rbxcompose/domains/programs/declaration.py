@@ -1,0 +1,228 @@
+"""What a program of others declares: its topics, services and actions with their types, and what it can do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from rbxcompose.base.config import (
+    Acceleration,
+    AngularAcceleration,
+    AngularSpeed,
+    Config,
+    Frequency,
+    Length,
+    Name,
+    Ratio,
+    Speed,
+    Time,
+)
+from rbxcompose.manifest.fields import TopicName
+from rbxcompose.msgs import registry
+from rbxcompose.sdk.capabilities import Capability, CommandsMotion, Drains, Drives, Setting, WritesFrame
+from rbxcompose.sdk.messages import ActionName, MessageName, ServiceName
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Qos, Serves, ServesAction
+
+QosName = Literal["command", "state", "latched", "event", "bulk"]
+_LARGE = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/PointCloud2")
+_TF = "tf2_msgs/msg/TFMessage"
+_COMMANDS = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
+
+
+def _as_type(value: Any) -> Any:
+    return {"type": value} if isinstance(value, str) else value
+
+
+class PublishedTopic(Config):
+    """A topic that it publishes."""
+
+    type: MessageName
+    """The type of its messages."""
+    rate: Frequency | None = Field(None, gt=0)
+    """How often they come at least; fewer are a warning, none an error."""
+    qos: QosName | None = None
+    """What the topic is for; without it, `bulk` for pictures and clouds, else `state`."""
+    unit: str = ""
+    """What a bare number in the message means: `%`."""
+
+
+class SubscribedTopic(Config):
+    """A topic that it subscribes to."""
+
+    type: MessageName
+    """The type of its messages."""
+    qos: QosName | None = None
+    """What the topic is for; without it, `command` for velocities, `bulk` for pictures and clouds, else `state`."""
+    optional: bool = False
+    """Whether it works without: then nobody in the robot needs to publish it."""
+
+
+class ServedAction(Config):
+    """An action that it serves, a skill of missions."""
+
+    type: ActionName
+    """The type of the action."""
+    claims: Literal["", "base", "arm", "head", "voice"] = ""
+    """The part of the robot that a goal needs for itself; such goals are cancelled when the robot is stopped."""
+
+
+Published = Annotated[PublishedTopic, BeforeValidator(_as_type, json_schema_input_type=PublishedTopic | str)]
+Subscribed = Annotated[SubscribedTopic, BeforeValidator(_as_type, json_schema_input_type=SubscribedTopic | str)]
+ActionServed = Annotated[ServedAction, BeforeValidator(_as_type, json_schema_input_type=ServedAction | str)]
+
+
+class DrivesModel(Config):
+    """A base: it moves the robot."""
+
+    commands: Name = "cmd_vel"
+    """Its port for velocities."""
+    odometry: Name | Literal[""] = ""
+    """Its port with the motion."""
+    max_speed: Speed | None = Field(None, gt=0)
+    """It limits faster commands to this."""
+    max_turn_rate: AngularSpeed | None = Field(None, gt=0)
+    """It limits faster turns to this."""
+    stops_after: Time | None = Field(None, gt=0)
+    """It brakes when no command has come for this long."""
+    acceleration: Acceleration | None = Field(None, gt=0)
+    """Acceleration, also of braking."""
+    turn_acceleration: AngularAcceleration | None = Field(None, gt=0)
+    """Angular acceleration, also of braking."""
+    wheel_distance: Length | None = Field(None, gt=0)
+    """Between the points where the wheels touch the ground."""
+
+
+class CommandsMotionModel(Config):
+    """It sends velocities for a base."""
+
+    commands: Name = "cmd_vel"
+    """Its port for them."""
+    max_speed: Speed | None = Field(None, gt=0)
+    """It sends at most this."""
+    max_turn_rate: AngularSpeed | None = Field(None, gt=0)
+    """It sends at most this."""
+
+
+class DrainsModel(Config):
+    """A battery."""
+
+    level: Name
+    """Its port with the charge."""
+    runtime: Time | None = Field(None, gt=0)
+    """From full to empty."""
+    warn: Ratio | None = None
+    """Below this charge its status is WARN."""
+    error: Ratio | None = None
+    """Below this charge its status is ERROR."""
+
+
+class CapabilitiesModel(Config):
+    """What it can do, for the checks."""
+
+    drives: DrivesModel | None = None
+    """It is a base."""
+    commands_motion: CommandsMotionModel | None = None
+    """It sends velocities for a base."""
+    drains: DrainsModel | None = None
+    """It is a battery."""
+    frames: dict[str, str] = {}
+    """Frames that it places at `/tf`, each with its parent."""
+
+    def named_ports(self) -> Iterator[tuple[str, str]]:
+        """Yield the ports that they name, each with the key that does."""
+        if self.drives is not None:
+            yield "drives.commands", self.drives.commands
+            if self.drives.odometry:
+                yield "drives.odometry", self.drives.odometry
+        if self.commands_motion is not None:
+            yield "commands_motion.commands", self.commands_motion.commands
+        if self.drains is not None:
+            yield "drains.level", self.drains.level
+
+
+class DeclaredPorts(Config):
+    """The ports and capabilities that a manifest declares for a program."""
+
+    publishes: dict[TopicName, Published] = {}
+    """Topics that it publishes: a type, or a map with `type`, `rate`, `qos` and `unit`."""
+    subscribes: dict[TopicName, Subscribed] = {}
+    """Topics that it subscribes to: a type, or a map with `type`, `qos` and `optional`."""
+    serves: dict[TopicName, ServiceName] = {}
+    """Services that it serves, each with its type."""
+    calls: dict[TopicName, ServiceName] = {}
+    """Services that it calls, each with its type."""
+    serves_actions: dict[TopicName, ActionServed] = {}
+    """Actions that it serves: a type, or a map with `type` and `claims`."""
+    calls_actions: dict[TopicName, ActionName] = {}
+    """Actions that it calls, each with its type."""
+    capabilities: CapabilitiesModel = CapabilitiesModel()
+    """What it can do, for the checks."""
+
+    @model_validator(mode="after")
+    def _have_names_of_their_own(self) -> DeclaredPorts:
+        topics: dict[str, str] = {}
+        kinds = self.publishes, self.subscribes, self.serves, self.calls, self.serves_actions, self.calls_actions
+        for topic in (topic for kind in kinds for topic in kind):
+            if port_name(topic) in topics:
+                raise ValueError(f"'{topics[port_name(topic)]}' and '{topic}' would be the same port: rename one")
+            topics[port_name(topic)] = topic
+        if self.capabilities.frames and self.publishes.get("/tf", PublishedTopic(type="std_msgs/Empty")).type != _TF:
+            raise ValueError(f"it places frames, so 'publishes' needs '/tf: {_TF}'")
+        for what, port in self.capabilities.named_ports():
+            if port not in topics:
+                raise ValueError(f"'{what}' names the port '{port}', which is not declared")
+        return self
+
+    def ports(self) -> dict[str, Port[Any]]:
+        """Return its ports by name: that of the topic, with underscores for slashes."""
+        return {port_name(port.topic): port.named(port_name(port.topic)).elsewhere() for port in self._declared()}
+
+    def _declared(self) -> Iterator[Port[Any]]:
+        for topic, given in self.publishes.items():
+            qos = given.qos or ("bulk" if given.type in _LARGE else "state")
+            yield Out(registry.message(given.type), topic, qos=qos, unit=given.unit, rate=given.rate)
+        for topic, taken in self.subscribes.items():
+            message = registry.message(taken.type)
+            qos = taken.qos or ("bulk" if taken.type in _LARGE else "command" if taken.type in _COMMANDS else "state")
+            yield In(message, topic, qos=qos, is_open=taken.optional, may_be_silent=taken.optional)
+        for topic, service in self.serves.items():
+            yield Serves(registry.service(service), topic)
+        for topic, service in self.calls.items():
+            yield Calls(registry.service(service), topic)
+        for topic, action in self.serves_actions.items():
+            yield ServesAction(registry.action(action.type), topic, claims=action.claims)
+        for topic, name in self.calls_actions.items():
+            yield CallsAction(registry.action(name), topic)
+
+    def declared_capabilities(self) -> Iterator[Capability]:
+        """Yield what it can do, each value with its field."""
+        can = self.capabilities
+        if can.drives is not None:
+            yield Drives(can.drives.commands, can.drives.odometry, **_settings("drives", can.drives, _DRIVES))
+        if can.commands_motion is not None:
+            limits = _settings("commands_motion", can.commands_motion, ("max_speed", "max_turn_rate"))
+            yield CommandsMotion(can.commands_motion.commands, **limits)
+        if can.drains is not None:
+            yield Drains(can.drains.level, **_settings("drains", can.drains, ("runtime", "warn", "error")))
+        for child, parent in can.frames.items():
+            yield WritesFrame("tf", Setting(parent), Setting(child))
+
+
+_DRIVES = ("max_speed", "max_turn_rate", "stops_after", "acceleration", "turn_acceleration", "wheel_distance")
+
+
+def _settings(name: str, model: Config, fields: tuple[str, ...]) -> Mapping[str, Any]:
+    values = ((field, getattr(model, field)) for field in fields)
+    return {field: Setting(value, f"capabilities.{name}.{field}") for field, value in values if value is not None}
+
+
+def port_name(topic: str) -> str:
+    """Return the name of the port of a topic: `wheels_odom` for `wheels/odom`."""
+    return topic.strip("/").replace("/", "_")
+
+
+def qos_of(port: Port[Any]) -> Qos:
+    """Return the class of the topic of a port."""
+    return cast(Out[Any] | In[Any], port).qos
