@@ -169,7 +169,7 @@ Taken = TypeVar("Taken")
 _MARK = "__answers__"
 
 
-class Failed(Exception):
+class OutsideError(Exception):
     """Raised by a component that cannot go on for a reason outside of its code; the text says which, in plain words."""
 
 

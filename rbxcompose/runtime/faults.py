@@ -5,7 +5,7 @@ from collections import deque
 from pathlib import Path
 
 from rbxcompose.base.config import DEFAULT, Restart
-from rbxcompose.base.requests import Failed
+from rbxcompose.base.requests import OutsideError
 
 
 class RestartPolicy:
@@ -38,9 +38,10 @@ class RestartPolicy:
 def explain(error: BaseException, file: str | None = None) -> tuple[str, str]:
     """Return one line that names the error and where it was raised, and the whole traceback.
 
-    A reason outside of all code has no place and no traceback. The place is the innermost one in `file`, the component's source, if the error passed through it.
+    The place is the innermost one in `file`, the component's source, if the error passed through it. A reason outside
+    of all code has neither place nor traceback.
     """
-    if isinstance(error, Failed):
+    if isinstance(error, OutsideError):
         return str(error), ""
     frames = traceback.extract_tb(error.__traceback__)
     words = f"{type(error).__name__}: {error}".removesuffix(": ")

@@ -21,7 +21,7 @@ from rbxcompose.base.config import (
 )
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.levels import Level
-from rbxcompose.base.requests import Command, Failed, Query, Refused, answers
+from rbxcompose.base.requests import Command, OutsideError, Query, Refused, answers
 from rbxcompose.msgs.fields import ArrayEntries
 from rbxcompose.sdk.bound import Ended, Later, Outcome, Reply, SentGoal, ServedGoal
 from rbxcompose.sdk.capabilities import (
@@ -85,7 +85,6 @@ __all__ = [
     "Drains",
     "Drives",
     "Ended",
-    "Failed",
     "Forwards",
     "Frequency",
     "FrequencyTask",
@@ -107,6 +106,7 @@ __all__ = [
     "OpensPort",
     "Out",
     "Outcome",
+    "OutsideError",
     "Place",
     "PlaceName",
     "Port",

@@ -261,8 +261,8 @@ class NeedsExtra(Capability):
 class RunsProgram(Capability):
     """It runs a program of others in real time; `up` looks for that before anything starts."""
 
-    executable: Setting[str]
-    """A path from `folder`, or the name of one in PATH."""
+    command: Setting[tuple[str, ...]]
+    """Its words; the first is a path from `folder`, or the name of an executable in PATH."""
     folder: Setting[str] = Setting("")
     """Where it runs."""
 

@@ -28,6 +28,7 @@ from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.sdk import Activity, Ended, Outcome, Place, skill
 from rbxcompose.sdk.bound import Reply
+from rbxcompose.sdk.component import BusAddress
 from rbxcompose.sdk.ports import In
 from rbxcompose.sdk.robot_events import MissionOver, RobotEvent
 from rbxcompose.sdk.updater import DiagnosticTask
@@ -225,6 +226,10 @@ class Robot:
         }
         self.mission.configure()
         self.mission.activate()
+
+    @property
+    def address(self) -> BusAddress:
+        return BusAddress("robot", "", 0, "", "jazzy")
 
     def log(self, level: Level, text: str) -> None:
         self.lines.append(f"{self.clock.now():g} {text}")

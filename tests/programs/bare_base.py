@@ -64,7 +64,7 @@ def main() -> None:
         odometry = session.declare_publisher(os.environ["RBXCOMPOSE_KEY_ODOM"])
         frames = session.declare_publisher(os.environ["RBXCOMPOSE_KEY_TF"])
         session.declare_subscriber(os.environ["RBXCOMPOSE_KEY_CMD_VEL"], base.take)
-        print("the base is there", flush=True)
+        sys.stderr.write("the base is there\n")
         while True:
             time.sleep(1 / RATE)
             speed, turn = base.move(1 / RATE)

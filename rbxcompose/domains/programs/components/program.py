@@ -18,7 +18,7 @@ from rbxcompose.base.clock import SteppedClock
 from rbxcompose.base.config import Config, FolderName, Time
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.levels import Level
-from rbxcompose.base.requests import Failed
+from rbxcompose.base.requests import OutsideError
 from rbxcompose.bus.names import ActionNames, data_key, dds_type
 from rbxcompose.bus.tokens import SPACE, EndpointToken, EntityKind, NodeToken, parse_token
 from rbxcompose.bus.transport import Closable
@@ -330,7 +330,7 @@ class Runner(Component[R]):
         while not self._is_ready(ready, guest):
             if self.now >= deadline:
                 self._release()
-                raise Failed(f"is not ready after {ready.within if ready is not None else 10.0:g} s")
+                raise OutsideError(f"is not ready after {ready.within if ready is not None else 10.0:g} s")
             if self.child is not None:
                 self.child.wait(_PAUSE)
             self._hear()
@@ -403,7 +403,7 @@ class Runner(Component[R]):
             for event in self.child.events():
                 self._happened(event)
         self._release()
-        raise Failed(how)
+        raise OutsideError(how)
 
     def _log(self, lines: Iterable[str]) -> None:
         for level, text in self.output.take(lines, self.now):
@@ -419,7 +419,7 @@ class Runner(Component[R]):
             return
         if (used := memory_of(child.pid) / _MEGABYTE) > most:
             self._release()
-            raise Failed(f"uses {used:.0f} MB, and may use {most:g}")
+            raise OutsideError(f"uses {used:.0f} MB, and may use {most:g}")
 
     def _compare(self, guest: Guest) -> None:
         """Find what its session has, name it to the others, and report what does not fit."""
@@ -518,7 +518,7 @@ class Program(Runner[ProgramConfig]):
     @classmethod
     def capabilities(cls, config: ProgramConfig) -> tuple[Capability, ...]:
         """Return what the manifest says that it can do, and what `up` looks for."""
-        found = RunsProgram(Setting(config.command[0], "command"), Setting(config.folder, "folder"))
+        found = RunsProgram(Setting(config.command, "command"), Setting(config.folder, "folder"))
         return (*config.declared_capabilities(), found)
 
     def order(self, environment: Mapping[str, str]) -> Order:
