@@ -31,6 +31,8 @@ class Order:
     open_files: int | None = None
     nice: int = 0
     cores: Sequence[int] = ()
+    descriptors: Sequence[int] = ()
+    """Open files that it inherits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +97,7 @@ class Child:
                 stdin=subprocess.PIPE,
                 stdout=output,
                 stderr=output,
-                pass_fds=(report,),
+                pass_fds=(report, *order.descriptors),
                 start_new_session=True,
                 bufsize=0,
             )

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from rbxcompose.base.clock import SteppedClock
-from rbxcompose.base.config import Config, FolderName, Time
+from rbxcompose.base.config import Config, LocalPath, Time
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import OutsideError
@@ -162,6 +162,7 @@ class Runner(Component[R]):
     blocking = True  # a program may take its time to get ready
     configures_within = 620.0
     process = "programs"
+    has_parameters = False  # the program may have some under the same name
     rate = 10.0
 
     @classmethod
@@ -181,9 +182,18 @@ class Runner(Component[R]):
         coasting = (drives.stops_after or 0.0) if drives is not None else 0.0
         return coasting + config.stop.within + 1.0
 
-    def order(self, environment: Mapping[str, str]) -> Order:
-        """Return what to start, with these variables beside its own."""
+    def order(self, environment: Mapping[str, str]) -> Order | None:
+        """Return what to start, with these variables beside its own; None if something else starts it."""
         raise NotImplementedError
+
+    def connect(self) -> None:
+        """Make what it needs on the bus besides its own session, before it starts."""
+
+    def attend(self) -> None:
+        """Look after that, at each step."""
+
+    def disconnect(self) -> None:
+        """Take that away."""
 
     @property
     def joins_bus(self) -> bool:
@@ -221,18 +231,23 @@ class Runner(Component[R]):
             return
         address = self.context.address
         self.guest = guest = Guest(BusPlace(address.router, address.domain), stays=True)
-        environment = {**os.environ, **self._joining()}
         self.is_over = False
-        self.child = Child(self.order(environment))
+        order = self.order({**os.environ, **self._joining()})
+        self.connect()
+        if order is not None:
+            self.child = Child(order)
         self._listen(guest)
         self._wait_until_ready(guest)
         self.watched.began(self.now)
 
     def step(self, dt: float) -> None:
         """Hear what it writes, whether it still runs, and compare what it does with what it declares."""
+        if self.guest is None:
+            return
+        self.attend()
+        self._hear()
         if self.child is None:
             return
-        self._hear()
         if self.ends_at is not None and self.now >= self.ends_at:
             self.child.ask_to_end()
         if self.is_over or self.now - self.looked < LOOKS:
@@ -257,7 +272,7 @@ class Runner(Component[R]):
     @property
     def is_at_rest(self) -> bool:
         """Return whether it has ended, once the robot goes down."""
-        return self.is_over or not self.is_ending
+        return self.child is None or self.is_over or not self.is_ending
 
     def deactivate(self) -> None:
         """End it if it still runs."""
@@ -347,7 +362,7 @@ class Runner(Component[R]):
 
     def _is_ready(self, ready: ReadyModel | None, guest: Guest) -> bool:
         if ready is None or ready.output is not None or ready.ended:
-            return self.is_ready  # as its events say
+            return self.is_ready or (ready is None and self.child is None)  # as its events say
         if ready.topic:
             return self.watched.count(_port_of(ready.topic)) > 0
         return bool(guest.tokens(ready.token))
@@ -485,6 +500,7 @@ class Runner(Component[R]):
         for closable in (*self.tokens.values(), *self.heard.values()):
             closable.close()
         self.tokens, self.heard = {}, {}
+        self.disconnect()
         if self.guest is not None:
             self.guest.__exit__(None, None, None)
             self.guest = None
@@ -503,7 +519,7 @@ class ProgramConfig(RunConfig):
     command: Command
     """Its words: an executable, found in `folder` if it begins with `./`, else by PATH, and its arguments. No shell
     reads them."""
-    folder: FolderName = Field(".", validate_default=True)
+    folder: LocalPath = Field(".", validate_default=True)
     """Where it runs, relative to the manifest's file."""
 
 
