@@ -71,8 +71,14 @@ def encode(message: Message) -> bytes:
     return bytes(out)
 
 
-def decode(message: type[M], payload: bytes | bytearray | memoryview, most: float = math.inf) -> M:
-    """Return the message of class `message` in `payload`.
+def decode(
+    message: type[M],
+    payload: bytes | bytearray | memoryview,
+    most: float = math.inf,
+    *,
+    trailing: float = MOST_TRAILING,
+) -> M:
+    """Return the message of class `message` in `payload`, behind which there may be so many bytes without meaning.
 
     Its lists of texts and messages may have at most `most` entries in all: each costs some 10 µs. They are counted
     before they are read. Arrays of numbers cost next to nothing and do not count.
@@ -93,7 +99,7 @@ def decode(message: type[M], payload: bytes | bytearray | memoryview, most: floa
         if len(data) < len(HEADER) or data[:2] != HEADER[:2]:
             raise CdrError("no little-endian CDR header")
         end = layout.read(data, len(HEADER), values)
-        if len(data) - end > MOST_TRAILING:
+        if len(data) - end > trailing:
             raise CdrLengthError(f"{len(data) - end} bytes too many")
     except (struct.error, CdrLengthError) as error:
         raise CdrLengthError(f"no {message.TYPE}: {error}") from error

@@ -26,6 +26,7 @@ from rbxcompose.domains.programs.bridge import link
 from rbxcompose.domains.programs.bridge.ends import BridgedEnd
 from rbxcompose.domains.programs.bridge.installation import RosInstallation
 from rbxcompose.domains.programs.child import Child, Line, Order, ProgramEnd
+from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.runtime.processes import describe_exit
 from rbxcompose.sdk.component import BusAddress
 
@@ -214,11 +215,11 @@ class Bridge:
         elif frame.kind == link.REQUEST:
             within = LONGEST_WAIT if lane.end.name.endswith("/_action/get_result") else _ANSWER_WITHIN
             answered = partial(self._answered, lane.channel, frame.number)
-            ask = self._guest.transport.ask
-            ask(lane.key, frame.payload, lane.origin(), answered, of_all=False, within=within)
+            payload = _exact(lane.end.interface.Request, frame.payload)
+            self._guest.transport.ask(lane.key, payload, lane.origin(), answered, of_all=False, within=within)
         elif (question := self._questions.pop(frame.number, None)) is not None:
             if frame.kind == link.RESPONSE:
-                question.reply(frame.payload, question.attachment)
+                question.reply(_exact(lane.end.interface.Response, frame.payload), question.attachment)
             else:
                 question.fail(frame.payload.decode())
 
@@ -233,6 +234,11 @@ class Bridge:
                     waiting.append(text)
             case {"answer": int(number), "graph": dict(found)}:
                 self._answers[number] = found
+
+
+def _exact(message: Any, payload: bytes) -> bytes:
+    """Return a message as we encode it: rclpy's `serialize_message` returns as many bytes as it may have needed."""
+    return encode(decode(message, payload, trailing=len(payload)))
 
 
 _bridges: dict[tuple[str, str], tuple[Bridge, set[str]]] = {}

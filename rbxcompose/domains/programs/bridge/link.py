@@ -15,6 +15,7 @@ from collections import deque
 TYPE_CHECKING = False  # as in `typing`
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from typing import Any
 
 DATA, REQUEST, RESPONSE, ERROR, EVENT = range(5)
 """Kinds of frames: a message, a request, its response or the reason why there is none, a JSON text."""
@@ -67,12 +68,9 @@ class Link:
     def frames(self) -> Iterator[Frame]:
         """Yield what the other side sends until it closes the socket."""
         with self._socket.makefile("rb", buffering=_BUFFER) as stream:
-            while len(header := stream.read(_HEADER.size)) == _HEADER.size:
+            while len(header := _read(stream, _HEADER.size)) == _HEADER.size:
                 size, channel, kind, number = _HEADER.unpack(header)
-                if size > LARGEST:
-                    return
-                payload = stream.read(size)
-                if len(payload) < size:
+                if size > LARGEST or len(payload := _read(stream, size)) < size:
                     return
                 yield Frame(channel, kind, number, payload)
 
@@ -125,3 +123,11 @@ class Link:
             with self._lock:
                 self._queue.popleft()
                 self._queued[-1] -= 1
+
+
+def _read(stream: Any, size: int) -> bytes:
+    try:
+        data: bytes = stream.read(size)
+    except OSError:
+        return b""  # the other side was killed
+    return data

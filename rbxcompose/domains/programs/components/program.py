@@ -422,7 +422,7 @@ class Runner(Component[R]):
 
     def _log(self, lines: Iterable[str]) -> None:
         for level, text in self.output.take(lines, self.now):
-            self.context.log(level, text)
+            self.context.log(Level.OK if self.is_ending else level, text)  # its end is wanted, however loud
 
     def _levels(self) -> Iterator[tuple[Level, str | None]]:
         yield Level.ERROR, self.config.levels.error

@@ -15,7 +15,7 @@ from rbxcompose.domains.programs.bridge import bridge
 from rbxcompose.domains.programs.bridge.ends import BridgedEnd, ends_of, parameters_of
 from rbxcompose.domains.programs.bridge.installation import RosInstallation, RosModel, installation_of
 from rbxcompose.domains.programs.child import Order
-from rbxcompose.domains.programs.components.program import Command, RunConfig, Runner, order_of
+from rbxcompose.domains.programs.components.program import Command, RunConfig, Runner, StopModel, order_of
 from rbxcompose.domains.programs.sections.ros2 import ros2
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.sdk import component
@@ -34,6 +34,9 @@ def _from_section(value: Any, info: ValidationInfo) -> Any:
 
 class Ros2NodeConfig(RunConfig):
     """Which node, and how it is started."""
+
+    stop: StopModel = StopModel(signal="SIGINT")
+    """How it is stopped; by SIGINT, as `ros2 launch` does, if nothing else is said."""
 
     package: str = ""
     """The package of its executable."""
