@@ -123,7 +123,13 @@ def rows() -> list[Row]:
         Row("bridge: velocity there, odometry back", "ms", how, bridge.median * 1e3, bridge.p99 * 1e3),
         Row("the same between two nodes of rclpy", "ms", "in turns", peer.median * 1e3, peer.p99 * 1e3),
         Row("bridge: beside two nodes of rclpy", "times", "medians", bridge.median / peer.median, most=2),
-        Row("bridge: share of a core", "%", "1,000 velocities a second from ROS; both its processes", share * 100, most=15),
+        Row(
+            "bridge: share of a core",
+            "%",
+            "1,000 velocities a second from ROS; both its processes",
+            share * 100,
+            most=15,
+        ),
         Row("bridge: share of a core while nothing passes", "%", "", idle * 100),
         Row("bridge: images", "MB/s", "640 x 480, 33 a second", rate, least=30),
     ]

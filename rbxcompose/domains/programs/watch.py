@@ -12,7 +12,7 @@ from rbxcompose.sdk.updater import TaskStatus
 
 PATIENCE = 10.0  # [s] after which a program should have declared and published what it says
 _ACTION = re.compile(r"/_action/\w+$")
-_OWN = re.compile(
+OWN = re.compile(
     r"^/(rosout|parameter_events)$|/_buf|"
     r"/(get|set|list|describe)_parameters$|/(get_parameter_types|set_parameters_atomically|get_type_description)$|"
     r"/_service_event$"
@@ -103,7 +103,7 @@ class ProgramWatch:
 
     def _undeclared(self, session: Collection[KeyOnBus]) -> Iterator[str]:
         for key in sorted(session, key=lambda one: (one.kind, one.name)):
-            if _OWN.search(key.name) or _ACTION.sub("", key.name) in self._actions:
+            if OWN.search(key.name) or _ACTION.sub("", key.name) in self._actions:
                 continue
             verb, where = _VERBS[key.kind]
             known = self._declared.get((key.kind, key.name))

@@ -71,7 +71,6 @@ class Bridge:
         self._questions: dict[int, Question] = {}
         self._numbers = count(1)
         self._problems: dict[int, deque[str]] = {}
-        self._answers: dict[int, Any] = {}
         self._done: set[int] = set()
         self._heard: deque[str] = deque(maxlen=100)
         self.middleware = self.end = ""
@@ -126,14 +125,6 @@ class Bridge:
             waiting = self._problems.get(channel)
             while waiting:
                 yield waiting.popleft()
-
-    def graph(self) -> dict[str, Any]:
-        """Return what is in ROS, by node."""
-        number = next(self._numbers)
-        self._link.event(call=number)
-        self._until(lambda: number in self._answers, 5.0)
-        found: dict[str, Any] = self._answers.pop(number, {})
-        return found
 
     def hear(self) -> str:
         """Take what its process wrote; return how it ended, empty while it runs."""
@@ -232,8 +223,6 @@ class Bridge:
             case {"problem": str(text), "channel": int(channel)}:
                 if (waiting := self._problems.get(channel)) is not None:
                     waiting.append(text)
-            case {"answer": int(number), "graph": dict(found)}:
-                self._answers[number] = found
 
 
 def _exact(message: Any, payload: bytes) -> bytes:

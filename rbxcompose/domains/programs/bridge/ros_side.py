@@ -28,6 +28,7 @@ else:
     import link  # beside this file: the package is not there in ROS's Python
 
 _LOOK = 0.5  # [s] between two looks at the graph
+_GOODBYE = 1.0  # [s] to leave ROS
 _ECHOES = 64  # messages that may be on their way back to us
 
 
@@ -84,7 +85,7 @@ class RosSide:
                 self._take(frame)
             except Exception as error:  # whatever one message causes, the others pass
                 self._problem(frame.channel, f"{type(error).__name__}: {error}")
-        os._exit(0)  # threads of the middleware may never return
+        leave(self.node)
 
     def _take(self, frame: link.Frame) -> None:
         entity = self._entities.get(frame.channel)
@@ -212,8 +213,6 @@ class RosSide:
         names = [(end["name"], end["way"]) for end in self._ends.values() if end["kind"] == "topic"]
         both = {name for name, _ in names if {(name, "to_ros"), (name, "from_ros")} <= {*names}}
         self._echoes = {name: self._echoes.get(name, deque(maxlen=_ECHOES)) for name in both}
-        if "call" in order:
-            self._link.event(answer=order["call"], graph=graph(self.node))
         self._link.event(done=[end["channel"] for end in order.get("add", ())])
 
     def _make(self, end: dict[str, Any]) -> None:
@@ -261,26 +260,53 @@ class RosSide:
 
 
 def graph(node: Any) -> dict[str, Any]:
-    """Return what is in ROS: by node, its topics, services and actions with their types and hashes."""
+    """Return what is in ROS: by node, its topics and services with their types, and which topics are latched."""
     found: dict[str, Any] = {}
     for name, namespace in node.get_node_names_and_namespaces():
         full = f"{namespace.rstrip('/')}/{name}"
         if full == f"/{node.get_name()}":
             continue
         try:
+            publishes = dict(node.get_publisher_names_and_types_by_node(name, namespace))
             found[full] = {
-                "publishes": dict(node.get_publisher_names_and_types_by_node(name, namespace)),
+                "publishes": publishes,
                 "subscribes": dict(node.get_subscriber_names_and_types_by_node(name, namespace)),
                 "serves": dict(node.get_service_names_and_types_by_node(name, namespace)),
                 "calls": dict(node.get_client_names_and_types_by_node(name, namespace)),
+                "latched": [topic for topic in publishes if _is_latched(node, topic, name)],
             }
         except Exception as error:  # a node that has just gone
-            found[full] = {"gone": str(error)}
+            sys.stderr.write(f"{full}: {error}\n")
     return found
 
 
+def _is_latched(node: Any, topic: str, name: str) -> bool:
+    infos = node.get_publishers_info_by_topic(topic)
+    return any(
+        info.node_name == name and info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for info in infos
+    )
+
+
+def leave(node: Any) -> None:
+    """End the process, after the others in ROS were told: they remember one that only dies for many seconds."""
+    sys.stdout.flush()
+    threading.Timer(_GOODBYE, os._exit, (0,)).start()  # threads of the middleware may never return
+    node.destroy_node()  # with the last one, the participant of DDS goes
+    rclpy.shutdown()
+    os._exit(0)
+
+
 def main() -> None:
-    """Serve the bridge at the socket whose descriptor is the first argument, as the node of the second."""
+    """Serve the bridge at the socket whose descriptor is the first argument, as the node of the second.
+
+    With `graph` and a time [s], only look around for so long, and print what there is.
+    """
+    if sys.argv[1] == "graph":
+        rclpy.init(args=[])
+        node = rclpy.create_node("_rbxcompose", start_parameter_services=False, enable_rosout=False)
+        time.sleep(float(sys.argv[2]))
+        sys.stdout.write(json.dumps(graph(node)))
+        leave(node)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     wire = link.Link(socket.socket(fileno=int(sys.argv[1])))
     rclpy.init(args=[])
