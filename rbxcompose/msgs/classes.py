@@ -9,7 +9,7 @@ from typing import Any, ClassVar, ForwardRef
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.msgs import definitions
-from rbxcompose.msgs.arrays import ArrayMessage, holds_numbers, zeros
+from rbxcompose.msgs.arrays import ArrayMessage, filled, holds_numbers, zeros
 from rbxcompose.msgs.types import Action, Message, Service, declared
 
 _ZEROS: Mapping[str, Any] = {
@@ -127,17 +127,20 @@ class _Maker:
         """Return the annotation and the default value of a field."""
         type_ = definition.type
         least = type_.length if type_.shape is definitions.FieldShape.ARRAY else 0
+        given = definition.default
         if holds_numbers(type_):
             # Not the type itself, since numpy is imported when the first array is made.
-            return ForwardRef(f"NDArray[np.{type_.base}]"), field(default_factory=partial(zeros, type_.base, least))
+            array: Any = ForwardRef(f"NDArray[np.{type_.base}]")
+            make = partial(filled, type_.base, given) if isinstance(given, tuple) else partial(zeros, type_.base, least)
+            return array, field(default_factory=make)
         if type_.shape is not definitions.FieldShape.SINGLE and type_.base in definitions.OCTETS:
-            return bytes, bytes(least)
+            return bytes, bytes(given) if isinstance(given, tuple) else bytes(least)  # type: ignore[arg-type]
         if type_.is_message:
             return self._nested(type_, least)
-        value = _ZEROS.get(type_.base, 0) if definition.default is None else definition.default
+        zero = _ZEROS.get(type_.base, 0)
         if type_.shape is definitions.FieldShape.SINGLE:
-            return type(value), value
-        return tuple[type(value), ...], (value,) * least  # type: ignore[misc]
+            return type(zero), zero if given is None else given
+        return tuple[type(zero), ...], (zero,) * least if given is None else given  # type: ignore[misc]
 
     def _nested(self, type_: definitions.FieldType, least: int) -> tuple[Any, Any]:
         # A part of a service or an action is made before what holds it.

@@ -22,9 +22,11 @@ _TYPE = re.compile(r"(?P<base>[A-Za-z][\w/]*)(?:<=(?P<limit>\d+))?(?P<array>\[(?
 _CONSTANT = re.compile(r"(?P<type>\S+)\s+(?P<name>[A-Z][A-Z0-9_]*)\s*=\s*(?P<value>.+)")
 _FIELD = re.compile(r"(?P<type>\S+)\s+(?P<name>[a-z][a-z0-9_]*)(?:\s+(?P<default>\S.*))?")
 _CODE_AND_COMMENT = re.compile(r"""(?P<code>(?:"[^"]*"|'[^']*'|[^#"'])*)(?:#\s?(?P<comment>.*))?""")
+_ITEM = re.compile(r"""\s*(?:"[^"]*"|'[^']*'|[^,\s"'][^,"']*)""")  # of a list of defaults
 _TRUTH = {"true": True, "1": True, "false": False, "0": False}
 
 Value = bool | int | float | str
+Default = Value | tuple[Value, ...]
 
 
 class DefinitionError(ValueError):
@@ -79,7 +81,7 @@ class FieldDefinition:
 
     name: str
     type: FieldType
-    default: Value | None = None
+    default: Default | None = None
     comment: str = ""
 
 
@@ -176,9 +178,23 @@ def _member(code: str, comment: str, package: str) -> Constant | FieldDefinition
         return Constant(constant["name"], _value(parse_type(constant["type"]), constant["value"]), comment)
     if field := _FIELD.fullmatch(code):
         type_ = parse_type(field["type"], package)
-        default = _value(type_, field["default"]) if field["default"] else None
+        default = _default(type_, field["default"]) if field["default"] else None
         return FieldDefinition(field["name"], type_, default, comment)
     raise DefinitionError(f"neither a field nor a constant: {code!r}")
+
+
+def _default(type_: FieldType, text: str) -> Default:
+    """Return the default of a field: of several values, they stand in brackets."""
+    if type_.shape is FieldShape.SINGLE or type_.is_message:
+        return _value(type_, text)
+    if text[0] != "[" or text[-1] != "]":
+        raise DefinitionError(f"the default of {type_} is a list in brackets")
+    values = tuple(_value(FieldType(type_.base), found.group().strip()) for found in _ITEM.finditer(text[1:-1]))
+    if type_.length and (
+        len(values) > type_.length or (type_.shape is FieldShape.ARRAY and len(values) < type_.length)
+    ):
+        raise DefinitionError(f"{len(values)} values where {type_} is expected")
+    return values
 
 
 def _value(type_: FieldType, text: str) -> Value:

@@ -161,11 +161,20 @@ class _Module:
     def _field(self, field: definitions.FieldDefinition) -> str:
         python_type, default = self._python(field.type)
         if field.default is not None:
-            default = _literal(field.default)
+            default = self._default(field.type, field.default)
         line = _commented(f"{definitions.attribute(field.name)}: {python_type} = {default}", field.comment)
         if len(line) <= LONGEST - len(INDENT) or field.comment:
             return line
         return line.replace("field(", f"field(\n{INDENT}{INDENT}").removesuffix(")") + f"\n{INDENT})"
+
+    def _default(self, type_: definitions.FieldType, value: definitions.Default) -> str:
+        if not isinstance(value, tuple):
+            return _literal(value)
+        if type_.base in definitions.OCTETS:
+            return repr(bytes(value))  # type: ignore[arg-type]
+        if holds_numbers(type_):
+            return self._made_by(f'lambda: {self._use("filled", ARRAYS)}("{type_.base}", {value!r})')
+        return repr(value)
 
     def _python(self, type_: definitions.FieldType) -> tuple[str, str]:
         """Return the annotation and the default value of a field."""
