@@ -326,7 +326,8 @@ class _Layout:
         if not message.FIELDS:
             self._add_step(lambda value: value, _Nothing())
         arguments = [
-            self._add_field(parse_type(text), prefix + attribute(name)) for name, text in message.FIELDS.items()
+            self._add_field(message, parse_type(text), prefix + attribute(name))
+            for name, text in message.FIELDS.items()
         ]
         return self._add_making(message, arguments)
 
@@ -347,13 +348,13 @@ class _Layout:
             self._lines.append(f"{setter}({made}, {value})")
         return made
 
-    def _add_field(self, type_: FieldType, path: str) -> str:
+    def _add_field(self, message: type[Message], type_: FieldType, path: str) -> str:
         if type_.shape is FieldShape.SINGLE and type_.is_message:
-            return self._add(registry.message(type_.base), f"{path}.")
+            return self._add(registry.inside(message, type_.base), f"{path}.")
         if type_.shape is FieldShape.SINGLE and type_.base in _CODES:
             self._numbers.append((path, type_.base))
         else:
-            self._add_step(attrgetter(path), _codec(type_))
+            self._add_step(attrgetter(path), _codec(message, type_))
         self._count += 1
         return f"v[{self._count - 1}]"
 
@@ -385,14 +386,14 @@ def _getter(paths: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
     return lambda message: (get(message),)
 
 
-def _codec(type_: FieldType) -> _Codec:
+def _codec(message: type[Message], type_: FieldType) -> _Codec:
     if holds_numbers(type_):
         return _Array(type_)
     if type_.base in OCTETS:
         return _Octets(type_)
     if type_.base == "bool":
         return _Flags(type_)
-    element: _Codec = _layout(registry.message(type_.base)) if type_.is_message else _Text(type_.text_limit)
+    element: _Codec = _layout(registry.inside(message, type_.base)) if type_.is_message else _Text(type_.text_limit)
     return element if type_.shape is FieldShape.SINGLE else _Elements(type_, element)
 
 

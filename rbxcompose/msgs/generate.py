@@ -156,7 +156,8 @@ class _Module:
 
     def _constant(self, constant: definitions.Constant) -> str:
         value = _literal(constant.value)
-        return _commented(f"{constant.name}: ClassVar[{type(constant.value).__name__}] = {value}", constant.comment)
+        name = definitions.attribute(constant.name)
+        return _commented(f"{name}: ClassVar[{type(constant.value).__name__}] = {value}", constant.comment)
 
     def _field(self, field: definitions.FieldDefinition) -> str:
         python_type, default = self._python(field.type)
