@@ -154,7 +154,7 @@ def parse(name: str, text: str) -> tuple[Structure, ...]:
     kind = name.split("/")[1]
     endings = {"msg": ("",), "srv": ("_Request", "_Response"), "action": ("_Goal", "_Result", "_Feedback")}[kind]
     sections: list[list[tuple[int, str]]] = [[]]
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(text.split("\n"), 1):
         if line.rstrip() == "---":
             sections.append([])
         else:
@@ -181,6 +181,12 @@ def _structure(name: str, lines: list[tuple[int, str]]) -> Structure:
     fields = tuple(member for member in members if isinstance(member, FieldDefinition))
     constants = tuple(member for member in members if isinstance(member, Constant))
     return Structure(name, fields, constants, " ".join(heading))
+
+
+def code_of(line: str) -> str:
+    """Return what stands in a line before a comment; empty if that cannot be told."""
+    found = _CODE_AND_COMMENT.fullmatch(line)
+    return found["code"].strip() if found else ""
 
 
 def _split(line: str) -> tuple[str, str]:

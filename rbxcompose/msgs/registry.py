@@ -192,13 +192,17 @@ def text_of(name: str) -> str:
     Raises:
         KeyError: if there is none.
     """
-    own = chosen().texts.get(name)
+    found = chosen().texts.get(name, standard_text(name))
+    if found is None:
+        raise KeyError(name)
+    return found
+
+
+def standard_text(name: str) -> str | None:
+    """Return the text of a standard interface, None if there is none of this name."""
     package, kind, bare = name.split("/")
     file = INTERFACES / package / kind / f"{bare}.{kind}"
-    try:
-        return file.read_text(encoding="utf-8") if own is None else own
-    except OSError as error:
-        raise KeyError(name) from error
+    return file.read_text(encoding="utf-8") if file.is_file() else None
 
 
 class _Package(ModuleType):
