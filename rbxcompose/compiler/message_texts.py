@@ -181,8 +181,8 @@ class Examination:
                 count = each.type.length if each.type.shape is FieldShape.ARRAY else 1
                 values += inside * (count if each.type.shape in (FieldShape.ARRAY, FieldShape.SINGLE) else 0) + 1
             if depth > DEEPEST or values > MOST_VALUES:
-                words = f"more than {DEEPEST} deep" if depth > DEEPEST else f"of more than {MOST_VALUES:,} values"
-                self.findings.append(NO_TEXT.at(one.span(), f"this is a message {words}, which is the limit"))
+                words = f"is more than {DEEPEST} deep" if depth > DEEPEST else f"has more than {MOST_VALUES:,} values"
+                self.findings.append(NO_TEXT.at(one.span(), f"this message {words}, which is the limit"))
                 self._without(name, 0)
                 depth, values = 1, 1
             sizes[name] = depth, values

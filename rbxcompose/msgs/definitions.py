@@ -160,7 +160,8 @@ def parse(name: str, text: str) -> tuple[Structure, ...]:
         else:
             sections[-1].append((number, line))
     if len(sections) != len(endings):
-        raise DefinitionError(f"{len(sections)} sections, not {len(endings)}", name)
+        words = f"a .{kind} file has {len(endings)} parts with '---' between them, not {len(sections)}"
+        raise DefinitionError(words if len(endings) > 1 else "a .msg file has no '---'", name)
     return tuple(_structure(name + ending, lines) for ending, lines in zip(endings, sections, strict=True))
 
 

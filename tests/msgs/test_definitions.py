@@ -90,7 +90,7 @@ def test_a_wrong_line_is_named(line: str, why: str) -> None:
 
 
 def test_an_interface_with_a_part_too_few_is_refused() -> None:
-    with pytest.raises(DefinitionError, match="a/srv/B: 1 sections, not 2"):
+    with pytest.raises(DefinitionError, match=r"a/srv/B: a \.srv file has 2 parts with '---' between them, not 1"):
         parse("a/srv/B", "int8 x\n")
 
 
