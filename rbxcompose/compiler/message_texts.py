@@ -46,14 +46,18 @@ def files_in(package: Path) -> Iterator[tuple[str, Path]]:
             yield f"{package.name}/{kind_}/{path.stem}", path
 
 
-def wrong_package(name: str, span: Span) -> Finding | None:
-    """Return the finding about a folder whose name no package can have, None if it is one."""
+def wrong_package(name: str) -> str:
+    """Return why a package cannot have this name, or nothing."""
     if not _PACKAGE.fullmatch(name):
-        message = f"'{plain(name, 60)}' cannot be the name of a package: small letters, digits and single '_'"
-        return NO_PACKAGE.at(span, message, help="rename the folder")
-    if name in registry.TAKEN:
-        return NO_PACKAGE.at(span, f"a package cannot be named '{name}': 'rbxcompose.msgs.{name}' is ours")
-    return None
+        return f"'{plain(name, 60)}' cannot be the name of a package: small letters, digits and single '_'"
+    return f"a package cannot be named '{name}': 'rbxcompose.msgs.{name}' is ours" if name in registry.TAKEN else ""
+
+
+def wrong_type(name: str) -> str:
+    """Return why a type cannot have this name, or nothing."""
+    if _TYPE.fullmatch(name):
+        return ""
+    return f"'{plain(name, 60)}' cannot be the name of a type: a capital letter, then letters and digits"
 
 
 @dataclass(slots=True)
@@ -82,8 +86,7 @@ class Examination:
 
     def __post_init__(self) -> None:
         for name, one in self.written.items():
-            if not _TYPE.fullmatch(bare := name.split("/")[2]):
-                words = f"'{plain(bare, 60)}' cannot be the name of a type: a capital letter, then letters and digits"
+            if words := wrong_type(name.split("/")[2]):
                 self.findings.append(NO_TEXT.at(one.span(), words, help="rename the file"))
             else:
                 self._read(name, one)
@@ -119,7 +122,7 @@ class Examination:
         """Find fields of types that there are not."""
         one, package = self.written[name], f"{name.split('/')[0]}/"
         for line, base in _uses(one):
-            if base in self.written or ("/msg/" in base and base in registry.SHIPPED):
+            if "/msg/" in base and (base in self.texts or base in registry.SHIPPED):
                 continue
             messages = {*interface_names("msg"), *(known for known in self.texts if "/msg/" in known)}
             valid, shown = sorted(map(_shown, messages)), _shown(base)

@@ -5,11 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.base.config import Config
-from rbxcompose.base.findings import Related, Report, Span
+from rbxcompose.base.findings import Finding, Related, Report, Span
 from rbxcompose.compiler.message_texts import NO_PACKAGE, Examination, TypeText, files_in, packages_in, wrong_package
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.fields import FileName
-from rbxcompose.manifest.files import folder_named, shown_name
+from rbxcompose.manifest.files import folder_named, resolve, shown_name
 from rbxcompose.manifest.reader import read_source
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, Short
@@ -40,7 +40,8 @@ def msgs(reading: Reading[MessageFolder]) -> Mapping[str, str]:
     packages: dict[str, tuple[Path, Span]] = {}
     for name, read in reading.entries().items():
         span = reading.value("msgs", name, "folder")
-        folder = folder_named(read.folder, documents.writer(span, reading.contents.file), span)
+        writer = documents.writer(span, reading.contents.file)
+        folder = folder_named(read.folder, writer, span)
         if not isinstance(folder, Path):
             report.add(folder)
             continue
@@ -53,20 +54,24 @@ def msgs(reading: Reading[MessageFolder]) -> Mapping[str, str]:
             if first != package:
                 words = f"there are two packages '{package.name}': '{shown_name(first)}' and '{shown_name(package)}'"
                 report.add(NO_PACKAGE.at(span, words, related=[Related(place, "the first one")]))
-            elif wrong := wrong_package(package.name, span):
-                report.add(wrong)
+            elif words := wrong_package(package.name):
+                report.add(NO_PACKAGE.at(span, words, help="rename the folder"))
             else:
-                written |= _texts(package, span, documents)
+                written |= _texts(package, writer, span, documents)
     examination = Examination(written)
     report.extend(examination.findings)
     return examination.texts
 
 
-def _texts(package: Path, span: Span, documents: Documents) -> dict[str, TypeText]:
+def _texts(package: Path, writer: Path, span: Span, documents: Documents) -> dict[str, TypeText]:
     found = {}
     for name, path in files_in(package):
-        shown = shown_name(path)
-        text, findings = read_source(path, shown, documents.sources, what="a type of messages")
+        file = resolve(str(path), writer, span)
+        if isinstance(file, Finding):  # a link to elsewhere
+            documents.report.add(file)
+            continue
+        shown = shown_name(file)
+        text, findings = read_source(file, shown, documents.sources, what="a type of messages")
         documents.report.extend(replace(finding, span=finding.span or span) for finding in findings)
         if text is not None:
             found[name] = TypeText(shown, text)
