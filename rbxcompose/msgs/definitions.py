@@ -29,7 +29,7 @@ _TYPE = re.compile(r"(?P<base>[A-Za-z][\w/]*)(?:<=(?P<limit>\d+))?(?P<array>\[(?
 _CONSTANT = re.compile(r"(?P<type>\S+)\s+(?P<name>[A-Z][A-Z0-9_]*)\s*=\s*(?P<value>.+)")
 _FIELD = re.compile(r"(?P<type>\S+)\s+(?P<name>[a-z][a-z0-9_]*)(?:\s+(?P<default>\S.*))?")
 _CODE_AND_COMMENT = re.compile(r"""(?P<code>(?:"[^"]*"|'[^']*'|[^#"'])*)(?:#\s?(?P<comment>.*))?""")
-_ITEM = re.compile(r"""\s*(?:"[^"]*"|'[^']*'|[^,\s"'][^,"']*)""")  # of a list of defaults
+_ITEM = re.compile(r"""(?:"[^"]*+"|'[^']*+'|[^,\s"'][^,"']*+)""")  # of a list of defaults
 _DOUBTFUL = re.compile(r"__|_$")  # what ROS has in no name
 _TAKEN = ("self", "TYPE", "HASH", "FIELDS", "ARRAYS", "CLASSES")
 _TRUTH = {"true": True, "1": True, "false": False, "0": False}
