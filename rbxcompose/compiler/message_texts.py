@@ -5,6 +5,7 @@ not unknown because there is a mistake in its text.
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field
 from itertools import pairwise
@@ -15,6 +16,7 @@ from rbxcompose.base.findings import Finding, Related, Span, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import KINDS, DefinitionError, FieldShape, Structure, code_of, interface_names, parse
+from rbxcompose.msgs.packages import short
 
 NO_PACKAGE = kind("RBX1322")
 NO_TEXT = kind("RBX3026")
@@ -24,6 +26,8 @@ OTHER_TYPE = kind("RBX3029")
 
 DEEPEST = 30  # messages inside each other
 MOST_VALUES = 1_000_000  # of a message whose lists are empty
+MOST_MISTAKES = 10  # in one text, which is not read any further
+LARGEST = 100_000  # [B] of a text
 _PACKAGE = re.compile(r"(?!.*__)[a-z][a-z0-9_]*(?<!_)")
 _TYPE = re.compile(r"[A-Z][A-Za-z0-9]*")
 _NOTHING = {"msg": "", "srv": "---\n", "action": "---\n---\n"}
@@ -32,7 +36,7 @@ _NOTHING = {"msg": "", "srv": "---\n", "action": "---\n---\n"}
 def packages_in(folder: Path) -> list[Path]:
     """Return the folders of packages: this one, if it has interfaces, else those in it that have some."""
     inside = [folder] if _has_interfaces(folder) else sorted(folder.glob("*/"))
-    return [one for one in inside if _has_interfaces(one)]
+    return [package for package in inside if _has_interfaces(package)]
 
 
 def _has_interfaces(folder: Path) -> bool:
@@ -83,32 +87,35 @@ class Examination:
     written: Mapping[str, TypeText]
     texts: dict[str, str] = field(default_factory=dict)
     findings: list[Finding] = field(default_factory=list)
+    _mistakes: Counter[str] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
-        for name, one in self.written.items():
+        for name, source in self.written.items():
             if words := wrong_type(name.split("/")[2]):
-                self.findings.append(NO_TEXT.at(one.span(), words, help="rename the file"))
+                self.findings.append(NO_TEXT.at(source.span(), words, help="rename the file"))
             else:
-                self._read(name, one)
+                self._read(name, source)
         for name in sorted(self.texts):
             self._judge_names(name)
         for name in sorted(name for name in self.texts if self._is_standard(name)):
             del self.texts[name]
         self._weigh(self._in_order())
 
-    def _read(self, name: str, one: TypeText) -> None:
+    def _read(self, name: str, source: TypeText) -> None:
         """Keep the text of a type without its wrong lines."""
-        self.texts[name] = one.text
+        self.texts[name] = source.text
         while True:
             try:
-                one.structures = parse(name, self.texts[name])
+                source.structures = parse(name, self.texts[name])
                 return
             except DefinitionError as error:
-                self.findings.append(NO_TEXT.at(one.span(error.line or 1), plain(error.problem)))
+                self.findings.append(NO_TEXT.at(source.span(error.line or 1), plain(error.problem)))
                 self._leave_out(name, error.line)
 
     def _leave_out(self, name: str, line: int) -> None:
-        """Leave a line out of a text; everything, if it is 0."""
+        """Leave a line out of a text; everything, if it is 0 or there have been too many."""
+        self._mistakes[name] += 1
+        line = 0 if self._mistakes[name] >= MOST_MISTAKES else line
         lines = self.texts[name].split("\n")
         lines[line - 1 : line] = [""]
         self.texts[name] = "\n".join(lines) if line else _NOTHING[name.split("/")[1]]
@@ -120,25 +127,27 @@ class Examination:
 
     def _judge_names(self, name: str) -> None:
         """Find fields of types that there are not."""
-        one, package = self.written[name], f"{name.split('/')[0]}/"
-        for line, base in _uses(one):
+        source, package = self.written[name], f"{name.split('/')[0]}/"
+        for line, base in _uses(source):
             if "/msg/" in base and (base in self.texts or base in registry.SHIPPED):
                 continue
             messages = {*interface_names("msg"), *(known for known in self.texts if "/msg/" in known)}
-            valid, shown = sorted(map(_shown, messages)), _shown(base)
-            span, message = one.span(line, first=True), f"there is no message type '{shown}'"
+            valid, shown = sorted(map(short, messages)), short(base)
+            span, message = source.span(line, first=True), f"there is no message type '{shown}'"
             near = [known.removeprefix(package) for known in valid if known.split("/")[1] == shown.split("/")[1]]
             help_text = f"write {' or '.join(map(repr, near))}"
             finding = NO_TYPE.misspelt(span, message, shown, valid, "message types")
             self.findings.append(NO_TYPE.at(span, message, help=help_text) if near else finding)
             self._without(name, line)
+            if self._mistakes[name] >= MOST_MISTAKES:
+                return
 
     def _is_standard(self, name: str) -> bool:
         """Return whether a type has the name of a standard one, after a finding if it is another one."""
-        standard, one = registry.standard_text(name), self.written[name]
-        if standard is not None and _content(parse(name, standard)) != _content(one.structures):
-            message = f"'{_shown(name)}' is a standard type with other fields or constants"
-            self.findings.append(OTHER_TYPE.at(one.span(), message, help="rename it, or its package"))
+        standard, source = registry.standard_text(name), self.written[name]
+        if standard is not None and _content(parse(name, standard)) != _content(source.structures):
+            message = f"'{short(name)}' is a standard type with other fields or constants"
+            self.findings.append(OTHER_TYPE.at(source.span(), message, help="rename it, or its package"))
         return standard is not None
 
     def _in_order(self) -> list[str]:
@@ -162,13 +171,15 @@ class Examination:
         return iter([(line, base) for line, base in _uses(self.written[name]) if base in self.texts])
 
     def _report_circle(self, names: list[str], line: int) -> None:
+        if self._mistakes[names[-1]] >= MOST_MISTAKES:
+            return
         related = [
-            Related(self.written[name].span(at, first=True), f"'{_shown(inner)}' is inside it here")
+            Related(self.written[name].span(at, first=True), f"'{short(inner)}' is inside it here")
             for name, inner in pairwise(names)
             for at, base in _uses(self.written[name])
             if base == inner
         ]
-        span, words = self.written[names[-1]].span(line, first=True), " -> ".join(map(_shown, (*names, names[0])))
+        span, words = self.written[names[-1]].span(line, first=True), " -> ".join(map(short, (*names, names[0])))
         self.findings.append(CIRCLE.at(span, f"a message cannot contain itself: {words}", related=related))
         self._without(names[-1], line)
 
@@ -176,33 +187,29 @@ class Examination:
         """Find messages that are too deep or too large to be made."""
         sizes: dict[str, tuple[int, int]] = {}
         for name in ordered:
-            one = self.written[name]
+            source = self.written[name]
             depth, values = 1, 0
-            for each in (each for structure in one.structures for each in structure.fields):
+            for each in (each for structure in source.structures for each in structure.fields):
                 inside_depth, inside = sizes.get(each.type.base, (1, 1))
                 depth = max(depth, inside_depth + 1)
                 count = each.type.length if each.type.shape is FieldShape.ARRAY else 1
                 values += inside * (count if each.type.shape in (FieldShape.ARRAY, FieldShape.SINGLE) else 0) + 1
             if depth > DEEPEST or values > MOST_VALUES:
                 words = f"is more than {DEEPEST} deep" if depth > DEEPEST else f"has more than {MOST_VALUES:,} values"
-                self.findings.append(NO_TEXT.at(one.span(), f"this message {words}, which is the limit"))
+                self.findings.append(NO_TEXT.at(source.span(), f"this message {words}, which is the limit"))
                 self._without(name, 0)
                 depth, values = 1, 1
             sizes[name] = depth, values
 
 
-def _uses(one: TypeText) -> list[tuple[int, str]]:
+def _uses(source: TypeText) -> list[tuple[int, str]]:
     """Return the messages inside a type, each with the line of the field."""
-    fields = [each for structure in one.structures for each in structure.fields]
+    fields = [each for structure in source.structures for each in structure.fields]
     return [(each.line, each.type.base) for each in fields if each.type.is_message]
-
-
-def _shown(name: str) -> str:
-    return name.replace("/msg/", "/")
 
 
 def _content(structures: tuple[Structure, ...]) -> object:
     return [
-        ([(each.name, each.type) for each in one.fields], {each.name: each.value for each in one.constants})
-        for one in structures
+        ([(each.name, each.type) for each in part.fields], {each.name: each.value for each in part.constants})
+        for part in structures
     ]

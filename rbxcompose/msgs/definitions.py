@@ -167,20 +167,20 @@ def parse(name: str, text: str) -> tuple[Structure, ...]:
 
 def _structure(name: str, lines: list[tuple[int, str]]) -> Structure:
     heading: list[str] = []
-    members: list[Constant | FieldDefinition] = []
+    members: dict[str, Constant | FieldDefinition] = {}
     for number, line in lines:
         try:
             code, comment = _split(line)
             if code:
-                members.append(_member(code, comment, name.split("/")[0], number))
-                if any(member.name == members[-1].name for member in members[:-1]):
-                    raise DefinitionError(f"there is a second '{members[-1].name}'")
+                member = _member(code, comment, name.split("/")[0], number)
+                if members.setdefault(member.name, member) is not member:
+                    raise DefinitionError(f"there is a second '{member.name}'")
             elif comment and not members:
                 heading.append(comment)
         except ValueError as error:
             raise DefinitionError(str(error), name, number) from error
-    fields = tuple(member for member in members if isinstance(member, FieldDefinition))
-    constants = tuple(member for member in members if isinstance(member, Constant))
+    fields = tuple(member for member in members.values() if isinstance(member, FieldDefinition))
+    constants = tuple(member for member in members.values() if isinstance(member, Constant))
     return Structure(name, fields, constants, " ".join(heading))
 
 

@@ -161,10 +161,15 @@ def chosen() -> Types:
     return _here.get() or _everywhere
 
 
+def types_of(texts: Mapping[str, str]) -> Types:
+    """Return the types of a robot with these texts of its own."""
+    return _own(tuple(sorted(texts.items())))
+
+
 def choose(texts: Mapping[str, str]) -> None:
     """Let names mean the types of a robot from now on; `texts` are those of its own interfaces by full name."""
     global _everywhere
-    types = _own(tuple(sorted(texts.items())))
+    types = types_of(texts)
     _here.set(types)
     if current_thread() is main_thread():
         _everywhere = types

@@ -15,10 +15,13 @@ from hypothesis import strategies as st
 from rbxcompose.compiler.message_texts import Examination, TypeText
 from rbxcompose.compiler.plan.dump import dump, load
 from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.compiler.systems.bundle import bundle_of
+from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.runtime.supervision.changes import changes
 from rbxcompose.testing.bench import Bench
+from rbxcompose.testing.system_bench import SystemBench
 from rbxcompose.tools.lsp.project import Project as Editor
 from tests.conftest import ROOT
 from tests.parts.project import Project
@@ -234,6 +237,14 @@ def test_whatever_the_texts_are_what_is_left_of_them_can_be_used(texts: dict[str
             assert message.HASH
 
 
+@pytest.mark.parametrize("line", ["what", "Foo foo", "Bar bar%d", "bool same", "uint8 A%d=256"])
+def test_a_text_with_thousands_of_mistakes_takes_no_time(line: str) -> None:
+    text = "".join(f"{line % number if '%' in line else line}\n" for number in range(8_000))
+    examined = Examination({"toy/msg/Bar": TypeText("Bar.msg", text)})
+    assert examined.findings
+    assert examined.texts["toy/msg/Bar"] == ""
+
+
 def test_messages_may_be_deep_but_not_too_deep() -> None:
     texts = {
         f"toy/msg/M{depth}": TypeText("M", f"M{depth + 1}[2] m\n" if depth < 400 else "bool x\n")
@@ -297,3 +308,42 @@ def test_a_component_of_another_package_imports_them_also_in_a_part(tmp_path: Pa
     )
     assert done.returncode == 0, done.stderr + done.stdout
     assert "error" not in done.stderr + done.stdout
+
+
+MUXED = """
+msgs: {own: msgs}
+muxes:
+  grasp: {inputs: {first: {priority: 1, timeout: 1 s}}}
+components:
+  width: {type: threshold, topic: grasp, message: my_msgs/Grasp, field: width, warn_below: 0.1}
+"""
+
+
+@pytest.mark.parametrize(("text", "is_same"), [("# Another comment.\n" + GRASP, True), ("float64 width\n", False)])
+def test_robots_that_share_a_topic_must_have_the_same_definition(tmp_path: Path, text: str, is_same: bool) -> None:
+    head = "rbx: 1\nkind: Robot\nname: "
+    files = {
+        **FILES,
+        "robots/one/robot.yaml": f"{head}one\n{MUXED}",
+        "robots/two/robot.yaml": f"{head}two\n{ROBOT.replace('topic: grasp', 'topic: /one/grasp')}",
+        **{path.replace("one", "two"): written for path, written in FILES.items()},
+        "robots/two/msgs/my_msgs/msg/Grasp.msg": text,
+        "systems/both.yaml": "rbx: 1\nkind: System\nname: both\nhosts: {desk: {}}\nrobots:\n"
+        "  one: {robot: ../robots/one/robot.yaml, share: [grasp]}\n  two: {robot: ../robots/two/robot.yaml}\n",
+    }
+    for name, written in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(written)
+    system = compile_system(str(tmp_path / "systems/both.yaml"), environment={})
+    errors = [finding for finding in system.report if finding.severity == "error"]
+    assert [finding.code for finding in errors] == ([] if is_same else ["RBX6126"]), errors
+    names = {path for path in bundle_of(system).archive.split(b"\0") if path.endswith(b".msg")}
+    assert len(names) == 4
+    if is_same:
+        bench = SystemBench(system)
+        registry.choose(bench.robots["two"].plan.messages)
+        statuses = bench.robots["two"].statuses("width")
+        registry.choose(bench.robots["one"].plan.messages)
+        bench.robots["one"].publish("grasp/first", registry.message("my_msgs/Grasp")(width=0.0))  # type: ignore[call-arg]
+        bench.advance(2.0)
+        assert statuses[-1].level == 1

@@ -6,7 +6,15 @@ from pathlib import Path
 
 from rbxcompose.base.config import Config
 from rbxcompose.base.findings import Finding, Related, Report, Span
-from rbxcompose.compiler.message_texts import NO_PACKAGE, Examination, TypeText, files_in, packages_in, wrong_package
+from rbxcompose.compiler.message_texts import (
+    LARGEST,
+    NO_PACKAGE,
+    Examination,
+    TypeText,
+    files_in,
+    packages_in,
+    wrong_package,
+)
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.fields import FileName
 from rbxcompose.manifest.files import folder_named, resolve, shown_name
@@ -71,7 +79,7 @@ def _texts(package: Path, writer: Path, span: Span, documents: Documents) -> dic
             documents.report.add(file)
             continue
         shown = shown_name(file)
-        text, findings = read_source(file, shown, documents.sources, what="a type of messages")
+        text, findings = read_source(file, shown, documents.sources, LARGEST, "a type of messages")
         documents.report.extend(replace(finding, span=finding.span or span) for finding in findings)
         if text is not None:
             found[name] = TypeText(shown, text)
