@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable
 
-from rbxcompose.msgs.definitions import KINDS, FieldType, interface_names, parse
+from rbxcompose.msgs.definitions import INTERFACES, KINDS, FieldType, interface_names, parse
 from rbxcompose.msgs.registry import chosen, text_of
 
 OWN = "rbxcompose_msgs"
@@ -39,6 +39,11 @@ ament_package()
 def all_names() -> list[str]:
     """Return the sorted names of all interfaces that have a text."""
     return sorted({*chosen().texts, *(name for kind in KINDS for name in interface_names(kind))})
+
+
+def own_packages() -> list[str]:
+    """Return the packages of a robot's own types that are no standard ones."""
+    return sorted({name.split("/")[0] for name in chosen().texts} - {path.name for path in INTERFACES.iterdir()})
 
 
 def parts_of(name: str) -> list[str]:

@@ -182,6 +182,16 @@ def test_stubs_of_a_robot_without_types_of_its_own_are_refused(robot: Path, caps
     assert "RBX9049" in capsys.readouterr().err
 
 
+def test_packages_of_the_robot_are_exported_too(robot: Path) -> None:
+    assert main(["msg", "export", "src", "robot.yaml"]) == 0
+    assert {path.name for path in (robot / "src").iterdir()} == {"rbxcompose_msgs", "my_msgs"}
+    assert (
+        '"msg/Grasp.msg"\n  DEPENDENCIES builtin_interfaces std_msgs'
+        in (robot / "src/my_msgs/CMakeLists.txt").read_text()
+    )
+    assert (robot / "src/my_msgs/msg/Grasp.msg").read_text() == (robot / "msgs/my_msgs/msg/Grasp.msg").read_text()
+
+
 def test_a_robot_that_cannot_be_read_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["msg", "ls", str(tmp_path / "robot.yaml")]) == 1
     assert "RBX1301" in capsys.readouterr().err

@@ -1,8 +1,8 @@
-"""List and show messages, services and actions; begin types of your own, or write our own as a ROS 2 package.
+"""List and show types of messages, services and actions, begin your own, export packages of them.
 
 A robot's own types are those in the folders of its section `msgs`: `msg new my_msgs/Grasp` begins one, and `msg stubs`
 tells editors and type checkers about `from rbxcompose.msgs.my_msgs import Grasp`. ROS 2 knows all types of a robot
-except its own and those of the package `rbxcompose_msgs`: `msg export ros2_ws/src` writes the latter.
+except its own and those of the package `rbxcompose_msgs`: `msg export ros2_ws/src PATH` writes their packages.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from rbxcompose.manifest.files import shown_name
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import KINDS, parse, parts, type_hash
 from rbxcompose.msgs.generate import all_structures, modules
-from rbxcompose.msgs.packages import OWN, all_names, package_files, parts_of, short, whole_text
+from rbxcompose.msgs.packages import OWN, all_names, own_packages, package_files, parts_of, short, whole_text
 
 GROUP = "data"
 LICENCE = "Apache-2.0"
@@ -67,8 +67,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     stubs.add_argument("--into", metavar="DIR", type=Path, default=Path("typings"), help="the folder (typings)")
     for subparser in (ls, show, stubs):
         add_path_argument(subparser)
-    export = actions.add_parser("export", help=f"write the package {OWN} for a ROS 2 workspace")
-    export.add_argument("folder", metavar="DIR", type=Path, help=f"the folder in which to create {OWN}")
+    export = actions.add_parser("export", help=f"write {OWN}, and a robot's own packages, for a ROS 2 workspace")
+    export.add_argument("folder", metavar="DIR", type=Path, help="the folder in which to create the packages")
+    export.add_argument("path", nargs="?", metavar="PATH", help="the robot whose own packages are written, too")
     for subparser in (ls, show, new, stubs, export):
         subparser.add_argument("--json", action="store_true", help="answer in JSON")
 
@@ -77,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Carry out the chosen action."""
     match arguments.action:
         case "export":
-            return _export(arguments.folder, arguments.json)
+            return _export(arguments)
         case "new":
             return _new(arguments)
         case "show":
@@ -171,13 +172,19 @@ def _stubs(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _export(folder: Path, as_json: bool) -> int:
-    target = folder / OWN
-    finding = write_new(target, package_files(OWN, rbxcompose.__version__, LICENCE))
+def _export(arguments: argparse.Namespace) -> int:
+    if arguments.path is not None and (code := _choose_robot(arguments.path)):
+        return code
+    folder, packages = arguments.folder, [OWN, *(own_packages() if arguments.path is not None else ())]
+    files = {package: package_files(package, rbxcompose.__version__, LICENCE) for package in packages}
+    finding = write_new(
+        folder, {f"{package}/{path}": text for package in files for path, text in files[package].items()}
+    )
     if finding is not None:
         return refuse(replace(finding, help="choose another folder"))
-    if as_json:
-        emit(to_json({"package": OWN, "folder": str(target)}))
+    if arguments.json:
+        emit(to_json({"packages": packages, "folder": str(folder)}))
     else:
-        emit(f"{shown_name(target)} is written; in the workspace: colcon build --packages-select {OWN}")
+        where = ", ".join(shown_name(folder / package) for package in packages)
+        emit(f"{where} is written; in the workspace: colcon build --packages-select {' '.join(packages)}")
     return 0
