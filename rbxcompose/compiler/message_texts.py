@@ -30,7 +30,7 @@ MOST_MISTAKES = 10  # in one text, which is not read any further
 LARGEST = 100_000  # [B] of a text
 _PACKAGE = re.compile(r"(?!.*__)[a-z][a-z0-9_]*(?<!_)")
 _TYPE = re.compile(r"[A-Z][A-Za-z0-9]*")
-_NOTHING = {"msg": "", "srv": "---\n", "action": "---\n---\n"}
+NOTHING = {"msg": "", "srv": "---\n", "action": "---\n---\n"}
 
 
 def packages_in(folder: Path) -> list[Path]:
@@ -118,7 +118,7 @@ class Examination:
         line = 0 if self._mistakes[name] >= MOST_MISTAKES else line
         lines = self.texts[name].split("\n")
         lines[line - 1 : line] = [""]
-        self.texts[name] = "\n".join(lines) if line else _NOTHING[name.split("/")[1]]
+        self.texts[name] = "\n".join(lines) if line else NOTHING[name.split("/")[1]]
 
     def _without(self, name: str, line: int) -> None:
         """Leave a right line, or all lines, out of a type."""

@@ -122,6 +122,12 @@ def test_a_folder_without_messages_is_found(tmp_path: Path, folder: str, found: 
     assert [one.code for one in project.findings] == [found]
 
 
+def test_a_text_that_cannot_be_read_is_not_unknown_where_it_is_used(tmp_path: Path) -> None:
+    project = Project(tmp_path)
+    project.check(ROBOT, files={**FILES, "robots/one/msgs/my_msgs/msg/Finger.msg": "#" * 200_000})
+    assert [finding.code for finding in project.findings] == ["RBX1103"], project.text
+
+
 def test_a_link_to_a_text_outside_the_project_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "Secret.msg").write_text("bool a\n")
     folder = tmp_path / "project/robots/one/msgs/my_msgs/msg"

@@ -9,6 +9,7 @@ from rbxcompose.base.findings import Finding, Related, Report, Span
 from rbxcompose.compiler.message_texts import (
     LARGEST,
     NO_PACKAGE,
+    NOTHING,
     Examination,
     TypeText,
     files_in,
@@ -81,8 +82,7 @@ def _texts(package: Path, writer: Path, span: Span, documents: Documents) -> dic
         shown = shown_name(file)
         text, findings = read_source(file, shown, documents.sources, LARGEST, "a type of messages")
         documents.report.extend(replace(finding, span=finding.span or span) for finding in findings)
-        if text is not None:
-            found[name] = TypeText(shown, text)
+        found[name] = TypeText(shown, NOTHING[name.split("/")[1]] if text is None else text)
     return found
 
 
