@@ -226,8 +226,8 @@ class Bridge:
 
 
 def _exact(message: Any, payload: bytes) -> bytes:
-    """Return a message as we encode it: rclpy's `serialize_message` returns as many bytes as it may have needed."""
-    return encode(decode(message, payload, trailing=len(payload)))
+    """Return a message as we encode it: rclpy's `serialize_message` returns more bytes than it has used."""
+    return encode(decode(message, payload))
 
 
 _bridges: dict[tuple[str, str], tuple[Bridge, set[str]]] = {}
