@@ -35,7 +35,7 @@ class RosNode:
                     ends[f"{kind}_actions"][topic.removesuffix(_SEND_GOAL)] = action
                 elif "/_action/" not in topic and not OWN.search(topic):
                     ends[kind][topic] = _short(types[0])
-        return cls(name, ends, frozenset(found.get("latched", ())))
+        return cls(name, ends, frozenset(found.get("latched", ())) & ends["publishes"].keys())
 
     def value(self, kind: str, topic: str) -> str:
         """Return what the manifest says of a topic, a service or an action."""

@@ -28,6 +28,7 @@ else:
     import link  # beside this file: the package is not there in ROS's Python
 
 _LOOK = 0.5  # [s] between two looks at the graph
+_SETTLED = 1.0  # [s] without anything new
 _GOODBYE = 1.0  # [s] to leave ROS
 _ECHOES = 64  # messages that may be on their way back to us
 
@@ -280,6 +281,17 @@ def graph(node: Any) -> dict[str, Any]:
     return found
 
 
+def discovered(node: Any, most: float) -> dict[str, Any]:
+    """Return the graph once nothing new has appeared for a second, after `most` [s] in any case."""
+    began = changed = time.monotonic()
+    found: dict[str, Any] = {}
+    while time.monotonic() - began < most and (not found or time.monotonic() - changed < _SETTLED):
+        time.sleep(_LOOK / 2)
+        if (now := graph(node)) != found:
+            found, changed = now, time.monotonic()
+    return found
+
+
 def _is_latched(node: Any, topic: str, name: str) -> bool:
     infos = node.get_publishers_info_by_topic(topic)
     return any(
@@ -299,13 +311,12 @@ def leave(node: Any) -> None:
 def main() -> None:
     """Serve the bridge at the socket whose descriptor is the first argument, as the node of the second.
 
-    With `graph` and a time [s], only look around for so long, and print what there is.
+    With `graph` and a time [s], only look around for so long at most, and print what there is.
     """
     if sys.argv[1] == "graph":
         rclpy.init(args=[])
         node = rclpy.create_node("_rbxcompose", start_parameter_services=False, enable_rosout=False)
-        time.sleep(float(sys.argv[2]))
-        sys.stdout.write(json.dumps(graph(node)))
+        sys.stdout.write(json.dumps(discovered(node, float(sys.argv[2]))))
         leave(node)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     wire = link.Link(socket.socket(fileno=int(sys.argv[1])))

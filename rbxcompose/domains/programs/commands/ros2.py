@@ -32,7 +32,7 @@ from rbxcompose.manifest.tree import FILE_BYTES, MappingNode, at
 GROUP = "data"
 NO_ROS = kind("RBX9051")
 NO_NODE = kind("RBX9052")
-_LOOKS = 2.0  # [s] until discovery has found what there is
+_LOOKS = 6.0  # [s] at most for discovery
 _MORE = 30.0  # [s] for ROS to start
 
 
