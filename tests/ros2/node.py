@@ -24,7 +24,7 @@ from test_msgs.msg import Builtins
 SPEED, PERIOD = 0.2, 0.05  # [m/s], [s]
 
 
-class OtherNode(Node):  # type: ignore[misc] -- rclpy is not here
+class OtherNode(Node):  # type: ignore[misc]  # rclpy is not here
     """Drives, answers, counts, and says what it has heard."""
 
     def __init__(self) -> None:
