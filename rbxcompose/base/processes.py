@@ -17,6 +17,9 @@ MEMORY = 140_000_000  # [bytes] of address space beyond what it has at its start
 ANSWER = 20_000_000  # [bytes] that it may write in all, to files that are open already
 _HARMLESS = {"compile", "exec", "glob.glob", "glob.glob/2", "builtins.id"}
 _LISTS = ("os.listdir", "os.scandir")
+_PR_SET_PDEATHSIG = 1
+_NEW_USER, _NEW_NET = 0x10000000, 0x40000000
+_LIBC = ctypes.CDLL(None, use_errno=True)
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
@@ -30,24 +33,30 @@ def processor_time() -> float:
     return time.process_time()
 
 
-def fence(roots: Iterable[str], used: set[str], start: float) -> None:
+def fence(
+    roots: Iterable[str], used: set[str], start: float, what: str = "a description", also: Iterable[str] = ()
+) -> None:
     """Limit what this process can use from now on, and refuse whatever Python reports that is not needed.
 
     The files and folders that it reads, or tries to read, are added to `used`. `start` is the processor time [s] that
-    the start of such a process takes here.
+    the start of such a process takes here. `what` names the stranger's text in errors, which may cause the events that
+    `also` names as well.
     """
-    real = [os.path.realpath(root) for root in roots]
+    real = tuple(os.path.realpath(root) for root in roots)
+    harmless = frozenset((*_HARMLESS, *also))
+    if _LIBC.unshare(_NEW_NET):
+        _LIBC.unshare(_NEW_USER | _NEW_NET)  # where users may; then there is no network, whatever Python reports
     _limit(start)
 
     def audit(event: str, arguments: tuple[Any, ...]) -> None:
         if event == "open":
             if not _may_open(arguments[0], arguments[2], real):
-                raise PermissionError("a description may only read files of its project")
+                raise PermissionError(f"{what} may only read files of its project")
         elif event in _LISTS:
             if not _may_open(arguments[0], os.O_RDONLY, real):
-                raise PermissionError("a description may only list folders of its project")
-        elif event not in _HARMLESS:
-            raise PermissionError(f"a description may not use {event}")
+                raise PermissionError(f"{what} may only list folders of its project")
+        elif event not in harmless:
+            raise PermissionError(f"{what} may not use {event}")
         else:
             return
         if isinstance(arguments[0], str | bytes):
@@ -67,18 +76,15 @@ def _limit(start: float) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (ANSWER, ANSWER))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
+    resource.setrlimit(resource.RLIMIT_NPROC, (0, 0))  # which root has no limit of
 
 
-def _may_open(file: object, flags: int, roots: list[str]) -> bool:
+def _may_open(file: object, flags: int, roots: Iterable[str]) -> bool:
     if isinstance(file, int):  # it is open already
         return True
     return (
         isinstance(file, str | bytes) and not flags & _WRITES and is_below(os.path.realpath(os.fsdecode(file)), roots)
     )
-
-
-_PR_SET_PDEATHSIG = 1
-_LIBC = ctypes.CDLL(None, use_errno=True)
 
 
 def end_with(parent: int, number: signal.Signals) -> None:
