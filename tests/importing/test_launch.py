@@ -162,7 +162,7 @@ def test_packages_are_found_and_files_included_with_arguments(
         ('<launch><node pkg="a" exec="b"><param name="c" value="[&amp;a [1], *a]"/></node></launch>', "RBX2254"),
         ('<launch><node pkg="a" exec="b"><param name="c" value=".inf"/></node></launch>', "RBX2254"),
         (f'<launch><node pkg="a" exec="b"><param name="c" value="{"[" * 5000}"/></node></launch>', "RBX2254"),
-        (f'<launch><let name="a" value="{"x" * 19000}"/><let name="b" value="$(var a)$(var a)"/></launch>', "RBX2254"),
+        (f'<launch><let name="a" value="{"x" * 40000}"/><let name="b" value="$(var a)$(var a)"/></launch>', "RBX2254"),
     ],
 )
 def test_a_mistake_is_a_finding_with_its_place(text: str, code: str, tmp_path: Path) -> None:
@@ -292,6 +292,23 @@ def test_python_that_is_no_launch_file_is_a_finding(text: str, tmp_path: Path) -
 def test_the_place_of_an_error_is_its_line(tmp_path: Path) -> None:
     found = launch(tmp_path, f"{HEAD}\ndef generate_launch_description():\n    x = 1\n    x.y\n", "py")
     assert found.told == [("RBX2257", 7)]
+
+
+def test_a_function_that_fails_leaves_the_rest(tmp_path: Path) -> None:
+    rest = "    return LaunchDescription([OpaqueFunction(function=f), ExecuteProcess(cmd=['a'])])\n"
+    found = launch(tmp_path, f"{HEAD}def f(context):\n    1 / 0\ndef generate_launch_description():\n{rest}", "py")
+    assert found.told == [("RBX2257", 5)]
+    assert [*components(found)] == ["a"]
+
+
+def test_what_is_nested_in_files_that_are_nested_ends(tmp_path: Path) -> None:
+    groups = "<group>" * 60
+    for number in range(15):
+        inner = f'<include file="{number + 1}.launch.xml"/>'
+        text = f"<launch>{groups}{inner}{groups.replace('<', '</')}</launch>"
+        (tmp_path / f"{number}.launch.xml").write_text(text)
+    found = import_files([tmp_path / "0.launch.xml"], program="launch")
+    assert [one.code for one in found.report] == ["RBX1103"]
 
 
 def test_a_function_of_a_launch_file_sees_arguments_that_were_given(tmp_path: Path) -> None:

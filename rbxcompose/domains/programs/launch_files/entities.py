@@ -120,9 +120,9 @@ def _of_tree(kind: str, span: Span, node: TreeNode, report: Report) -> LaunchEnt
         elif name == "children" and isinstance(value, SequenceNode):
             children += _items(value, report)
         elif name == "value" and isinstance(value, SequenceNode):
-            children += (_item(one, report) for one in value.items)
+            children += (_item(each, report) for each in value.items)
         elif isinstance(value, SequenceNode):
-            children += (_of_tree(_kind(name), one.span, one, report) for one in value.items)
+            children += (_of_tree(_kind(name), each.span, each, report) for each in value.items)
         else:
             children.append(_of_tree(_kind(name), entry.key.span, value, report))
     return LaunchEntity(kind, span, given, tuple(children))
@@ -151,16 +151,20 @@ def _of_python(file: ForeignFile, context: SubstitutionContext, report: Report) 
     [answer] = fenced_answers(_CHILD, [json.dumps(request)], context.environment, _DEADLINE)
     try:
         found = json.loads(answer)
-        line = found.get("line") or 1
-        words, entities = found["error"], _decoded(found["entities"], file.name)
+        errors = [(plain(str(words), 300), _place(line, file.name)) for words, line in found["errors"]]
+        entities = _decoded(found["entities"], file.name)
     except (ValueError, TypeError, LookupError, AttributeError, RecursionError):
         words = f"'{plain(file.name)}' does not end within its limits of time and memory, or ends the process"
         report.add(NOT_RUN.at(here, words, help="a launch file may only declare what is to be started"))
         return ()
-    if words:
-        span = Span(file.name, line, 1, line, 2) if isinstance(line, int) and line > 0 else here
-        report.add(NOT_RUN.at(span, f"'{plain(file.name)}' cannot be run here: {plain(str(words), 300)}"))
+    report.extend(NOT_RUN.at(span, f"'{plain(file.name)}' cannot be run here: {words}") for words, span in errors)
     return entities
+
+
+def _place(line: Any, file: str) -> Span:
+    if not isinstance(line, int) or not 0 < line < 1_000_000:
+        raise ValueError("this is no line")
+    return Span(file, line, 1, line, 2)
 
 
 def _decoded(data: Any, file: str, depth: int = 0) -> tuple[LaunchEntity, ...]:
@@ -171,10 +175,7 @@ def _decoded(data: Any, file: str, depth: int = 0) -> tuple[LaunchEntity, ...]:
 
 
 def _decoded_entity(data: Any, file: str, depth: int) -> LaunchEntity:
-    line = int(data["line"])
-    if not 0 < line < 1_000_000:
-        raise ValueError("this is no line")
-    span = Span(file, line, 1, line, 2)
+    span = _place(data["line"], file)
     given = {str(name): Given(_decoded_text(text), span) for name, text in data["attributes"].items()}
     return LaunchEntity(str(data["kind"]), span, given, _decoded(data["children"], file, depth + 1))
 

@@ -32,12 +32,15 @@ from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 NO_VALUE = kind("RBX2255")
 NOT_INCLUDED = kind("RBX2256")
 
+_Pair = dict[str, str]
 Parameter = bool | int | float | str | list["Parameter"] | dict[str, "Parameter"]
 _MOST_ENTITIES = 10_000  # that are evaluated: includes may double them again and again
+_DEEPEST = 2 * DEPTH  # that they are nested, over all files
 _MOST_PYTHON = 20  # runs of files in Python
+_MANY = ("the transitions", "substitutions")
 _OF_ALL = ("if", "unless")
 _OF_PROGRAMS = (*_OF_ALL, "name", "output", "respawn", "respawn_delay", "respawn_max_retries", "cwd")
-_OF_NODES = (*_OF_PROGRAMS, "pkg", "exec", "exec_name", "namespace", "ns", "args", "ros_args")
+_OF_NODES = (*_OF_PROGRAMS, "pkg", "exec", "exec_name", "namespace", "args", "ros_args")
 _KNOWN: Mapping[str, tuple[str, ...]] = {
     "arg": (*_OF_ALL, "name", "default", "description"),
     "let": (*_OF_ALL, "name", "value"),
@@ -135,7 +138,7 @@ class Evaluation:
         self.sources: dict[str, str] = {}
         self._prefixes, self._environment, self._report = prefixes, environment, report
         self._unset: set[str] = set()
-        self._left, self._python = _MOST_ENTITIES, _MOST_PYTHON
+        self._left, self._python, self._depth = _MOST_ENTITIES, _MOST_PYTHON, 0
         self._open: list[Path] = []
         self._actions: dict[str, Callable[[LaunchEntity, _Scope], None]] = {
             "arg": self._argument,
@@ -149,7 +152,7 @@ class Evaluation:
             "timer": self._timer,
             "push_ros_namespace": self._push,
             "set_env": self._set_env,
-            "unset_env": self._set_env,
+            "unset_env": self._unset_env,
             "set_parameter": self._set_parameter,
             "set_remap": self._set_remap,
         }
@@ -171,22 +174,28 @@ class Evaluation:
         self._all(entities_of(file, scope.context, self._report), scope)
         self._open.pop()
 
-    def _all(self, entities: tuple[LaunchEntity, ...], scope: _Scope, depth: int = 0) -> None:
+    def _all(self, entities: tuple[LaunchEntity, ...], scope: _Scope) -> None:
+        self._depth += 1
         for entity in entities:
-            self._left -= 1
-            if self._left < 0 or depth > DEPTH:
-                if self._left == -1:
-                    words = f"more than {_MOST_ENTITIES:,} actions are included"
-                    self._report.add(TOO_LARGE.at(entity.span, words))
-                return
-            if entity.kind not in self._actions:
-                why = _WHY.get(entity.kind, "it is not known here")
-                shown = self._shown(entity, scope)
-                words = f"'{plain(entity.kind, 60)}'{shown} is not carried over: {why}"
-                self._report.add(NOT_CARRIED_OVER.at(entity.span, words))
-            elif self._holds(entity, scope):
+            self._left -= 1 if self._depth < _DEEPEST else self._left + 1
+            if self._left == -1:
+                words = f"more than {_MOST_ENTITIES:,} actions are included, or they are nested too deep"
+                self._report.add(TOO_LARGE.at(entity.span, words))
+            if self._left < 0:
+                break
+            if not self._holds(entity, scope):
+                continue
+            if (act := self._actions.get(entity.kind)) is not None:
                 self._check(entity)
-                self._actions[entity.kind](entity, scope)
+                act(entity, scope)
+            else:
+                words = f"'{plain(entity.kind, 60)}'{self._shown(entity, scope)}"
+                self._leave(entity.span, words, _WHY.get(entity.kind, "it is not known here"))
+        self._depth -= 1
+
+    def _leave(self, span: Span, what: str, why: str, help_text: str = "") -> None:
+        verb = "are" if what.startswith(_MANY) else "is"
+        self._report.add(NOT_CARRIED_OVER.at(span, f"{what} {verb} not carried over: {why}", help=help_text))
 
     def _shown(self, entity: LaunchEntity, scope: _Scope) -> str:
         """Return in brackets what an action is about, where it says so."""
@@ -221,17 +230,15 @@ class Evaluation:
         known, parts, shown = _KNOWN[entity.kind], _PARTS.get(entity.kind, ()), f"'{entity.kind}'"
         for name, given in entity.attributes.items():
             if name in _LEFT:
-                words = f"'{name}' of {shown} is not carried over: nothing here has the same effect"
-                self._report.add(NOT_CARRIED_OVER.at(given.span, words))
+                self._leave(given.span, f"'{name}' of {shown}", "nothing here has the same effect")
             elif name == TEXT:
-                self._report.add(NOT_CARRIED_OVER.at(given.span, f"the text in {shown} is not carried over"))
+                self._leave(given.span, f"the text in {shown}", "only elements count")
             elif name not in known:
                 words = f"unknown attribute '{plain(name, 60)}' of {shown}"
                 self._report.add(UNKNOWN_KEY.misspelt(given.span, words, name, known, KEYS))
         for child in entity.children if entity.kind not in ("group", "timer") else ():
             if child.kind not in parts:
-                words = f"'{plain(child.kind, 60)}' in {shown} is not carried over: it is not known here"
-                self._report.add(NOT_CARRIED_OVER.at(child.span, words))
+                self._leave(child.span, f"'{plain(child.kind, 60)}' in {shown}", "it is not known here")
             elif child.kind in _KNOWN and child.kind != "arg":
                 self._check(child)
 
@@ -256,6 +263,11 @@ class Evaluation:
     def _needed(self, entity: LaunchEntity, name: str, scope: _Scope) -> str | None:
         return None if attribute(entity, name, self._report) is None else self._text(entity, name, scope)
 
+    def _pair(self, entity: LaunchEntity, scope: _Scope, first: str = "name", second: str = "value") -> _Pair:
+        """Return two attributes that belong together, as a map of one entry; empty if one is missing."""
+        left, right = self._needed(entity, first, scope), self._needed(entity, second, scope)
+        return {} if left is None or right is None else {left: right}
+
     def _argument(self, entity: LaunchEntity, scope: _Scope) -> None:
         name = self._needed(entity, "name", scope)
         if name is None:
@@ -270,41 +282,41 @@ class Evaluation:
             self._unset.add(name)
             return
         self._unset.discard(name)
-        choices = [self._text(one, "value", scope) for one in entity.all("choice")]
+        choices = [self._text(each, "value", scope) for each in entity.all("choice")]
         if choices and values[name] not in choices:
             words = f"'{plain(values[name], 60)}' is no choice for the argument '{plain(name, 60)}'"
-            names = [one for one in choices if one is not None]
+            names = [each for each in choices if each is not None]
             self._report.add(NO_VALUE.misspelt(entity.span, words, values[name], names, "its choices"))
         description = self._text(entity, "description", scope) or ""
         self.arguments.setdefault(name, LaunchArgument(values[name], entity.span, description))
 
     def _let(self, entity: LaunchEntity, scope: _Scope) -> None:
-        name, value = self._needed(entity, "name", scope), self._needed(entity, "value", scope)
-        if name is not None and value is not None:
-            scope.context.values[name] = value
-            self._unset.discard(name)
-        elif name is not None:
+        found = self._pair(entity, scope)
+        scope.context.values |= found
+        self._unset -= found.keys()
+        if not found and (name := self._text(entity, "name", scope)) is not None:
             self._unset.add(name)
 
     def _group(self, entity: LaunchEntity, scope: _Scope) -> None:
         self._all(entity.children, scope if self._flag(entity, "scoped", scope) is False else scope.copy())
 
     def _timer(self, entity: LaunchEntity, scope: _Scope) -> None:
-        words = "'timer' is not carried over: what it delays starts with the others"
-        self._report.add(NOT_CARRIED_OVER.at(entity.span, words, help="say what it waits for: 'starts_after: [NAME]'"))
+        help_text = "say what it waits for: 'starts_after: [NAME]'"
+        self._leave(entity.span, "'timer'", "what it delays starts with the others", help_text)
         self._all(entity.children, scope)
 
     def _push(self, entity: LaunchEntity, scope: _Scope) -> None:
         scope.namespace = _namespace(scope.namespace, self._needed(entity, "namespace", scope) or "")
 
     def _set_env(self, entity: LaunchEntity, scope: _Scope) -> None:
-        name = self._needed(entity, "name", scope)
-        value = self._needed(entity, "value", scope) if entity.kind == "set_env" else None
-        for variables in (scope.environment, scope.context.environment):
-            if name is not None and value is not None:
-                variables[name] = value
-            elif name is not None:
-                variables.pop(name, None)
+        found = self._pair(entity, scope)
+        scope.environment |= found
+        scope.context.environment |= found
+
+    def _unset_env(self, entity: LaunchEntity, scope: _Scope) -> None:
+        name = self._needed(entity, "name", scope) or ""
+        scope.environment.pop(name, None)
+        scope.context.environment.pop(name, None)
 
     def _set_parameter(self, entity: LaunchEntity, scope: _Scope) -> None:
         name, value = self._needed(entity, "name", scope), self._value(entity, scope)
@@ -312,9 +324,7 @@ class Evaluation:
             scope.parameters[name] = value
 
     def _set_remap(self, entity: LaunchEntity, scope: _Scope) -> None:
-        origin, target = self._needed(entity, "from", scope), self._needed(entity, "to", scope)
-        if origin is not None and target is not None:
-            scope.remaps.setdefault(origin, target)
+        scope.remaps = self._pair(entity, scope, "from", "to") | scope.remaps
 
     def _include(self, entity: LaunchEntity, scope: _Scope) -> None:
         written = self._needed(entity, "file", scope)
@@ -362,16 +372,13 @@ class Evaluation:
         program = LaunchedProgram(wanted, entity.span, package, executable, name, words=words)
         if ros := self._words(replace(entity, children=()), "ros_args", scope):
             program.words += ["--ros-args", *ros, "--"]
-        given = self._text(entity, "namespace", scope) or self._text(entity, "ns", scope) or ""
+        given = self._text(entity, "namespace", scope) or ""
         program.namespace = _namespace(scope.namespace, given)
         if "cwd" in entity.attributes:
-            words_ = "'cwd' of 'node' is not carried over: a node runs in the folder of the robot"
-            self._report.add(NOT_CARRIED_OVER.at(entity.attributes["cwd"].span, words_))
+            self._leave(entity.attributes["cwd"].span, "'cwd' of 'node'", "a node runs in the folder of the robot")
         program.remaps = dict(scope.remaps)
-        for remap in entity.all("remap"):
-            origin, target = self._needed(remap, "from", scope), self._needed(remap, "to", scope)
-            if origin is not None and target is not None:
-                program.remaps.setdefault(origin, target)
+        for remap in entity.all("remap"):  # the first one of a name counts
+            program.remaps = {**self._pair(remap, scope, "from", "to"), **program.remaps}
         self._parameters(program, entity, scope)
         self._common(program, entity, scope)
         self._report_rest_of(program, entity, scope)
@@ -380,24 +387,21 @@ class Evaluation:
         """Report what a node needs beside its process."""
         shown = f"'{plain(program.wanted, 60)}'"
         if entity.kind == "lifecycle_node":
-            words = f"the transitions of {shown} are not carried over: nobody configures and activates it"
             help_text = "send them by 'ros2 lifecycle set', or by a lifecycle manager"
-            self._report.add(NOT_CARRIED_OVER.at(entity.span, words, help=help_text))
+            self._leave(entity.span, f"the transitions of {shown}", "nobody configures and activates it", help_text)
         for child in entity.all("composable_node"):
             plugin, package = self._text(child, "plugin", scope), self._text(child, "pkg", scope)
             target = f"{program.namespace}/{program.name or program.wanted}"
-            words = f"the plug-in '{plain(plugin or '?', 60)}' is not carried over: nobody loads it into {shown}"
             load = " ".join(plain(each, 60) for each in (target, package or "PACKAGE", plugin or "PLUGIN"))
             help_text = f"load it by 'ros2 component load {load}', or run its own executable as another 'ros2_node'"
-            self._report.add(NOT_CARRIED_OVER.at(child.span, words, help=help_text))
+            words = f"the plug-in '{plain(plugin or '?', 60)}'"
+            self._leave(child.span, words, f"nobody loads it into {shown}", help_text)
 
     def _common(self, program: LaunchedProgram, entity: LaunchEntity, scope: _Scope) -> None:
         """Add what all programs may have, and the program."""
         program.environment = dict(scope.environment)
         for variable in entity.all("env"):
-            name, value = self._needed(variable, "name", scope), self._needed(variable, "value", scope)
-            if name is not None and value is not None:
-                program.environment[name] = value
+            program.environment |= self._pair(variable, scope)
         if "output" in entity.attributes:
             self.outputs.append(entity.attributes["output"].span)
         if (respawn := self._flag(entity, "respawn", scope)) is not None:
@@ -418,9 +422,9 @@ class Evaluation:
             elif program.restart.get("when") == "always":
                 program.restart["backoff"] = f"{seconds:g} s"
         if (retries := self._text(entity, "respawn_max_retries", scope)) not in (None, "-1"):
-            words = f"'respawn_max_retries' {plain(str(retries), 60)} is not carried over: it starts again for ever"
             span = entity.attributes["respawn_max_retries"].span
-            self._report.add(NOT_CARRIED_OVER.at(span, words, help="write 'when: on_failure' with 'max'"))
+            help_text = "write 'when: on_failure' with 'max'"
+            self._leave(span, f"'respawn_max_retries' {plain(str(retries), 60)}", "it starts again for ever", help_text)
 
     def _words(self, entity: LaunchEntity, name: str, scope: _Scope) -> list[str] | None:
         """Return the words of a command line, from a text or listed; None after a finding."""
@@ -470,8 +474,7 @@ class Evaluation:
                 related = [Related(first, "a single value before it")]
                 self._report.add(NOT_CARRIED_OVER.at(span, words, related=related))
             if "allow_substs" in param.attributes:
-                words = "substitutions in this file are not carried over: it is read as it is"
-                self._report.add(NOT_CARRIED_OVER.at(span, words))
+                self._leave(span, "substitutions in this file", "it is read as it is")
 
     def _parameter(self, known: dict[str, Parameter], param: LaunchEntity, scope: _Scope, depth: int = 0) -> None:
         name = self._needed(param, "name", scope)
@@ -492,15 +495,15 @@ class Evaluation:
         items = list(param.all("item"))
         if items:
             found = [self._value(item, scope) for item in items]
-            return None if None in found else [one for one in found if one is not None]
+            return None if None in found else [each for each in found if each is not None]
         text, type_ = self._needed(param, "value", scope), self._text(param, "type", scope) or "auto"
         if text is None:
             return None
         between = self._text(param, "value-sep", scope)
         texts = text.split(between) if between else [text]
         try:
-            values = [_typed(one, type_) for one in texts]
-        except (ValueError, TypeError, RecursionError, yaml.YAMLError):
+            values = [_typed(each, type_) for each in texts]
+        except (ValueError, TypeError, KeyError, RecursionError):
             words = f"'{plain(text, 60)}' is no value of a parameter of type '{plain(type_, 60)}'"
             self._report.add(NOT_KNOWN.at(param.attributes["value"].span, words))
             return None
@@ -512,7 +515,7 @@ def _variables(text: LaunchText) -> Iterator[str]:
     for piece in text:
         if isinstance(piece, SubstitutionCall):
             if piece.name == "var" and piece.arguments:
-                yield "".join(one for one in piece.arguments[0] if isinstance(one, str))
+                yield "".join(each for each in piece.arguments[0] if isinstance(each, str))
             for argument in piece.arguments:
                 yield from _variables(argument)
 
@@ -534,20 +537,23 @@ def _typed(text: str, type_: str) -> Parameter:
         return text
     if "&" in text and text.lstrip()[:1] in ("[", "{"):
         raise ValueError("no anchors")  # a few of them could stand for any number of values
-    value = yaml.safe_load(text) if type_ in ("auto", "yaml") or type_.startswith("list") else None
+    value: object = None
+    if type_ in ("auto", "yaml") or type_.startswith("list"):
+        try:
+            value = yaml.safe_load(text)
+        except yaml.YAMLError:
+            value = text
     match type_:
         case "bool":
-            value = {"true": True, "false": False}[text.strip().lower()] if text.strip().lower() in _FLAGS else None
+            value = _FLAGS[text.strip().lower()]
         case "int":
             value = int(text)
         case "float" | "double":
             value = float(text)
-    if isinstance(value, list):
-        return [_single(one, str(one)) for one in value]
-    return _single(value, text)
+    return [_single(each, str(each)) for each in value] if isinstance(value, list) else _single(value, text)
 
 
-_FLAGS = ("true", "false")
+_FLAGS = {"true": True, "false": False}
 
 
 def _single(value: object, text: str) -> Parameter:
@@ -558,6 +564,6 @@ def _single(value: object, text: str) -> Parameter:
             return value
         case float() if math.isfinite(value) and abs(value) < MOST:
             return value
-        case int() | float() | dict() | list() | bytes():
+        case int() | float() | list():
             raise ValueError("no value")
-    return text  # of YAML's other types, such as dates, ROS knows none
+    return text  # of other types, such as dates and maps, ROS makes texts

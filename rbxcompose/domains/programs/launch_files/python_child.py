@@ -38,6 +38,7 @@ _OFFERED = (
 )  # fmt: skip
 """Modules that a file may import: much of what they do is refused, but not their names."""
 _REMOVED = ("rbxcompose", "ctypes", "_ctypes", "resource", "gc")
+Errors = list[tuple[str, int]]
 _HARMLESS = ("sys._getframe", "os.putenv", "os.unsetenv")
 
 
@@ -57,10 +58,13 @@ def _answer(request: Data, start: float) -> Data:
         del sys.modules[name]
     fence(request["roots"], set(), start, "a launch file", _HARMLESS)
     builtins.__import__ = _limited(builtins.__import__)
+    errors: Errors = []
+    entities: list[Data] = []
     try:
-        return {"error": "", "line": 1, "entities": _run(request["text"], request["file"], context)}
+        entities += _entities(_run(request["text"], request["file"]), context, errors)
     except BaseException as error:  # it may raise anything
-        return {"error": _words(error), "line": _line(error), "entities": []}
+        errors.append((_words(error), _line(error)))
+    return {"errors": errors, "entities": entities}
 
 
 def _limited(load: Callable[..., ModuleType]) -> Callable[..., ModuleType]:
@@ -76,7 +80,7 @@ def _limited(load: Callable[..., ModuleType]) -> Callable[..., ModuleType]:
     return limited
 
 
-def _run(text: str, file: str, context: SubstitutionContext) -> list[Data]:
+def _run(text: str, file: str) -> Iterable[Any]:
     names: Data = {"__name__": "launch_file", "__file__": file, FILE: True}
     exec(compile(text, file, "exec"), names)  # noqa: S102  (within the fence)
     if "generate_launch_description" not in names:
@@ -84,20 +88,20 @@ def _run(text: str, file: str, context: SubstitutionContext) -> list[Data]:
     found = names["generate_launch_description"]()
     if not isinstance(found, LaunchDescription):
         raise TypeError("'generate_launch_description' returns no LaunchDescription")
-    return [*_entities(found.entities, context)]
+    return found.entities
 
 
-def _entities(actions: Iterable[Any], context: SubstitutionContext) -> Iterator[Data]:
+def _entities(actions: Iterable[Any], context: SubstitutionContext, errors: Errors) -> Iterator[Data]:
     """Yield what actions declare; functions among them are called with the values that arguments have up to there."""
     for action in actions:
         if isinstance(action, LaunchDescription):
-            yield entity("group", {"scoped": "false"}, _entities(action.entities, context))
+            yield entity("group", {"scoped": "false"}, _entities(action.entities, context, errors))
         elif not isinstance(action, DeclaredAction):
             raise TypeError(f"a {type(action).__name__} is no action")
         else:
             if isinstance(action, UnknownStandIn) or _holds(action, context):
                 _set(action.entity, context)
-                action.entity["children"] += _below(action, context)
+                action.entity["children"] += _below(action, context, errors)
             if action.kind == "function":
                 action.entity |= {"kind": "group"}
                 action.entity["attributes"] = {**_condition(action), "scoped": ("false",)}
@@ -108,16 +112,20 @@ def _condition(action: DeclaredAction) -> Data:
     return {} if action.condition is None else {action.condition.name: action.condition.text}
 
 
-def _below(action: DeclaredAction, context: SubstitutionContext) -> list[Data]:
+def _below(action: DeclaredAction, context: SubstitutionContext, errors: Errors) -> list[Data]:
     if action.kind == "function":
         named = action.named
-        found = action.function(LaunchContext(context), *named.get("args") or (), **named.get("kwargs") or {})
-        return [*_entities(found or (), context)]
+        try:
+            found = action.function(LaunchContext(context), *named.get("args") or (), **named.get("kwargs") or {})
+            return [*_entities(found or (), context, errors)]
+        except BaseException as error:  # the others may be fine
+            errors.append((_words(error), _line(error, 1)))
+            return []
     is_scoped = action.entity["attributes"].get("scoped") != ("false",)
     inner = replace(context, values=dict(context.values)) if is_scoped else context
     for child in action.entity["children"] if action.kind == "group" else ():
         _set(child, inner)
-    return [*_entities(action.actions, inner)]
+    return [*_entities(action.actions, inner, errors)]
 
 
 def _holds(action: DeclaredAction, context: SubstitutionContext) -> bool:
@@ -153,11 +161,11 @@ def _words(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"
 
 
-def _line(error: BaseException) -> int:
+def _line(error: BaseException, above: int = 2) -> int:
     """Return the line in the file that an error comes from: below this module's own, the first that is no stand-in."""
     if isinstance(error, SyntaxError):
         return error.lineno or 1
     trace = error.__traceback__
-    for _ in range(2):
+    for _ in range(above):
         trace = trace.tb_next if trace is not None else None
     return trace.tb_lineno if trace is not None else line_here()

@@ -51,7 +51,7 @@ def text_of(value: Any) -> LaunchText:
         case bool():
             return ("true" if value else "false",)
         case list() | tuple():
-            return tuple(piece for one in value for piece in text_of(one))
+            return tuple(piece for each in value for piece in text_of(each))
     return (str(value),)
 
 
@@ -89,7 +89,7 @@ def _substitution(call: str, *names: str, is_list: bool = False) -> type[Substit
         values = {**dict(zip(names, given, strict=False)), **named}
         listed = [values[name] for name in names if values.get(name) is not None]
         if is_list:
-            listed = [one for value in given or named.values() for one in (value if _is_list(value) else [value])]
+            listed = [each for value in given or named.values() for each in (value if _is_list(value) else [value])]
         Substitution.__init__(self, SubstitutionCall(call, tuple(map(text_of, listed))))
 
     return type("Substitution", (Substitution,), {"__init__": begin})
@@ -161,21 +161,21 @@ def _valued(kind: str, value: Any, **given: Any) -> Data:
         type_, value = value.type, value.value
     if isinstance(value, Mapping):
         return entity(kind, given, [_valued("param", below, name=name) for name, below in value.items()])
-    if _is_list(value) and not any(isinstance(one, Substitution) for one in value):
-        return entity(kind, given, [_valued("item", one) for one in value])
+    if _is_list(value) and not any(isinstance(each, Substitution) for each in value):
+        return entity(kind, given, [_valued("item", each) for each in value])
     if type_ is None and isinstance(value, bool | int | float | str):
         type_ = type(value).__name__
     return entity(kind, {**given, "value": value, "type": type_})
 
 
 def _parameters(parameters: Any) -> Iterator[Data]:
-    for one in [parameters] if isinstance(parameters, Mapping) else _listed(parameters):
-        if isinstance(one, Mapping):
-            yield from (_valued("param", value, name=name) for name, value in one.items())
-        elif isinstance(one, ParameterFile):
-            yield one.entity
+    for each in [parameters] if isinstance(parameters, Mapping) else _listed(parameters):
+        if isinstance(each, Mapping):
+            yield from (_valued("param", value, name=name) for name, value in each.items())
+        elif isinstance(each, ParameterFile):
+            yield each.entity
         else:
-            yield entity("param", {"from": one})
+            yield entity("param", {"from": each})
 
 
 _NAMES = {
@@ -198,8 +198,8 @@ Part = Callable[[Any], Iterable[Data]]
 
 def _pairs(kind: str, first: str, second: str) -> Part:
     def parts(value: Any) -> Iterator[Data]:
-        for one, other in value.items() if isinstance(value, Mapping) else value or ():
-            yield entity(kind, {first: one, second: other})
+        for each, other in value.items() if isinstance(value, Mapping) else value or ():
+            yield entity(kind, {first: each, second: other})
 
     return parts
 
@@ -211,10 +211,10 @@ _PARTS: dict[str, Part] = {
     "additional_env": _pairs("env", "name", "value"),
     "launch_arguments": _pairs("arg", "name", "value"),
     "launch_configurations": _pairs(LET, "name", "value"),
-    "arguments": lambda value: (entity("word", {"value": one}) for one in _listed(value)),
-    "cmd": lambda value: (entity("word", {"value": one}) for one in _listed(value)),
-    "choices": lambda value: (entity("choice", {"value": one}) for one in value or ()),
-    "composable_node_descriptions": lambda value: (one.entity for one in value or ()),
+    "arguments": lambda value: (entity("word", {"value": each}) for each in _listed(value)),
+    "cmd": lambda value: (entity("word", {"value": each}) for each in _listed(value)),
+    "choices": lambda value: (entity("choice", {"value": each}) for each in value or ()),
+    "composable_node_descriptions": lambda value: (each.entity for each in value or ()),
 }
 """Arguments that become children."""
 
@@ -276,7 +276,7 @@ def _started(values: Iterable[Any], depth: int = 0) -> Iterator[str]:
             yield from _started(value.given, depth + 1)
         elif isinstance(value, DeclaredAction):
             found = value.entity["attributes"].get("exec", ())
-            yield "".join(one for one in found if isinstance(one, str)) or value.kind
+            yield "".join(each for each in found if isinstance(each, str)) or value.kind
         elif isinstance(value, list | tuple):
             yield from _started(value, depth + 1)
 

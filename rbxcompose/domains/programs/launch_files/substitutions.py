@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.printable import plain
 
-MOST = 20_000  # characters of a text that is filled in, and of one that is read
+MOST = 64_000  # characters of a text that is filled in, and of one that is read
 _DEPTH = 16  # of substitutions in each other
 _PACKAGE = re.compile(r"[A-Za-z][\w-]*", re.ASCII)
 _FLAGS = {"true": True, "1": True, "false": False, "0": False}
@@ -106,9 +106,11 @@ class SubstitutionContext:
         Raises:
             UnknownValueError: if something in it is not known here.
         """
-        found = "".join(piece if isinstance(piece, str) else self._performed(piece) for piece in text)
-        if len(found) > MOST:
-            raise UnknownValueError(f"it becomes longer than {MOST:,} characters")
+        found = ""
+        for piece in text:
+            found += piece if isinstance(piece, str) else self._performed(piece)
+            if len(found) > MOST:
+                raise UnknownValueError(f"it becomes longer than {MOST:,} characters")
         return found
 
     def holds(self, text: LaunchText) -> bool:
@@ -197,9 +199,9 @@ _KNOWN: dict[str, tuple[Callable[..., str], int, int]] = {
     "rewritten": (_rewritten, 1, 1),
     "eval": (lambda context, *given: evaluated(" ".join(map(str, given))), 1, _SOME),
     "join-path": (lambda context, *given: str(Path(*map(str, given))), 0, _SOME),
-    "not": (lambda context, one: _flag(not context.holds(one.text)), 1, 1),
-    "and": (lambda context, *given: _flag(all(context.holds(one.text) for one in given)), 1, _SOME),
-    "or": (lambda context, *given: _flag(any(context.holds(one.text) for one in given)), 1, _SOME),
+    "not": (lambda context, each: _flag(not context.holds(each.text)), 1, 1),
+    "and": (lambda context, *given: _flag(all(context.holds(each.text) for each in given)), 1, _SOME),
+    "or": (lambda context, *given: _flag(any(context.holds(each.text) for each in given)), 1, _SOME),
     "equals": (lambda context, left, right: _flag(str(left) == str(right)), 2, 2),
     "not-equals": (lambda context, left, right: _flag(str(left) != str(right)), 2, 2),
     "if": (lambda context, which, yes, no="": str(yes if context.holds(which.text) else no), 2, 3),
@@ -228,8 +230,8 @@ _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.LtE: operator.le,
     ast.Gt: operator.gt,
     ast.GtE: operator.ge,
-    ast.In: lambda one, many: one in many,
-    ast.NotIn: lambda one, many: one not in many,
+    ast.In: lambda each, many: each in many,
+    ast.NotIn: lambda each, many: each not in many,
 }
 _LONGEST = 2_000  # characters of an expression
 
@@ -267,13 +269,13 @@ def _value(node: ast.expr) -> Any:
             return _UNARY[type(node.op)](_value(node.operand))
         case ast.BinOp() if type(node.op) in _BINARY:
             return _small(_BINARY[type(node.op)], _value(node.left), _value(node.right))
-        case ast.Compare() if all(type(one) in _COMPARE for one in node.ops):
-            values = [_value(one) for one in (node.left, *node.comparators)]
+        case ast.Compare() if all(type(each) in _COMPARE for each in node.ops):
+            values = [_value(each) for each in (node.left, *node.comparators)]
             return all(map(_compared, node.ops, values, values[1:]))
         case ast.IfExp():
             return _value(node.body if _value(node.test) else node.orelse)
         case ast.List() | ast.Tuple():
-            return [_value(one) for one in node.elts]
+            return [_value(each) for each in node.elts]
     raise UnknownValueError(f"'{plain(ast.unparse(node), 60)}' is not evaluated: only numbers, texts and operators are")
 
 
