@@ -15,6 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.commands import main as command
+from rbxcompose.domains.programs.launch_files.evaluation import _KNOWN
 from rbxcompose.domains.programs.launch_files.substitutions import UnknownValueError, evaluated, read_launch_text
 from rbxcompose.testing.golden import Golden
 from tests.importing.imports import EXAMPLES, Imported, import_files
@@ -96,6 +97,34 @@ def test_xml_and_yaml_say_the_same(tmp_path: Path, actions: list[Any]) -> None:
     in_xml = launch(tmp_path, xml("launch", actions))
     assert without_comments(in_yaml.text) == without_comments(in_xml.text)
     assert [one.code for one in in_yaml.report] == [one.code for one in in_xml.report]
+
+
+KINDS = st.sampled_from([*_KNOWN, "composable_node", "item", "word", "choice", "log", "strange"])
+GIVEN = st.sampled_from(sorted({name for names in _KNOWN.values() for name in names} - {"file"}))
+PIECES = ("$(var a)", "$(var b c)", "$(eval 1 + 1)", "$(eval '", "$(env HOME)", "$(not true)", "$(", ")", "[1, x]",
+          "{a: ", "true", "/a/b", "3.5", "-1", "'", "*a", "!!python/none", "2020-01-01", "\u202e", " ")  # fmt: skip
+WRITTEN = st.lists(st.sampled_from(PIECES), max_size=3).map("".join)
+ELEMENTS: st.SearchStrategy[Any] = st.recursive(
+    st.tuples(KINDS, st.dictionaries(GIVEN, WRITTEN, max_size=5), st.just([])),
+    lambda inner: st.tuples(KINDS, st.dictionaries(GIVEN, WRITTEN, max_size=5), st.lists(inner, max_size=4)),
+    max_leaves=12,
+)
+
+
+def element(kind: str, given: dict[str, str], children: list[Any]) -> str:
+    attributes = "".join(f" {name}={quoteattr(value)}" for name, value in given.items())
+    return f"<{kind}{attributes}>{''.join(element(*child) for child in children)}</{kind}>"
+
+
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(ELEMENTS, max_size=5))
+def test_whatever_a_launch_file_says_a_manifest_without_mistakes_of_yaml_or_a_finding_comes_of_it(
+    tmp_path: Path, elements: list[Any]
+) -> None:
+    found = launch(tmp_path, element("launch", {}, elements))
+    assert found.text or list(found.report)
+    assert not found.text or components(found)
+    assert all(one.span for one in found.report if one.code != "RBX2238")
 
 
 def test_arguments_come_from_the_command_line(
