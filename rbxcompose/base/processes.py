@@ -51,10 +51,10 @@ def fence(
     def audit(event: str, arguments: tuple[Any, ...]) -> None:
         if event == "open":
             if not _may_open(arguments[0], arguments[2], real):
-                raise PermissionError(f"{what} may only read files of its project")
+                raise PermissionError(f"{what} may only read files of its project, not {arguments[0]!r}")
         elif event in _LISTS:
             if not _may_open(arguments[0], os.O_RDONLY, real):
-                raise PermissionError(f"{what} may only list folders of its project")
+                raise PermissionError(f"{what} may only list folders of its project, not {arguments[0]!r}")
         elif event not in harmless:
             raise PermissionError(f"{what} may not use {event}")
         else:

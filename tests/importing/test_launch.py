@@ -279,10 +279,11 @@ BAD = {
     "it returns nothing": ("return None", "no LaunchDescription"),
     "it returns strange things": ("return LaunchDescription([3])", "no action"),
     "it declares without end": ("return LaunchDescription(iter(lambda: LogInfo(msg='a'), 1))", "memory"),
-    "it looks for a package": (
-        "from ament_index_python.packages import get_package_share_directory as f\n    f('base')",
-        "no package 'base'",
+    "it reads a package that is not there": (
+        "from ament_index_python.packages import get_package_share_directory as f\n    open(f('base'))",
+        "'$(find-pkg-share base)'",
     ),
+    "it asks for what is not known": ("from launch.events import a\n    if a(): pass", "'a' is not known"),
 }  # fmt: skip
 
 
@@ -321,6 +322,37 @@ def test_python_that_is_no_launch_file_is_a_finding(text: str, tmp_path: Path) -
 def test_the_place_of_an_error_is_its_line(tmp_path: Path) -> None:
     found = launch(tmp_path, f"{HEAD}\ndef generate_launch_description():\n    x = 1\n    x.y\n", "py")
     assert found.told == [("RBX2257", 7)]
+
+
+IN_PACKAGE = """
+from ament_index_python.packages import get_package_share_directory
+from launch_ros.actions import Node
+from launch_ros.substitutions import FindPackageShare
+
+
+def generate_launch_description():
+    own = get_package_share_directory("own")
+    other = FindPackageShare("other").find("other")
+    missing = os.path.join(get_package_share_directory("missing"), "a.yaml")
+    text = open(os.path.join(own, "words.txt")).read()
+    return LaunchDescription(
+        [
+            Node(package="own", executable="a", arguments=[other, text]),
+            Node(package="own", executable="b", parameters=[missing, {"c": 1}]),
+        ]
+    )
+"""
+
+
+def test_a_package_is_found_in_its_workspace_and_without_one_only_what_needs_it_is_left_out(tmp_path: Path) -> None:
+    for package in ("own", "other"):
+        (tmp_path / package / "launch").mkdir(parents=True)
+        (tmp_path / package / "package.xml").write_text("<package/>")
+    (tmp_path / "own/words.txt").write_text("hello")
+    found = launch(tmp_path / "own/launch", HEAD + IN_PACKAGE, "py")
+    assert components(found)["a"]["arguments"] == [str(tmp_path / "other"), "hello"]
+    assert components(found)["b"]["parameters"] == {"c": 1}
+    assert [one.code for one in found.report] == ["RBX2299", "RBX2254"]
 
 
 def test_a_function_that_fails_leaves_the_rest(tmp_path: Path) -> None:

@@ -1,1 +1,1 @@
-"""Programs beside the components: nodes of ROS 2, and any other program, which the robot starts."""
+"""Programs of others: executables, containers and ROS 2 nodes as components."""

@@ -140,13 +140,13 @@ def _item(node: TreeNode, report: Report) -> LaunchEntity:
 
 def _of_python(file: ForeignFile, context: SubstitutionContext, report: Report) -> tuple[LaunchEntity, ...]:
     here = Span(file.name, 1, 1, 1, 2)
-    folder = context.file.parent
+    above = next((each for each in context.file.parents if (each / "package.xml").is_file()), context.file).parent
     request = {
         "file": str(context.file),
         "text": file.text,
         "values": context.values,
         "prefixes": [str(prefix) for prefix in context.prefixes],
-        "roots": [str(folder.parent if folder.name == "launch" else folder), *map(str, context.prefixes)],
+        "roots": [str(above), *map(str, context.prefixes)],
     }
     [answer] = fenced_answers(_CHILD, [json.dumps(request)], context.environment, _DEADLINE)
     try:

@@ -56,24 +56,35 @@ _KNOWN: Mapping[str, tuple[str, ...]] = {
     "unset_env": (*_OF_ALL, "name"),
     "set_parameter": (*_OF_ALL, "name", "value", "type"),
     "set_remap": (*_OF_ALL, "from", "to"),
+    "load_composable_node": (*_OF_ALL, "target"),
     "param": ("name", "value", "value-sep", "from", "type", "allow_substs"),
     "remap": ("from", "to"),
     "env": ("name", "value"),
 }
 _PARTS: Mapping[str, tuple[str, ...]] = {
-    **dict.fromkeys(("node", "lifecycle_node"), ("param", "remap", "env", "word")),
-    "node_container": ("param", "remap", "env", "word", "composable_node"),
-    "executable": ("env", "word"),
+    **dict.fromkeys(("node", "lifecycle_node"), ("param", "remap", "env", "argument")),
+    "node_container": ("param", "remap", "env", "argument", "composable_node"),
+    "executable": ("env", "argument"),
     "include": ("arg", "let"),
     "param": ("param", "item"),
     "arg": ("choice",),
+    "load_composable_node": ("composable_node",),
 }
 """The children of each kind that are parts of it."""
-_LEFT = ("launch-prefix", "emulate_tty", "sigterm_timeout", "sigkill_timeout", "forwarding", "on_exit", "log_cmd")
+_LEFT = (
+    "launch-prefix",
+    "emulate_tty",
+    "sigterm_timeout",
+    "sigkill_timeout",
+    "forwarding",
+    "on_exit",
+    "log_cmd",
+    "autostart",
+)
 _WHY = {
     "log": "it only prints",
+    "RegisterEventHandler": "events start nothing here",
     "shutdown": "the supervisor decides when a robot goes down",
-    "load_composable_node": "no container loads plug-ins by itself here",
 }
 _INTEGERS = 1 << 63
 _BODY = "in the place of 'robot_description', write 'body: {xacro: FILE}'"
@@ -148,6 +159,7 @@ class Evaluation:
             "node_container": self._node,
             "executable": self._executable,
             "include": self._include,
+            "load_composable_node": self._load,
             "group": self._group,
             "timer": self._timer,
             "push_ros_namespace": self._push,
@@ -209,7 +221,7 @@ class Evaluation:
             yield
         except UnknownValueError as error:
             if given is not None and not any(name in self._unset for name in _variables(given.value)):
-                help_text = _BODY if "$(command)" in str(error) else ""
+                help_text = _BODY if "(robot_description)" in what else ""
                 self._report.add(NOT_KNOWN.at(given.span, f"{what} is not known: {error}", help=help_text))
 
     def _holds(self, entity: LaunchEntity, scope: _Scope) -> bool:
@@ -248,7 +260,7 @@ class Evaluation:
         if given is None:
             return None
         found, words = None, f"'{name}' of '{entity.kind}'"
-        if name == "value" and (of := entity.attributes.get("name")) is not None:
+        if name in ("value", "default") and (of := entity.attributes.get("name")) is not None:
             words += f" ({plain(''.join(one for one in of.value if isinstance(one, str)), 60)})"
         with self._reporting(words, given):
             found = scope.context.perform(given.value)
@@ -350,7 +362,7 @@ class Evaluation:
     def _executable(self, entity: LaunchEntity, scope: _Scope) -> None:
         words = self._words(entity, "cmd", scope)
         if not words:
-            if "cmd" not in entity.attributes and not list(entity.all("word")):
+            if "cmd" not in entity.attributes and not list(entity.all("argument")):
                 attribute(entity, "cmd", self._report)
             return
         words += self._words(replace(entity, children=()), "args", scope) or []
@@ -389,13 +401,18 @@ class Evaluation:
         if entity.kind == "lifecycle_node":
             help_text = "send them by 'ros2 lifecycle set', or by a lifecycle manager"
             self._leave(entity.span, f"the transitions of {shown}", "nobody configures and activates it", help_text)
+        self._report_plugins(entity, f"{program.namespace}/{program.name or program.wanted}", scope)
+
+    def _load(self, entity: LaunchEntity, scope: _Scope) -> None:
+        self._report_plugins(entity, self._needed(entity, "target", scope) or "CONTAINER", scope)
+
+    def _report_plugins(self, entity: LaunchEntity, target: str, scope: _Scope) -> None:
         for child in entity.all("composable_node"):
             plugin, package = self._text(child, "plugin", scope), self._text(child, "pkg", scope)
-            target = f"{program.namespace}/{program.name or program.wanted}"
             load = " ".join(plain(each, 60) for each in (target, package or "PACKAGE", plugin or "PLUGIN"))
             help_text = f"load it by 'ros2 component load {load}', or run its own executable as another 'ros2_node'"
             words = f"the plug-in '{plain(plugin or '?', 60)}'"
-            self._leave(child.span, words, f"nobody loads it into {shown}", help_text)
+            self._leave(child.span, words, f"nobody loads it into '{plain(target, 60)}'", help_text)
 
     def _common(self, program: LaunchedProgram, entity: LaunchEntity, scope: _Scope) -> None:
         """Add what all programs may have, and the program."""
@@ -438,7 +455,7 @@ class Evaluation:
                 return None
             if text is None:
                 return None
-        for word in entity.all("word"):
+        for word in entity.all("argument"):
             if (found := self._text(word, "value", scope)) is None:
                 return None
             words.append(found)

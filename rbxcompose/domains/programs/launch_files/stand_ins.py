@@ -5,6 +5,7 @@ An action becomes an entity as XML and YAML have it, and a substitution the same
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -16,6 +17,7 @@ from rbxcompose.domains.programs.launch_files.substitutions import (
     SubstitutionCall,
     SubstitutionContext,
     UnknownValueError,
+    read_launch_text,
 )
 
 MODULES = (
@@ -25,12 +27,13 @@ MODULES = (
     "launch_ros.event_handlers", "launch_ros.events", "launch_ros.events.lifecycle",
     "launch_ros.parameter_descriptions", "launch_ros.substitutions", "launch_xml",
     "launch_xml.launch_description_sources", "launch_yaml", "launch_yaml.launch_description_sources",
-    "ament_index_python", "ament_index_python.packages", "lifecycle_msgs", "lifecycle_msgs.msg", "nav2_common",
-    "nav2_common.launch",
+    "ament_index_python", "ament_index_python.packages", "ament_index_python.resources", "lifecycle_msgs",
+    "lifecycle_msgs.msg", "nav2_common", "nav2_common.launch",
 )  # fmt: skip
 Data = dict[str, Any]
 FILE = "__launch_file__"  # a global name of a launch file, by which its frames are known
 LET = "let"
+_OF_PACKAGE = re.compile(r"\$\(find-pkg-(share|prefix) [A-Za-z][\w-]*\)", re.ASCII)
 
 
 def line_here() -> int:
@@ -52,7 +55,7 @@ def text_of(value: Any) -> LaunchText:
             return ("true" if value else "false",)
         case list() | tuple():
             return tuple(piece for each in value for piece in text_of(each))
-    return (str(value),)
+    return read_launch_text(str(value)) if _OF_PACKAGE.search(str(value)) else (str(value),)
 
 
 class LaunchContext:
@@ -93,6 +96,12 @@ def _substitution(call: str, *names: str, is_list: bool = False) -> type[Substit
         Substitution.__init__(self, SubstitutionCall(call, tuple(map(text_of, listed))))
 
     return type("Substitution", (Substitution,), {"__init__": begin})
+
+
+def _found(call: str) -> type[Substitution]:
+    """Return a class of folders of packages; `find` gives words that `text_of` knows again."""
+    names = {"find": lambda self, name: f"$({call} {name})"}
+    return type("Substitution", (_substitution(call, "package"),), names)
 
 
 class TextSubstitution(Substitution):
@@ -211,8 +220,8 @@ _PARTS: dict[str, Part] = {
     "additional_env": _pairs("env", "name", "value"),
     "launch_arguments": _pairs("arg", "name", "value"),
     "launch_configurations": _pairs(LET, "name", "value"),
-    "arguments": lambda value: (entity("word", {"value": each}) for each in _listed(value)),
-    "cmd": lambda value: (entity("word", {"value": each}) for each in _listed(value)),
+    "arguments": lambda value: (entity("argument", {"value": each}) for each in _listed(value)),
+    "cmd": lambda value: (entity("argument", {"value": each}) for each in _listed(value)),
     "choices": lambda value: (entity("choice", {"value": each}) for each in value or ()),
     "composable_node_descriptions": lambda value: (each.entity for each in value or ()),
 }
@@ -264,6 +273,9 @@ class UnknownStandIn(DeclaredAction, Substitution):
         self.given = (*given, *named.values())
         DeclaredAction.__init__(self, condition=named.get("condition"))
 
+    def __bool__(self) -> bool:
+        raise UnknownValueError(f"'{type(self).__name__}' is not known here")
+
     def _entity(self) -> Data:
         started = ", ".join(dict.fromkeys(_started(self.given)))
         return entity(type(self).__name__, {"name": started or None})
@@ -309,9 +321,10 @@ _NAMESAKES: dict[str, Any] = {
     "LaunchContext": LaunchContext,
     "LaunchConfiguration": _substitution("var", "variable_name", "default"),
     "EnvironmentVariable": _substitution("env", "name", "default_value"),
-    "FindPackageShare": _substitution("find-pkg-share", "package"),
-    "FindPackagePrefix": _substitution("find-pkg-prefix", "package"),
-    "FindPackage": _substitution("find-pkg-prefix", "package"),
+    "LaunchConfigAsBool": _substitution("as-flag", "name"),
+    "FindPackageShare": _found("find-pkg-share"),
+    "FindPackagePrefix": _found("find-pkg-prefix"),
+    "FindPackage": _found("find-pkg-prefix"),
     "FindExecutable": _substitution("find-exec", "name"),
     "ExecutableInPackage": _substitution("exec-in-pkg", "executable", "package"),
     "PythonExpression": _substitution("eval", "expression"),
@@ -365,13 +378,10 @@ def install(context: SubstitutionContext) -> None:
     """Put the modules where imports find them; packages are those that the context knows."""
 
     def prefix(package_name: str) -> str:
-        try:
-            return str(context.prefix_of(package_name))
-        except UnknownValueError as error:
-            raise PackageNotFoundError(str(error)) from None
+        return _known(f"$(find-pkg-prefix {package_name})", lambda: context.prefix_of(package_name))
 
     def share(package_name: str) -> str:
-        return f"{prefix(package_name)}/share/{package_name}"
+        return _known(f"$(find-pkg-share {package_name})", lambda: context.share_of(package_name))
 
     names = {
         **_NAMESAKES,
@@ -388,6 +398,16 @@ def install(context: SubstitutionContext) -> None:
         parent, _, name = module.rpartition(".")
         if parent:
             setattr(sys.modules[parent], name, made)
+
+
+def _known(words: str, find: Callable[[], Path]) -> str:
+    """Return a path, or words that `text_of` knows again: only what needs an unknown one is left out."""
+    try:
+        return str(find())
+    except UnknownValueError as error:
+        if _OF_PACKAGE.fullmatch(words):
+            return words
+        raise PackageNotFoundError(str(error)) from None
 
 
 def _unknown(name: str) -> Any:

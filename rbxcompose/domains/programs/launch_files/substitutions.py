@@ -16,6 +16,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.printable import plain
 
 MOST = 64_000  # characters of a text that is filled in, and of one that is read
+_ABOVE = 5  # folders above a file in which its package and the others of its workspace are looked for
 _DEPTH = 16  # of substitutions in each other
 _PACKAGE = re.compile(r"[A-Za-z][\w-]*", re.ASCII)
 _FLAGS = {"true": True, "1": True, "false": False, "0": False}
@@ -136,6 +137,18 @@ class SubstitutionContext:
                     return prefix
         raise UnknownValueError(f"there is no package '{plain(package, 60)}' in AMENT_PREFIX_PATH")
 
+    def share_of(self, package: str) -> Path:
+        """Return the folder with the files of a package: where it is installed, or beside or above this file.
+
+        Raises:
+            UnknownValueError: if it is in none of them.
+        """
+        above = self.file.parents[:_ABOVE] if _PACKAGE.fullmatch(package) else ()
+        for folder in (each for parent in above for each in (parent, parent / package)):
+            if folder.name == package and (folder / "package.xml").is_file():
+                return folder
+        return self.prefix_of(package) / "share" / package
+
     def _performed(self, call: SubstitutionCall) -> str:
         if call.name not in _KNOWN:
             raise UnknownValueError(_REFUSED.get(call.name, f"'$({plain(call.name, 60)})' is not known here"))
@@ -189,13 +202,14 @@ _SOME = 64  # words that a substitution takes
 _KNOWN: dict[str, tuple[Callable[..., str], int, int]] = {
     "var": (lambda context, *given: _variable(context.values, "launch argument", given), 1, 2),
     "env": (lambda context, *given: _variable(context.environment, "variable of the environment", given), 1, 2),
-    "find-pkg-share": (lambda context, name: f"{context.prefix_of(str(name))}/share/{name}", 1, 1),
+    "find-pkg-share": (lambda context, name: str(context.share_of(str(name))), 1, 1),
     "find-pkg-prefix": (lambda context, name: str(context.prefix_of(str(name))), 1, 1),
     "exec-in-pkg": (lambda context, name, package: f"{context.prefix_of(str(package))}/lib/{package}/{name}", 2, 2),
     "find-exec": (_executable, 1, 1),
     "dirname": (lambda context: str(context.file.parent), 0, 0),
     "filename": (lambda context: str(context.file), 0, 0),
     "anon": (_anonymous, 1, 1),
+    "as-flag": (lambda context, name: _flag(context.holds((SubstitutionCall("var", (name.text,)),))), 1, 1),
     "rewritten": (_rewritten, 1, 1),
     "eval": (lambda context, *given: evaluated(" ".join(map(str, given))), 1, _SOME),
     "join-path": (lambda context, *given: str(Path(*map(str, given))), 0, _SOME),
@@ -207,7 +221,10 @@ _KNOWN: dict[str, tuple[Callable[..., str], int, int]] = {
     "if": (lambda context, which, yes, no="": str(yes if context.holds(which.text) else no), 2, 3),
 }
 _KNOWN |= {"all": _KNOWN["and"], "any": _KNOWN["or"]}
-_REFUSED = {"command": "'$(command)' would run a program, and an import runs none"}
+_REFUSED = {
+    "command": "'$(command)' would run a program, and an import runs none",
+    "file-content": "the text of a file is not copied into a manifest",
+}
 
 _CONSTANTS = {"true": True, "false": False, "pi": math.pi, "inf": math.inf}
 _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
