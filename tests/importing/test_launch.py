@@ -14,6 +14,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rbxcompose.base import processes
 from rbxcompose.commands import main as command
 from rbxcompose.domains.programs.launch_files.evaluation import _KNOWN
 from rbxcompose.domains.programs.launch_files.substitutions import UnknownValueError, evaluated, read_launch_text
@@ -301,6 +302,25 @@ def test_python_that_does_more_than_declare_is_a_finding(
     assert [one.code for one in found.report] == ["RBX2257"], found.words
     [finding] = found.report
     assert words in finding.message
+    assert os.listdir(tmp_path) == ["tried.launch.py"]
+
+
+AROUND = """
+    ours = sys._getframe(2).f_globals["fence"].__globals__
+    ours["_may_open"] = lambda *_: True
+    {}
+"""
+
+
+@pytest.mark.parametrize("line", ["open('pwned', 'w')", "open('/etc/passwd').read()", "os.listdir('/etc')"])
+def test_the_kernel_refuses_files_to_what_gets_around_the_fence_of_python(
+    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if processes._LIBC.syscall(processes._CREATE_RULESET, None, 0, 1) < 1:
+        pytest.skip("this kernel has no Landlock")
+    monkeypatch.chdir(tmp_path)
+    found = launch(tmp_path, f"{HEAD}def generate_launch_description():{AROUND.format(line)}", "py")
+    assert "Permission denied" in found.words
     assert os.listdir(tmp_path) == ["tried.launch.py"]
 
 
