@@ -32,6 +32,7 @@ DOMAINS = {
     "bases": "body servos worlds",
     "console": "body",
     "navigation": "bases body vision worlds",
+    "programs": "body",
     "servos": "body devices",
     "vision": "bases body worlds",
     "worlds": "body",
