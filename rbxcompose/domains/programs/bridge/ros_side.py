@@ -17,12 +17,13 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
-import rclpy
-from rclpy.impl.implementation_singleton import rclpy_implementation as implementation
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message, serialize_message
-
-if TYPE_CHECKING:
+_IS_READ = "rbxcompose" in sys.modules  # by a tool, in our Python, which has no rclpy
+if TYPE_CHECKING or not _IS_READ:
+    import rclpy
+    from rclpy.impl.implementation_singleton import rclpy_implementation as implementation
+    from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+    from rclpy.serialization import deserialize_message, serialize_message
+if TYPE_CHECKING or _IS_READ:
     from rbxcompose.domains.programs.bridge import link
 else:
     import link  # beside this file: the package is not there in ROS's Python

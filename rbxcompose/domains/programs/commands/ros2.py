@@ -23,9 +23,9 @@ from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, write_repo
 from rbxcompose.commands.messages import to_json
 from rbxcompose.commands.targets import add_path_argument, robot_path
 from rbxcompose.compiler.compile import Compilation, compile_robot
-from rbxcompose.domains.programs.bridge.bridge import ROS_SIDE
 from rbxcompose.domains.programs.bridge.installation import RosModel, installation_of
-from rbxcompose.domains.programs.pinning import KINDS, RosNode, edits_of
+from rbxcompose.domains.programs.bridge.ros_bridge import ROS_SIDE
+from rbxcompose.domains.programs.ros_nodes import KINDS, RosNode, edits_of
 from rbxcompose.domains.programs.sections.ros2 import ros2
 from rbxcompose.manifest.tree import FILE_BYTES, MappingNode, at
 

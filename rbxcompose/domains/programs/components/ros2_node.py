@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 from rbxcompose.base.config import COMPONENT, CONTENTS, LocalPath, Name, Refers
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.requests import OutsideError
-from rbxcompose.domains.programs.bridge import bridge
+from rbxcompose.domains.programs.bridge import ros_bridge
 from rbxcompose.domains.programs.bridge.ends import BridgedEnd, ends_of, parameters_of
 from rbxcompose.domains.programs.bridge.installation import RosInstallation, RosModel, installation_of
 from rbxcompose.domains.programs.child import Order
@@ -91,7 +91,7 @@ class Ros2Node(Runner[Ros2NodeConfig]):
     def configure(self) -> None:
         """Find its ROS 2."""
         super().configure()
-        self.bridge: bridge.Bridge | None = None
+        self.bridge: ros_bridge.RosBridge | None = None
         self.channels: list[int] = []
         self.ros: RosInstallation | None = None
 
@@ -138,7 +138,7 @@ class Ros2Node(Runner[Ros2NodeConfig]):
         """Let its topics, services, actions and parameters pass the bridge."""
         if self.ros is None or not self.ros.is_bridged:
             return
-        self.bridge = bridge.joined(self.ros, self.context.address, self.name)
+        self.bridge = ros_bridge.joined(self.ros, self.context.address, self.name)
         self.channels = self.bridge.add(self.name, self._ends())
 
     def _ends(self) -> Iterator[BridgedEnd]:
@@ -163,4 +163,4 @@ class Ros2Node(Runner[Ros2NodeConfig]):
         if (joined := self.bridge) is not None:
             self.bridge = None
             joined.remove(self.channels)
-            bridge.left(joined, self.name)
+            ros_bridge.left(joined, self.name)

@@ -55,7 +55,7 @@ class _Lane:
         return Attachment(next(self.sequence), time.time_ns(), self.gid).encode()
 
 
-class Bridge:
+class RosBridge:
     """Carries bytes between a robot and ROS 2; several components may share it."""
 
     def __init__(self, installation: RosInstallation, address: BusAddress) -> None:
@@ -230,11 +230,11 @@ def _exact(message: Any, payload: bytes) -> bytes:
     return encode(decode(message, payload))
 
 
-_bridges: dict[tuple[str, str], tuple[Bridge, set[str]]] = {}
+_bridges: dict[tuple[str, str], tuple[RosBridge, set[str]]] = {}
 _sharing = threading.Lock()
 
 
-def joined(installation: RosInstallation, address: BusAddress, component: str) -> Bridge:
+def joined(installation: RosInstallation, address: BusAddress, component: str) -> RosBridge:
     """Return the bridge of this process to a ROS 2; the first component starts it.
 
     Raises:
@@ -246,13 +246,13 @@ def joined(installation: RosInstallation, address: BusAddress, component: str) -
         if bridge is None or bridge.hear():
             if bridge is not None:
                 bridge.close()
-            bridge, users = Bridge(installation, address), set()
+            bridge, users = RosBridge(installation, address), set()
         users.add(component)
         _bridges[key] = bridge, users
         return bridge
 
 
-def left(bridge: Bridge, component: str) -> None:
+def left(bridge: RosBridge, component: str) -> None:
     """Leave a bridge; the last component ends it."""
     with _sharing:
         for key, (other, users) in list(_bridges.items()):
