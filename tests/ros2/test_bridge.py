@@ -39,7 +39,7 @@ components:
       plan: {{type: std_msgs/String, qos: latched}}
     subscribes:
       odom: nav_msgs/Odometry
-      asked: {{type: test_msgs/Builtins, optional: true}}
+      asked: test_msgs/Builtins
     serves: {{beep: std_srvs/Trigger, retune: std_srvs/Trigger, chase: std_srvs/Trigger}}
     serves_actions: {{count: test_msgs/Fibonacci}}
     calls_actions: {{ours: test_msgs/Fibonacci}}
@@ -49,6 +49,19 @@ muxes:
   cmd_vel:
     inputs:
       ros: {{topic: cmd_vel_ros, priority: 10, timeout: 0.5 s}}
+values:
+  answer: {{topic: answered, field: duration_value.sec}}
+missions: {{ask: ask.yaml}}
+"""
+MISSION = """rbx: 1
+kind: Mission
+name: ask
+do:
+  - publish: asked
+    message: {duration_value: {sec: 9}}
+  - wait_for: $answer == 9
+    timeout: 10 s
+  - count: 2
 """
 
 
@@ -67,6 +80,7 @@ def robot(ros2_python: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterat
         bus=free_port(), python=ros2_python, domain=DOMAIN, own=HERE / "own/test_msgs", node=HERE / "node.py"
     )
     made = Robot(tmp_path_factory.mktemp("ros"), text)
+    (made.file.parent / "ask.yaml").write_text(MISSION)
     up = made.do("up", "-d", str(made.file))
     assert up.returncode == 0, up.stdout + up.stderr
     until(made, lambda: "true" in made.do("service", "call", "beep").stdout)
@@ -108,6 +122,11 @@ def test_a_message_of_the_user_passes_both_ways(robot: Robot) -> None:
     )
     out, _ = listening.communicate()
     assert json.loads(out)["duration_value"]["sec"] == 7
+
+
+def test_a_mission_sends_and_understands_messages_of_the_user_and_uses_skills_there(robot: Robot) -> None:
+    assert robot.do("mission", "run", "ask").returncode == 0
+    until(robot, lambda: "ask: success" in robot.do("logs").stdout)
 
 
 def test_what_it_published_before_we_came_is_there(robot: Robot) -> None:

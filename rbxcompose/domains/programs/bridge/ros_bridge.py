@@ -79,7 +79,7 @@ class RosBridge:
             for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
                 one.setsockopt(socket.SOL_SOCKET, option, 4 << 20)
         with theirs:
-            command = (installation.python, str(ROS_SIDE), str(theirs.fileno()), f"rbxcompose_{address.robot}")
+            command = (installation.python, str(ROS_SIDE), str(theirs.fileno()), f"_rbxcompose_{address.robot}")
             self._child = Child(
                 Order(command, os.getcwd(), installation.environment, 15, 1.0, descriptors=(theirs.fileno(),))
             )

@@ -29,7 +29,7 @@ else:
     import link  # beside this file: the package is not there in ROS's Python
 
 _LOOK = 0.5  # [s] between two looks at the graph
-_SETTLED = 1.0  # [s] without anything new
+_SETTLED = 2.0  # [s] without anything new
 _GOODBYE = 1.0  # [s] to leave ROS
 _ECHOES = 64  # messages that may be on their way back to us
 
@@ -266,7 +266,7 @@ def graph(node: Any) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name, namespace in node.get_node_names_and_namespaces():
         full = f"{namespace.rstrip('/')}/{name}"
-        if full == f"/{node.get_name()}":
+        if name.startswith("_"):  # hidden, as bridges are
             continue
         try:
             publishes = dict(node.get_publisher_names_and_types_by_node(name, namespace))
@@ -283,7 +283,7 @@ def graph(node: Any) -> dict[str, Any]:
 
 
 def discovered(node: Any, most: float) -> dict[str, Any]:
-    """Return the graph once nothing new has appeared for a second, after `most` [s] in any case."""
+    """Return the graph once something has appeared and then nothing new, after `most` [s] in any case."""
     began = changed = time.monotonic()
     found: dict[str, Any] = {}
     while time.monotonic() - began < most and (not found or time.monotonic() - changed < _SETTLED):
