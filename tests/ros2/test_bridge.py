@@ -234,3 +234,32 @@ def test_nothing_is_left_after_down(robot: Robot) -> None:
     left = [Process.of(pid) for pid in descendants(process)]
     robot.do("down")
     assert not any(one.is_running for one in left)
+
+
+OTHER = """rbx: 1
+kind: Robot
+name: other_definitions
+bus: {{port: {bus}}}
+ros2: {{python: {python}, domain: {domain}}}
+msgs: {{own: own}}
+components:
+  stranger:
+    type: ros2_node
+    publishes: {{strange: test_msgs/Builtins}}
+    serves: {{also_strange: test_msgs/Missing}}
+"""
+
+
+def test_types_that_ros_defines_otherwise_or_does_not_have_are_told(ros2_python: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "own/test_msgs"
+    for name, text in {"msg/Builtins.msg": "int32 sec\n", "srv/Missing.srv": "---\nbool success\n"}.items():
+        (folder / name).parent.mkdir(parents=True)
+        (folder / name).write_text(text)
+    robot = Robot(tmp_path, OTHER.format(bus=free_port(), python=ros2_python, domain=DOMAIN))
+    try:
+        up = robot.do("up", "-d", str(robot.file))
+        assert up.returncode == 0, up.stderr
+        until(robot, lambda: "test_msgs/srv/Missing" in robot.do("logs").stdout)
+        assert "another definition of test_msgs/msg/Builtins" in robot.do("logs").stdout
+    finally:
+        robot.do("down")

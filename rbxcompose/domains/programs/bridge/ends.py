@@ -42,6 +42,7 @@ class BridgedEnd:
             "kind": self.kind,
             "way": self.way,
             "type": self.interface.TYPE,
+            "hash": self.interface.HASH,
             "depth": min(self.qos.depth, _DEEPEST),
             "latched": self.qos is Qos.LATCHED,
         }

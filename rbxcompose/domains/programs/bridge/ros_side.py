@@ -233,9 +233,20 @@ class RosSide:
                 made = node.create_subscription(
                     kind, name, lambda data: None, quality(end, reliable=end["reliable"]), raw=True
                 )
+            if end["kind"] == "topic" and (other := self._other_hash(end)):
+                made.destroy()
+                raise EndError(f"this ROS 2 has another definition of {end['type']}: {other}, ours is {end['hash']}")
             self._entities[channel] = made
         except Exception as error:  # an end that cannot be made must not end the others
             self._problem(channel, str(error))
+
+    def _other_hash(self, end: dict[str, Any]) -> str:
+        """Return the hash of the type of our own end in ROS, if it is not ours; Humble has none."""
+        node, name = self.node, end["name"]
+        look = node.get_publishers_info_by_topic if end["way"] == "to_ros" else node.get_subscriptions_info_by_topic
+        own = [info for info in look(name) if info.node_name == node.get_name()]
+        found = {str(getattr(info, "topic_type_hash", end["hash"])) for info in own}
+        return "" if end["hash"] in found else next(iter(found), "")
 
     def _drop(self, channel: int) -> None:
         if (entity := self._entities.pop(channel, None)) is not None:
