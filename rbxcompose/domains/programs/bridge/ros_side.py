@@ -29,6 +29,8 @@ else:
     import link  # beside this file: the package is not there in ROS's Python
 
 _LOOK = 0.5  # [s] between two looks at the graph
+_SHALLOWEST = 10  # messages that wait in ROS: the newest counts only where it is used
+_BUSY, _PACE = 500.0, 0.002  # [1/s] messages from ROS, above which they are taken that often [s]
 _SETTLED = 2.0  # [s] without anything new
 _GOODBYE = 1.0  # [s] to leave ROS
 _ECHOES = 64  # messages that may be on their way back to us
@@ -56,7 +58,7 @@ def quality(end: dict[str, Any], *, reliable: bool) -> QoSProfile:
     """Return the quality of service of a topic."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
-        depth=end["depth"],
+        depth=max(end["depth"], _SHALLOWEST),
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if end["latched"] else DurabilityPolicy.VOLATILE,
     )
@@ -77,6 +79,8 @@ class RosSide:
         self._waiting: dict[tuple[int, int], int] = {}  # numbers of our requests by client and sequence
         self._asked: dict[int, tuple[int, Any]] = {}  # ROS's requests by our number: the channel and the header
         self._next = 0
+        self._passed = 0  # messages from ROS
+        self._is_busy = False
 
     # From the socket
 
@@ -142,13 +146,16 @@ class RosSide:
             clients, services = self._of_way("service", "to_ros"), self._of_way("service", "from_ros")
             size = len(subscriptions), 1, 0, len(clients), len(services), 0
             waits = implementation.WaitSet(*size, context.handle)
-            looked = time.monotonic()
+            looked, passed = time.monotonic(), self._passed
             while context.ok() and not self._orders:
                 self._wait(waits, subscriptions, clients, services)
                 if (now := time.monotonic()) - looked > _LOOK:
-                    looked = now
+                    self._is_busy = (self._passed - passed) / (now - looked) > _BUSY
+                    looked, passed = now, self._passed
                     if self._adapt():
                         break
+                if self._is_busy:
+                    time.sleep(_PACE)  # several messages at once cost little more than one
 
     def _of_way(self, kind: str, way: str) -> list[tuple[int, Any]]:
         wanted = [channel for channel, end in self._ends.items() if (end["kind"], end["way"]) == (kind, way)]
@@ -180,6 +187,7 @@ class RosSide:
             if echoes and data in echoes:
                 echoes.remove(data)  # our own message, on its way back
                 continue
+            self._passed += 1
             self._link.send(channel, link.DATA, data, depth=depth)
 
     def _responses(self, channel: int, client: Any) -> None:
