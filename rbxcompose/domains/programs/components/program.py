@@ -35,7 +35,6 @@ from rbxcompose.domains.programs.child import (
     Order,
     ProgramEnd,
     Started,
-    memory_of,
 )
 from rbxcompose.domains.programs.declaration import DeclaredPorts
 from rbxcompose.domains.programs.output import OutputLog
@@ -374,7 +373,7 @@ class Runner(Component[R]):
                     self._happened(event)
         self._log(lines)
         if self.child is not None and self.child.is_over and not self.is_over:
-            self._ended("ended without a word: its keeper is gone")
+            self._ended("was killed, since its keeper was")
 
     def _happened(self, event: object) -> None:
         match event:
@@ -384,8 +383,8 @@ class Runner(Component[R]):
                 within, name = self.config.stop.within, self.config.stop.signal
                 self.warn(f"did not end within {within:g} s of {name}, and was killed")
             case LeftBehind(number):
-                processes = "process" if number == 1 else "processes"
-                self.warn(f"left {number} {processes} in the background, which were killed: it must stay in front")
+                left = "one process, which was" if number == 1 else f"{number} processes, which were"
+                self.warn(f"left behind {left} killed: what it starts must end with it")
             case ProgramEnd(status) if self.config.ready is not None and self.config.ready.ended and not status:
                 self.is_over = self.is_ready = True
                 self.state = TaskStatus(Level.OK, "has ended, as it should")
@@ -398,12 +397,22 @@ class Runner(Component[R]):
         if self.is_ending:
             self.info(how)
             return
-        while self.child is not None and not self.child.is_over:  # it ends what was left behind
-            self.child.wait(_PAUSE)
-            for event in self.child.events():
-                self._happened(event)
+        self._hear_the_rest()
         self._release()
         raise OutsideError(how)
+
+    def _hear_the_rest(self) -> None:
+        """Wait for the keeper, which ends what was left behind; what was written to the last is logged."""
+        is_over = False
+        while self.child is not None and not is_over:
+            is_over = self.child.is_over  # before what may be the last look
+            for event in self.child.events():
+                if isinstance(event, Line):
+                    self._log([event.text])
+                else:
+                    self._happened(event)
+            if not is_over:
+                self.child.wait(_PAUSE)
 
     def _log(self, lines: Iterable[str]) -> None:
         for level, text in self.output.take(lines, self.now):
@@ -415,9 +424,9 @@ class Runner(Component[R]):
 
     def _mind_memory(self, child: Child) -> None:
         most = self.config.limits.memory
-        if most is None or child.pid is None or self.is_ending:
+        if most is None or self.is_ending:
             return
-        if (used := memory_of(child.pid) / _MEGABYTE) > most:
+        if (used := child.memory / _MEGABYTE) > most:
             self._release()
             raise OutsideError(f"uses {used:.0f} MB, and may use {most:g}")
 
