@@ -138,7 +138,9 @@ def test_what_it_leaves_in_the_background_is_ended_and_counted(run: Run, mark: M
 
 
 def test_all_that_it_has_started_is_asked_with_it_and_has_the_same_time(run: Run) -> None:
-    child = run(*shell("(trap 'sleep 0.3; echo ended in order; exit' TERM; echo ready; while :; do sleep 0.02; done) & wait"))
+    child = run(
+        *shell("(trap 'sleep 0.3; echo ended in order; exit' TERM; echo ready; while :; do sleep 0.02; done) & wait")
+    )
     until(child, has_said("ready"))
     child.ask_to_end()
     events = to_its_end(child)
@@ -240,7 +242,9 @@ def test_one_that_closes_its_output_does_not_keep_its_component_awake(run: Run) 
 
 
 def test_memory_is_that_of_all_its_processes(run: Run) -> None:
-    holding = f"""{sys.executable} -c 'held = b"x" * 40_000_000; print("ready", flush=True); import time; time.sleep(100)'"""
+    holding = (
+        f"""{sys.executable} -c 'held = b"x" * 40_000_000; print("ready", flush=True); import time; time.sleep(100)'"""
+    )
     child = run(*shell(f"{holding} & {holding} & wait"))
     until(child, lambda events: events.count(Line("ready")) == 2)
     assert 80_000_000 < child.memory < 250_000_000

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import re
+import shlex
 import signal
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, cast
 from uuid import uuid4
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from rbxcompose.base.clock import SteppedClock
@@ -24,27 +28,19 @@ from rbxcompose.bus.tokens import SPACE, EndpointToken, EntityKind, NodeToken, p
 from rbxcompose.bus.transport import Closable
 from rbxcompose.bus.wire import WireProfile, ros_qos
 from rbxcompose.bus.zenoh_session import as_file, guest_settings
+from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
-from rbxcompose.domains.programs.child import (
-    Child,
-    Deaf,
-    LeftBehind,
-    Line,
-    NotStarted,
-    Order,
-    ProgramEnd,
-    Started,
-)
-from rbxcompose.domains.programs.declaration import DeclaredPorts
+from rbxcompose.domains.programs.child import Child, Deaf, LeftBehind, Line, NotStarted, Order, ProgramEnd, Started
+from rbxcompose.domains.programs.declaration import DeclaredPorts, port_name, published
 from rbxcompose.domains.programs.output import OutputLog
 from rbxcompose.domains.programs.watch import DeclaredKey, EndKind, KeyOnBus, ProgramWatch
-from rbxcompose.msgs.action_msgs import CancelGoal
+from rbxcompose.msgs.action_msgs import CancelGoal, GoalStatusArray
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.processes import describe_exit
 from rbxcompose.sdk import Capability, Component, component
 from rbxcompose.sdk.capabilities import RunsProgram, Setting
-from rbxcompose.sdk.ports import Calls, In, Out, Port, Qos, Serves, ServesAction
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Qos, Serves, ServesAction
 from rbxcompose.sdk.updater import FrequencyTask, TaskStatus
 
 LOOKS = 1.0  # [s] between two looks at what its session declares, and at its memory
@@ -54,15 +50,33 @@ _STRANGER = 0.5  # [s] after which it does not seem to use the configuration tha
 _PAUSE = 0.05  # [s] between two looks at a program that is not ready yet
 _TOKENS = {EndKind.PUBLISHER: EntityKind.PUBLISHER, EndKind.SUBSCRIBER: EntityKind.SUBSCRIPTION}
 _TOKENS |= {EndKind.QUERYABLE: EntityKind.SERVER}
+_ACTIONS = ServesAction, CallsAction
 _MEGABYTE = 1_000_000
 
 
 def _words(value: Any) -> Any:
     if isinstance(value, str):
-        words = value.split()
-        help_text = f"no shell reads it; write its words: [{', '.join(words)}]"
+        help_text = f"no shell reads it; write its words: [{', '.join(map(_quoted, _split(value)))}]"
+        if _SHELL.search(value):
+            help_text = f"only a shell reads that: [sh, -c, {json.dumps(value)}]"
         raise PydanticCustomError("command", "a command is a list of words", {"help": help_text})
+    if isinstance(value, Sequence) and value and value[0] == "":
+        raise PydanticCustomError("command", "a command begins with an executable", {"help": "such as [./program]"})
     return value
+
+
+_SHELL, _PLAIN = re.compile(r"[|&;<>$`]"), re.compile(r"[\w./=+-]*[A-Za-z/][\w./=+-]*", re.ASCII)
+
+
+def _split(text: str) -> list[str]:
+    try:
+        return shlex.split(text)
+    except ValueError:  # a quote without its end
+        return text.split()
+
+
+def _quoted(word: str) -> str:
+    return word if _PLAIN.fullmatch(word) else json.dumps(word)
 
 
 def _is_pattern(text: str) -> str:
@@ -145,11 +159,12 @@ class RunConfig(DeclaredPorts):
     levels: LevelsModel = LevelsModel()
     """How its output is read."""
 
-    @model_validator(mode="after")
-    def _waits_for_its_own(self) -> RunConfig:
-        if self.ready is not None and self.ready.topic and self.ready.topic not in self.publishes:
-            raise ValueError(f"'ready' waits for the topic '{self.ready.topic}', which 'publishes' does not have")
-        return self
+    @field_validator("ready")
+    @classmethod
+    def _waits_for_its_own(cls, given: ReadyModel | None, info: ValidationInfo) -> ReadyModel | None:
+        if given is not None and "publishes" in info.data:
+            published(given.topic, info.data["publishes"])
+        return given
 
 
 R = TypeVar("R", bound=RunConfig)
@@ -205,7 +220,7 @@ class Runner(Component[R]):
         self.output = OutputLog({level: text for level, text in self._levels() if text})
         self.is_inert = isinstance(self.context.clock, SteppedClock)
         self.ends = {} if self.is_inert else {end.port: end for end in self._declared()}
-        actions = {str(self.bound[name]) for name, port in self._elsewhere() if isinstance(port, ServesAction)}
+        actions = {str(self.bound[name]) for name, port in self._elsewhere() if isinstance(port, _ACTIONS)}
         self.watched = ProgramWatch(self.ends.values(), actions, self.now)
         for end in self.ends.values():
             if end.rate is not None:
@@ -218,8 +233,15 @@ class Runner(Component[R]):
         if self.is_inert:
             self.warn("does not run: robot time is stepped, and programs of others keep real time")
             return
+        with self._leaving_nothing():
+            self._start()
+
+    def _start(self) -> None:
         address = self.context.address
-        self.guest = guest = Guest(BusPlace(address.router, address.domain), stays=True)
+        try:
+            self.guest = guest = Guest(BusPlace(address.router, address.domain), stays=True)
+        except NotDoneError as error:
+            raise OutsideError(f"cannot be started: {error}") from error
         environment = {**os.environ, **self._joining()}
         self.is_over = False
         self.child = Child(self.order(environment))
@@ -231,15 +253,24 @@ class Runner(Component[R]):
         """Hear what it writes, whether it still runs, and compare what it does with what it declares."""
         if self.child is None:
             return
-        self._hear()
-        if self.ends_at is not None and self.now >= self.ends_at:
-            self.child.ask_to_end()
-        if self.is_over or self.now - self.looked < LOOKS:
-            return
-        self.looked = self.now
-        self._mind_memory(self.child)
-        if self.joins_bus and self.guest is not None:
-            self._compare(self.guest)
+        with self._leaving_nothing():
+            self._hear()
+            if self.ends_at is not None and self.now >= self.ends_at:
+                self.child.ask_to_end()
+            if self.is_over or self.now - self.looked < LOOKS:
+                return
+            self.looked = self.now
+            self._mind_memory(self.child)
+            if self.joins_bus and self.guest is not None:
+                self._compare(self.guest)
+
+    @contextmanager
+    def _leaving_nothing(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException:
+            self._release()
+            raise
 
     def stop(self) -> None:
         """Cancel the goals of actions that claim a part of the robot."""
@@ -280,15 +311,12 @@ class Runner(Component[R]):
         self.session = f"{uuid4().int % 15 + 1:x}{uuid4().hex[1:]}"
         file = RobotFolder.of(address.robot).path / f"{self.name}.zenoh.json5"
         replace_file(file, as_file(guest_settings(address.router, self.session)).encode())
-        keys = {
-            f"RBXCOMPOSE_KEY_{name.upper()}": self._key(str(self.bound[name]), port)
-            for name, port in self._elsewhere()
-            if isinstance(port, Out | In | Serves | Calls)
-        }
+        keys = {f"RBXCOMPOSE_KEY_{name.upper()}": key for name, key in self._keys()}
         return {
             "ZENOH_CONFIG": str(file),
             "ZENOH_SESSION_CONFIG_URI": str(file),
             "ROS_DOMAIN_ID": str(address.domain),
+            "PYTHONUNBUFFERED": "1",  # a line is written when it is printed, as to a terminal
             "RBXCOMPOSE_ROBOT": address.robot,
             "RBXCOMPOSE_COMPONENT": self.name,
             "RBXCOMPOSE_NAMESPACE": address.namespace,
@@ -297,8 +325,19 @@ class Runner(Component[R]):
             **self.config.environment,
         }
 
-    def _key(self, name: str, port: Port[Any]) -> str:
-        address, interface = self.context.address, cast(Any, port.interface)
+    def _keys(self) -> Iterator[tuple[str, str]]:
+        """Yield the Zenoh key of each end; an action has five."""
+        for name, port in self._elsewhere():
+            if not isinstance(port, _ACTIONS):
+                yield name, self._key(str(self.bound[name]), port.interface)
+                continue
+            names, action = ActionNames.of(str(self.bound[name])), cast(Any, port.interface)
+            parts = action.SendGoal, action.GetResult, CancelGoal, action.FeedbackMessage, GoalStatusArray
+            for part, interface in zip(ActionNames.__slots__, parts, strict=True):
+                yield f"{name}_{part}", self._key(getattr(names, part), interface)
+
+    def _key(self, name: str, interface: Any) -> str:
+        address = self.context.address
         return data_key(address.domain, name, interface.TYPE, WireProfile(address.wire).hash_of(interface))
 
     def _elsewhere(self) -> Iterator[tuple[str, Port[Any]]]:
@@ -308,15 +347,18 @@ class Runner(Component[R]):
         kinds = {Out: EndKind.PUBLISHER, In: EndKind.SUBSCRIBER, Serves: EndKind.QUERYABLE, Calls: EndKind.QUERIER}
         wire = WireProfile(self.context.address.wire)
         for name, port in self._elsewhere():
-            if (kind := kinds.get(type(port))) is not None and (interface := port.interface) is not None:
-                key = KeyOnBus(kind, str(self.bound[name]), dds_type(interface.TYPE), wire.hash_of(interface))
+            full, kind, interface = str(self.bound[name]), kinds.get(type(port)), cast(Any, port.interface)
+            if isinstance(port, ServesAction):  # one of its ends stands for all
+                full, kind, interface = ActionNames.of(full).send_goal, EndKind.QUERYABLE, interface.SendGoal
+            if kind is not None:
+                key = KeyOnBus(kind, full, dds_type(interface.TYPE), wire.hash_of(interface))
                 yield DeclaredKey(name, key, port.rate if isinstance(port, Out) else None)
 
     def _listen(self, guest: Guest) -> None:
         """Count the messages of its topics: of those with a rate all, of the others until one has come."""
         for name, port in self._elsewhere():
             if isinstance(port, Out):
-                key = self._key(str(self.bound[name]), port)
+                key = self._key(str(self.bound[name]), port.interface)
                 self.heard[name] = guest.transport.subscribe(key, port.qos, partial(self._arrived, name))
 
     def _arrived(self, name: str, arrival: object) -> None:
@@ -328,7 +370,6 @@ class Runner(Component[R]):
         self.is_ready = False
         while not self._is_ready(ready, guest):
             if self.now >= deadline:
-                self._release()
                 raise OutsideError(f"is not ready after {ready.within if ready is not None else 10.0:g} s")
             if self.child is not None:
                 self.child.wait(_PAUSE)
@@ -348,7 +389,7 @@ class Runner(Component[R]):
         if ready is None or ready.output is not None or ready.ended:
             return self.is_ready  # as its events say
         if ready.topic:
-            return self.watched.count(_port_of(ready.topic)) > 0
+            return self.watched.count(port_name(ready.topic)) > 0
         return bool(guest.tokens(ready.token))
 
     # Running
@@ -398,7 +439,6 @@ class Runner(Component[R]):
             self.info(how)
             return
         self._hear_the_rest()
-        self._release()
         raise OutsideError(how)
 
     def _hear_the_rest(self) -> None:
@@ -413,6 +453,8 @@ class Runner(Component[R]):
                     self._happened(event)
             if not is_over:
                 self.child.wait(_PAUSE)
+        for level, text in self.output.take((), math.inf):
+            self.context.log(level, text)
 
     def _log(self, lines: Iterable[str]) -> None:
         for level, text in self.output.take(lines, self.now):
@@ -427,7 +469,6 @@ class Runner(Component[R]):
         if most is None or self.is_ending:
             return
         if (used := child.memory / _MEGABYTE) > most:
-            self._release()
             raise OutsideError(f"uses {used:.0f} MB, and may use {most:g}")
 
     def _compare(self, guest: Guest) -> None:
@@ -500,10 +541,6 @@ class Runner(Component[R]):
 
 
 _NODE = KeyOnBus(EndKind.QUERIER, "", "", "")  # stands for the token of the node
-
-
-def _port_of(topic: str) -> str:
-    return topic.strip("/").replace("/", "_")
 
 
 class ProgramConfig(RunConfig):
