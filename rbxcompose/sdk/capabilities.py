@@ -265,6 +265,18 @@ class RunsProgram(Capability):
     """Its words; the first is a path from `folder`, or the name of an executable in PATH."""
     folder: Setting[str] = Setting("")
     """Where it runs."""
+    path: Setting[str] = Setting("")
+    """Its PATH, if it has one of its own."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunsContainer(Capability):
+    """It runs an image in real time; `up` looks for it and for what runs it before anything starts."""
+
+    image: Setting[str]
+    """The image."""
+    engines: Setting[tuple[str, ...]]
+    """Executables that can run it; the first one that works does."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,11 +38,11 @@ def check(tmp_path: Path) -> Check:
 def test_ports_are_those_of_the_topics_with_their_types_and_classes() -> None:
     config = ProgramConfig(
         command=("./x",),
-        publishes={"a/image": "sensor_msgs/Image", "odom": {"type": "nav_msgs/Odometry", "rate": 20.0}},  # type: ignore[dict-item]
-        subscribes={"cmd_vel": "geometry_msgs/Twist", "map": {"type": "nav_msgs/OccupancyGrid", "qos": "latched"}},  # type: ignore[dict-item]
+        publishes={"a/image": "sensor_msgs/Image", "odom": {"type": "nav_msgs/Odometry", "rate": 20.0}},
+        subscribes={"cmd_vel": "geometry_msgs/Twist", "map": {"type": "nav_msgs/OccupancyGrid", "qos": "latched"}},
         serves={"reset": "std_srvs/Trigger"},
         calls={"ask": "std_srvs/Trigger"},
-        serves_actions={"wave": {"type": "rbxcompose_msgs/MoveArm", "claims": "arm"}},  # type: ignore[dict-item]
+        serves_actions={"wave": {"type": "rbxcompose_msgs/MoveArm", "claims": "arm"}},
         calls_actions={"go": "nav2_msgs/NavigateToPose"},
     )
     ports = Program.ports(config)
@@ -62,7 +62,7 @@ def test_ports_are_those_of_the_topics_with_their_types_and_classes() -> None:
 
 
 def test_a_topic_that_is_published_and_subscribed_to_has_two_ports() -> None:
-    both = DeclaredPorts(publishes={"/tf": "tf2_msgs/TFMessage"}, subscribes={"/tf": "tf2_msgs/TFMessage"})  # type: ignore[dict-item]
+    both = DeclaredPorts(publishes={"/tf": "tf2_msgs/TFMessage"}, subscribes={"/tf": "tf2_msgs/TFMessage"})
     assert {name: type(port) for name, port in both.ports().items()} == {"tf": Out, "tf_in": In}
 
 
@@ -76,8 +76,8 @@ def test_either_each_declared_topic_has_a_port_of_its_own_or_it_is_refused(
     message = "std_msgs/String"
     try:
         declared = DeclaredPorts(
-            publishes=dict.fromkeys(publishes, message),  # type: ignore[arg-type]
-            subscribes=dict.fromkeys(subscribes, message),  # type: ignore[arg-type]
+            publishes=dict.fromkeys(publishes, message),
+            subscribes=dict.fromkeys(subscribes, message),
             serves=dict.fromkeys(serves, "std_srvs/Trigger"),
         )
     except ValidationError:
@@ -169,7 +169,7 @@ def test_nothing_follows_from_a_mistake(check: Check) -> None:
 def test_ready_is_one_thing() -> None:
     for settings in ({}, {"topic": "a", "token": "b"}):
         with pytest.raises(ValidationError):
-            ReadyModel(**settings)  # type: ignore[arg-type]
+            ReadyModel(**settings)
 
 
 def test_a_robot_with_a_base_that_is_a_program_is_fine(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ KEEPER = Path(__file__).with_name("keeper.py")
 MOST_READ = 256 * 1024  # [bytes] at once; a program that writes more waits
 LONGEST_LINE = 2_000  # [bytes]
 _KILLED = 3.5  # [s] for the keeper to end all
+_CLEANS_UP = 5.0  # [s] for what ends something elsewhere
 _PAUSE = 0.005  # [s] between two looks for what is left
 _MARK = "RBXCOMPOSE_RUN"  # in the environment of all that belongs to one run of a program
 
@@ -37,6 +38,8 @@ class Order:
     open_files: int | None = None
     nice: int = 0
     cores: Sequence[int] = ()
+    cleanup: Sequence[str] = ()
+    """Run when it has ended, also if nobody is left: it ends what runs elsewhere on its behalf."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +121,7 @@ class Child:
             os.set_blocking(descriptor, False)
         self._heard = {self._reports: b"", self._lines: b""}
         self._silent: set[int] = set()  # nobody can write there any more
+        self._patience = _KILLED + (_CLEANS_UP if order.cleanup else 0.0)
         self._is_asked = False
         self.pid: int | None = None
 
@@ -155,7 +159,7 @@ class Child:
         if self._keeper.stdin is not None:
             self._keeper.stdin.close()
         try:
-            self._keeper.wait(_KILLED)
+            self._keeper.wait(self._patience)
         except subprocess.TimeoutExpired:
             self._keeper.kill()
             self._keeper.wait()

@@ -29,6 +29,7 @@ _PDEATHSIG, _SUBREAPER = 1, 36  # options of prctl(2)
 _HARMLESS = 127  # exit code of a child that could not start the command
 _AT_ONCE = 1.0  # [s] for what was killed to end
 _ORPHANED = 1.0  # [s] that a program has when nobody is left to drive the robot
+_CLEANS_UP = 5.0  # [s] for the command that cleans up
 _LIBC = ctypes.CDLL(None)
 _TAKEN = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE)
 
@@ -56,6 +57,7 @@ def main() -> None:
         for descriptor in (1, 2):  # only the program's: their end is its end
             os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
         keep(wanted, child, ended, report)
+        clean_up(wanted)
 
 
 def start(wanted: Order, report: Report) -> int | None:
@@ -229,6 +231,23 @@ def _end_all() -> int:
         killed |= left
         time.sleep(0.005)  # what a killed process has forked comes here when it is gone
     return len(killed)
+
+
+def clean_up(wanted: Order) -> None:
+    """Run the command that ends what runs elsewhere on behalf of the program, such as its container."""
+    command = wanted["cleanup"]
+    if not command:
+        return
+    null = [(os.POSIX_SPAWN_OPEN, number, os.devnull, os.O_RDWR, 0) for number in (0, 1, 2)]
+    try:
+        os.posix_spawn(command[0], command, wanted["environment"], file_actions=null, setsigdef=_TAKEN)
+    except OSError:
+        return  # it is not there any more
+    deadline = time.monotonic() + _CLEANS_UP
+    while _children() and time.monotonic() < deadline:
+        _reaped(0, None)
+        time.sleep(0.005)
+    _end_all()
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from uuid import uuid4
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from rbxcompose.base.clock import SteppedClock
+from rbxcompose.base.clock import MonotonicClock, SteppedClock
 from rbxcompose.base.config import Config, FolderName, Time
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.levels import Level
@@ -204,6 +204,15 @@ class Runner(Component[R]):
         """Return whether it speaks Zenoh itself."""
         return True
 
+    @property
+    def most_memory(self) -> float | None:
+        """Return what its processes may hold in memory [MB]."""
+        return self.config.limits.memory
+
+    def described(self, status: int) -> str:
+        """Return in words how it has ended."""
+        return describe_exit(status)
+
     # Lifecycle
 
     def configure(self) -> None:
@@ -217,8 +226,10 @@ class Runner(Component[R]):
         self.tokens: dict[KeyOnBus, Closable] = {}
         self.heard: dict[str, Closable] = {}
         self.session = ""
+        self.joining: dict[str, str] = {}
         self.output = OutputLog({level: text for level, text in self._levels() if text})
-        self.is_inert = isinstance(self.context.clock, SteppedClock)
+        self.is_inert = type(self.context.clock) is SteppedClock
+        self.real_time = MonotonicClock()  # that of processes, also where robot time is that of a simulator
         self.ends = {} if self.is_inert else {end.port: end for end in self._declared()}
         actions = {str(self.bound[name]) for name, port in self._elsewhere() if isinstance(port, _ACTIONS)}
         self.watched = ProgramWatch(self.ends.values(), actions, self.now)
@@ -242,9 +253,9 @@ class Runner(Component[R]):
             self.guest = guest = Guest(BusPlace(address.router, address.domain), stays=True)
         except NotDoneError as error:
             raise OutsideError(f"cannot be started: {error}") from error
-        environment = {**os.environ, **self._joining()}
+        self.joining = self._joining()
         self.is_over = False
-        self.child = Child(self.order(environment))
+        self.child = Child(self.order({**os.environ, **self.joining}))
         self._listen(guest)
         self._wait_until_ready(guest)
         self.watched.began(self.now)
@@ -255,11 +266,11 @@ class Runner(Component[R]):
             return
         with self._leaving_nothing():
             self._hear()
-            if self.ends_at is not None and self.now >= self.ends_at:
+            if self.ends_at is not None and self.real_time.now() >= self.ends_at:
                 self.child.ask_to_end()
-            if self.is_over or self.now - self.looked < LOOKS:
+            if self.is_over or self.real_time.now() - self.looked < LOOKS:
                 return
-            self.looked = self.now
+            self.looked = self.real_time.now()
             self._mind_memory(self.child)
             if self.joins_bus and self.guest is not None:
                 self._compare(self.guest)
@@ -280,8 +291,9 @@ class Runner(Component[R]):
         """End it; a base first gets the time in which it brakes by itself."""
         self._cancel_goals()
         drives = self.config.capabilities.drives
-        self.is_ending, self.ends_at = True, self.now + ((drives.stops_after or 0.0) if drives else 0.0)
-        if self.child is not None and self.ends_at <= self.now:
+        self.is_ending, now = True, self.real_time.now()
+        self.ends_at = now + ((drives.stops_after or 0.0) if drives else 0.0)
+        if self.child is not None and self.ends_at <= now:
             self.child.ask_to_end()
 
     @property
@@ -294,8 +306,8 @@ class Runner(Component[R]):
         if self.child is not None and not self.is_over:
             self.is_ending = True
             self.child.ask_to_end()
-            deadline = self.now + self.config.stop.within + _ANSWERS
-            while not self.is_over and self.now < deadline:
+            deadline = self.real_time.now() + self.config.stop.within + _ANSWERS
+            while not self.is_over and self.real_time.now() < deadline:
                 self.child.wait(_PAUSE)
                 self._hear()
 
@@ -366,10 +378,10 @@ class Runner(Component[R]):
 
     def _wait_until_ready(self, guest: Guest) -> None:
         ready = self.config.ready
-        deadline = self.now + (ready.within if ready is not None else 10.0)
+        deadline = self.real_time.now() + (ready.within if ready is not None else 10.0)
         self.is_ready = False
         while not self._is_ready(ready, guest):
-            if self.now >= deadline:
+            if self.real_time.now() >= deadline:
                 raise OutsideError(f"is not ready after {ready.within if ready is not None else 10.0:g} s")
             if self.child is not None:
                 self.child.wait(_PAUSE)
@@ -379,9 +391,9 @@ class Runner(Component[R]):
 
     def _wait_until_linked(self, guest: Guest) -> None:
         """Wait until what it publishes reaches every process of the robot."""
-        began = self.now
+        began = self.real_time.now()
         while not (is_linked := guest.is_linked(self.session, _ANSWERS)):
-            if self.now - began > (_STRANGER if is_linked is None else _LINKS):
+            if self.real_time.now() - began > (_STRANGER if is_linked is None else _LINKS):
                 break
             guest.run(lambda: False, _PAUSE)
 
@@ -430,7 +442,7 @@ class Runner(Component[R]):
                 self.is_over = self.is_ready = True
                 self.state = TaskStatus(Level.OK, "has ended, as it should")
             case ProgramEnd(status):
-                self._ended(describe_exit(status))
+                self._ended(self.described(status))
 
     def _ended(self, how: str) -> None:
         self.is_over = True
@@ -465,7 +477,7 @@ class Runner(Component[R]):
         yield Level.WARN, self.config.levels.warn
 
     def _mind_memory(self, child: Child) -> None:
-        most = self.config.limits.memory
+        most = self.most_memory
         if most is None or self.is_ending:
             return
         if (used := child.memory / _MEGABYTE) > most:
@@ -564,7 +576,8 @@ class Program(Runner[ProgramConfig]):
     @classmethod
     def capabilities(cls, config: ProgramConfig) -> tuple[Capability, ...]:
         """Return what the manifest says that it can do, and what `up` looks for."""
-        found = RunsProgram(Setting(config.command, "command"), Setting(config.folder, "folder"))
+        path = Setting(config.environment.get("PATH", ""), "environment")
+        found = RunsProgram(Setting(config.command, "command"), Setting(config.folder, "folder"), path)
         return (*config.declared_capabilities(), found)
 
     def order(self, environment: Mapping[str, str]) -> Order:
