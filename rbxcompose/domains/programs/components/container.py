@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
@@ -29,14 +29,24 @@ _ENDS = {
 }
 
 
+Paths = TypeVar("Paths", dict[str, "MountModel"], tuple[str, ...])
+
+
 def _as_folder(value: Any) -> Any:
     return {"folder": value} if isinstance(value, str) else value
 
 
-def _is_whole_path(path: str) -> str:
-    if not path.startswith("/") or "," in path:
-        raise ValueError(f"'{path}' must be a path from '/', without a comma")
-    return path
+def _are_whole(paths: Paths) -> Paths:
+    for path in paths:
+        if not path.startswith("/") or "," in path:
+            raise ValueError(f"'{path}' must be a path that begins with '/' and has no comma")
+    return paths
+
+
+def _is_word(text: str) -> str:
+    if not text[:1].isalnum() or any(map(str.isspace, text)):
+        raise ValueError("must be one word that begins with a letter or a digit")
+    return text
 
 
 class MountModel(Config):
@@ -48,15 +58,15 @@ class MountModel(Config):
     """Whether the container may write there."""
 
 
-InsidePath = Annotated[str, AfterValidator(_is_whole_path)]
+Word = Annotated[str, AfterValidator(_is_word)]
 Mount = Annotated[MountModel, BeforeValidator(_as_folder, json_schema_input_type=MountModel | str)]
 
 
 class ContainerLimits(ProgramLimits):
     """What a container may use; the engine sees to it."""
 
-    nice: Literal[0] = 0
-    """Engines have no such limit: give it fewer `cpus`."""
+    nice: int = Field(0, ge=0, le=0)
+    """Always 0: engines have no such limit; give it fewer `cpus`."""
     cpus: float | None = Field(None, gt=0)
     """Processors' worth of time: 0.5 is half of one."""
 
@@ -64,18 +74,18 @@ class ContainerLimits(ProgramLimits):
 class ContainerConfig(RunConfig):
     """What is run."""
 
-    image: str = Field(min_length=1, pattern=r"^[a-zA-Z0-9]")
+    image: Word
     """The image; it must be on this machine when the robot starts."""
     arguments: tuple[str, ...] = ()
     """What its entry point gets, or the command in it."""
     engine: Literal["auto", "docker", "podman"] = "auto"
     """What runs it; `auto` takes the first that works."""
-    mounts: dict[InsidePath, Mount] = {}
+    mounts: Annotated[dict[str, Mount], AfterValidator(_are_whole)] = {}
     """Folders and files of this machine by their path in the container: a path, or a map with `folder` and
     `writable`."""
-    devices: tuple[InsidePath, ...] = ()
+    devices: Annotated[tuple[str, ...], AfterValidator(_are_whole)] = ()
     """Devices of this machine that it may open: `/dev/video0`."""
-    network: str = Field("host", pattern=r"^[a-zA-Z0-9]")
+    network: Word = "host"
     """Its network; only that of the host reaches the robot's bus."""
     limits: ContainerLimits = ContainerLimits()
     """What it may use."""
