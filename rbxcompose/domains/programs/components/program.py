@@ -383,6 +383,8 @@ class Runner(Component[R]):
         while not self._is_ready(ready, guest):
             if self.real_time.now() >= deadline:
                 raise OutsideError(f"is not ready after {ready.within if ready is not None else 10.0:g} s")
+            if self.context.is_over:
+                raise OutsideError("is not ready yet, and the robot goes down")
             if self.child is not None:
                 self.child.wait(_PAUSE)
             self._hear()
