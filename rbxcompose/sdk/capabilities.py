@@ -265,8 +265,8 @@ class RunsProgram(Capability):
     """Its words; the first is a path from `folder`, or the name of an executable in PATH."""
     folder: Setting[str] = Setting("")
     """Where it runs."""
-    path: Setting[str] = Setting("")
-    """Its PATH, if it has one of its own."""
+    environment: Setting[Mapping[str, str]] = Setting({})
+    """Variables of its own; PATH may be one of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,8 +275,8 @@ class RunsContainer(Capability):
 
     image: Setting[str]
     """The image."""
-    engines: Setting[tuple[str, ...]]
-    """Executables that can run it; the first one that works does."""
+    engine: Setting[str]
+    """What runs it: `docker`, `podman`, or `auto` for the first one that works."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from rbxcompose.domains.programs.child import Child, Deaf, Line, ProgramEnd
-from rbxcompose.domains.programs.components.container import Container, ContainerConfig, engines_of, order_of, removal
+from rbxcompose.domains.programs.components.container import Container, ContainerConfig, order_of, removal
 from rbxcompose.domains.programs.runnable import NoEngineError, ask_for_real, engine_of, program_findings
 from rbxcompose.testing.manifests import check_text
 from tests.programs.foreign import robot
@@ -199,7 +199,7 @@ def findings(folder: Path, **config: Any) -> list[tuple[str, str, str, int]]:
 
 def test_a_machine_that_has_all_is_fine(engine: Path, tmp_path: Path) -> None:
     assert findings(tmp_path) == []
-    assert engine_of(("podman", "docker"), os.environ["PATH"], ask_for_real) == str(engine / "docker")
+    assert engine_of("auto", os.environ["PATH"], ask_for_real) == str(engine / "docker")
 
 
 def test_an_engine_that_does_not_answer_is_told_with_its_reason(engine: Path, tmp_path: Path) -> None:
@@ -226,7 +226,7 @@ def test_a_machine_without_an_engine_is_told(tmp_path: Path, monkeypatch: pytest
 
 def test_a_real_engine_runs_and_stops_a_container() -> None:
     try:
-        engine = engine_of(engines_of(ContainerConfig(image="x")), os.environ["PATH"], ask_for_real)
+        engine = engine_of("auto", os.environ["PATH"], ask_for_real)
     except NoEngineError as error:
         pytest.skip(str(error))
     if ask_for_real([engine, "image", "inspect", "busybox"]):

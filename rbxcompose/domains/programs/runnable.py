@@ -16,6 +16,7 @@ from rbxcompose.sdk.capabilities import RunsContainer, RunsProgram
 CANNOT_RUN = kind("RBX9427")
 NO_ENGINE = kind("RBX9428")
 NO_IMAGE = kind("RBX9429")
+ENGINES = ("docker", "podman")
 _PATIENCE = 10.0  # [s] for an engine to answer
 
 Ask = Callable[[Sequence[str]], str]
@@ -30,7 +31,7 @@ def program_findings(robot: Robot, environment: Mapping[str, str], ask: Ask) -> 
     """Yield why the programs and containers of a robot cannot run here, with the environment of `up`."""
     path = environment.get("PATH", os.defpath)
     for component, runs in robot.declared(RunsProgram):
-        yield from _of_program(robot, component, runs, runs.path.value or path)
+        yield from _of_program(robot, component, runs, runs.environment.value.get("PATH", path))
     for component, runs_image in robot.declared(RunsContainer):
         yield from _of_container(robot, component, runs_image, path, ask)
 
@@ -53,9 +54,9 @@ def _of_container(
 ) -> Iterator[Finding]:
     image = runs.image.value
     try:
-        engine = engine_of(runs.engines.value, path, ask)
+        engine = engine_of(runs.engine.value, path, ask)
     except NoEngineError as error:
-        span = setting_span(robot, (component, runs.engines.field))
+        span = setting_span(robot, (component, runs.engine.field))
         yield NO_ENGINE.at(span, f"'{component.name}' needs an engine for containers: {plain(str(error))}")
         return
     if ask([engine, "image", "inspect", image]):
@@ -63,12 +64,13 @@ def _of_container(
         yield NO_IMAGE.at(span, f"the image '{image}' is not on this machine", help=f"{name} pull {image}")
 
 
-def engine_of(engines: Sequence[str], path: str, ask: Ask) -> str:
-    """Return the file of the first engine that works.
+def engine_of(wanted: str, path: str, ask: Ask) -> str:
+    """Return the file of the wanted engine, with `auto` that of the first one that works.
 
     Raises:
         NoEngineError: if none does.
     """
+    engines = ENGINES if wanted == "auto" else (wanted,)
     files = {engine: file for engine in engines if (file := found(engine, ".", path))}
     if not files:
         raise NoEngineError(f"{' or '.join(engines)} is not installed")

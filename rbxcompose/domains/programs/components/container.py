@@ -18,7 +18,6 @@ from rbxcompose.runtime.processes import describe_exit
 from rbxcompose.sdk import Capability, component
 from rbxcompose.sdk.capabilities import RunsContainer, Setting
 
-ENGINES = ("docker", "podman")
 _INSIDE = "/rbxcompose/zenoh.json5"
 _FILES = ("ZENOH_CONFIG", "ZENOH_SESSION_CONFIG_URI")
 _ENDS = {
@@ -96,18 +95,13 @@ class Container(Runner[ContainerConfig]):
     """Runs an image of others with docker or podman, with the ports that the manifest declares for it.
 
     Example:
-        detector:
-          type: container
-          image: example.org/detector:1.2
-          devices: [/dev/video0]
-          mounts: {/models: models}
-          publishes: {detections: vision_msgs/Detection2DArray}
+        detector: {type: container, image: "example.org/detector:1.2", publishes: {found: std_msgs/String}}
     """
 
     @classmethod
     def capabilities(cls, config: ContainerConfig) -> tuple[Capability, ...]:
         """Return what the manifest says that it can do, and what `up` looks for."""
-        found = RunsContainer(Setting(config.image, "image"), Setting(engines_of(config), "engine"))
+        found = RunsContainer(Setting(config.image, "image"), Setting(config.engine, "engine"))
         return (*config.declared_capabilities(), found)
 
     @property
@@ -123,17 +117,12 @@ class Container(Runner[ContainerConfig]):
     def order(self, environment: Mapping[str, str]) -> Order:
         """Return the call of the engine; a container that a dead predecessor has left is removed first."""
         try:
-            engine = engine_of(engines_of(self.config), environment.get("PATH", os.defpath), ask_for_real)
+            engine = engine_of(self.config.engine, environment.get("PATH", os.defpath), ask_for_real)
         except NoEngineError as error:
             raise OutsideError(f"cannot be started: {error}") from error
         name = f"rbxcompose-{self.context.address.robot}-{self.name}"
         ask_for_real(removal(engine, name))
         return order_of(self.config, engine, name, environment, self.joining)
-
-
-def engines_of(config: ContainerConfig) -> tuple[str, ...]:
-    """Return the engines that may run it."""
-    return ENGINES if config.engine == "auto" else (config.engine,)
 
 
 def removal(engine: str, name: str) -> tuple[str, ...]:

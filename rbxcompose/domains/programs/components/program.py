@@ -19,7 +19,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, fie
 from pydantic_core import PydanticCustomError
 
 from rbxcompose.base.clock import MonotonicClock, SteppedClock
-from rbxcompose.base.config import Config, FolderName, Time
+from rbxcompose.base.config import Config, FolderName, Secret, Time
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import OutsideError
@@ -150,6 +150,8 @@ class RunConfig(DeclaredPorts):
 
     environment: dict[str, str] = {}
     """Variables of its environment, besides those of `up`."""
+    secrets: dict[str, Secret] = {}
+    """The same for what nobody else may see, such as `{TOKEN: "${secret.token}"}`."""
     ready: ReadyModel | None = None
     """When it is ready; without it, as soon as it runs."""
     stop: StopModel = StopModel()
@@ -335,6 +337,7 @@ class Runner(Component[R]):
             "RBXCOMPOSE_ROUTER": address.router,
             **keys,
             **self.config.environment,
+            **{name: secret.reveal() for name, secret in self.config.secrets.items()},
         }
 
     def _keys(self) -> Iterator[tuple[str, str]]:
@@ -578,8 +581,8 @@ class Program(Runner[ProgramConfig]):
     @classmethod
     def capabilities(cls, config: ProgramConfig) -> tuple[Capability, ...]:
         """Return what the manifest says that it can do, and what `up` looks for."""
-        path = Setting(config.environment.get("PATH", ""), "environment")
-        found = RunsProgram(Setting(config.command, "command"), Setting(config.folder, "folder"), path)
+        environment = Setting(config.environment, "environment")
+        found = RunsProgram(Setting(config.command, "command"), Setting(config.folder, "folder"), environment)
         return (*config.declared_capabilities(), found)
 
     def order(self, environment: Mapping[str, str]) -> Order:
