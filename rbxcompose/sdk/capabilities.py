@@ -265,6 +265,28 @@ class RunsProgram(Capability):
     """Its words; the first is a path from `folder`, or the name of an executable in PATH."""
     folder: Setting[str] = Setting("")
     """Where it runs."""
+    environment: Setting[Mapping[str, str]] = Setting({})
+    """Variables of its own; PATH may be one of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunsRosNode(Capability):
+    """It runs a node of ROS 2 in real time; `up` looks for that ROS 2 before anything starts."""
+
+    python: Setting[str]
+    """Its Python, if the manifest names it."""
+    setup: Setting[str]
+    """Its setup file, if the manifest names it."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunsContainer(Capability):
+    """It runs an image in real time; `up` looks for it and for what runs it before anything starts."""
+
+    image: Setting[str]
+    """The image."""
+    engine: Setting[str]
+    """What runs it: `docker`, `podman`, or `auto` for the first one that works."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,6 +46,11 @@ class Context(Protocol):
         ...
 
     @property
+    def is_over(self) -> bool:
+        """Return whether nobody waits any more for the call that runs: one that may block should return soon."""
+        ...
+
+    @property
     def address(self) -> BusAddress:
         """Return where the robot is on the bus."""
         ...

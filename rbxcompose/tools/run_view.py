@@ -1,5 +1,6 @@
 """Run a plan and show the run: follow the log as `logs -f` does; the supervisor reports the rest."""
 
+import os
 import sys
 from collections.abc import Iterable, Mapping
 
@@ -14,11 +15,12 @@ from rbxcompose.compiler.plan.model import Plan, extent
 from rbxcompose.domains.console.links import show_link
 from rbxcompose.domains.devices.openable import look_at, port_findings
 from rbxcompose.domains.devices.serial_ports import serial_ports
+from rbxcompose.domains.programs.runnable import ask_for_real, program_findings
 from rbxcompose.runtime.folder import RobotFolder, RunOptions
 from rbxcompose.runtime.log import NAME, Follower, Record
 from rbxcompose.runtime.supervision import launch
 from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
-from rbxcompose.sdk.capabilities import ServesPage
+from rbxcompose.sdk.capabilities import RunsContainer, RunsProgram, RunsRosNode, ServesPage
 from rbxcompose.sdk.registry import declared
 from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import LiveReload
@@ -126,6 +128,19 @@ class _Watch:
 
 def is_fit(robot: Robot, sources: Mapping[str, str]) -> bool:
     """Tell what is wrong with this machine for a robot, and return whether it may start."""
-    report = Report([*missing_extras(robot), *port_findings(robot, serial_ports(), look_at)])
+    report = Report(
+        [
+            *missing_extras(robot),
+            *port_findings(robot, serial_ports(), look_at),
+            *program_findings(robot, os.environ, ask_for_real),
+        ]
+    )
     write_report(report, sources)
     return not report.has_errors
+
+
+def real_time_only(robot: Robot) -> list[str]:
+    """Return the components that run programs of others, for which robot time cannot be stepped."""
+    return [
+        component.name for what in (RunsProgram, RunsContainer, RunsRosNode) for component, _ in robot.declared(what)
+    ]

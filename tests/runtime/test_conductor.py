@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -13,7 +15,7 @@ from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.sdk.robot_events import MissionOver, RobotHeld
-from tests.runtime.stage import ENDPOINT, Stage, robot
+from tests.runtime.stage import ENDPOINT, Stage, placed, robot
 
 # The beginning
 
@@ -45,6 +47,26 @@ def test_components_are_activated_in_the_order_of_the_plan() -> None:
     stage = Stage().start()
     expected = [("world", ["base"]), ("robot", ["mux", "go_to"]), ("mission", ["mission"])]
     assert stage.orders(say.Activate) == [(process, say.Activate(names)) for process, names in expected]
+
+
+def test_who_starts_after_one_that_may_take_its_time_waits_until_that_is_active() -> None:
+    prepare, other = (placed(name, "program", "programs", command=["./x"]) for name in ("prepare", "other"))
+    late = replace(placed("late", "program", "programs", command=["./x"]), starts_after=("prepare",))
+    stage = Stage(Plan("robot", "robot.yaml", (prepare, late, other)))
+    stage.configure("router", "programs")
+    assert stage.orders(say.Activate) == [("programs", say.Activate(["prepare", "other"]))]
+    stage.speak("programs", say.States({"other": ("active", 0)}))
+    assert len(stage.orders(say.Activate)) == 1
+    stage.speak("programs", say.States({"prepare": ("active", 0)}))
+    assert stage.orders(say.Activate)[1:] == [("programs", say.Activate(["late"]))]
+    stage.exit("programs")
+    stage.pass_time(0.2)
+    stage.configure("programs")
+    assert stage.orders(say.Activate)[2:] == [("programs", say.Activate(["prepare", "other"]))]
+    stage.speak("programs", say.States({"other": ("active", 1)}))
+    assert len(stage.orders(say.Activate)) == 3
+    stage.speak("programs", say.States({"prepare": ("active", 1)}))
+    assert stage.orders(say.Activate)[3:] == [("programs", say.Activate(["late"]))]
 
 
 def test_the_robot_starts_once_all_are_active() -> None:

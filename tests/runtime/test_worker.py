@@ -329,6 +329,29 @@ def test_one_that_becomes_active_while_the_robot_goes_down_brakes(process: Proce
     process.until(lambda: process.planner.brakes == 1)
 
 
+def test_one_that_has_not_braked_yet_is_not_at_rest(process: Process) -> None:
+    process.send("work", 1.0)
+    assert Planner.gate.entered.wait(PATIENCE)
+    process.host.brake()
+    assert not process.host.is_at_rest
+    Planner.gate.opened.set()
+    process.until(lambda: process.host.is_at_rest)
+    assert process.planner.brakes == 1
+
+
+def test_one_that_runs_can_see_that_nobody_waits_for_it_any_more(process: Process) -> None:
+    process.send("work", 1.0)
+    assert Planner.gate.entered.wait(PATIENCE)
+    context = process.planner.context
+    before = context.is_over
+    process.host.shutdown()
+    assert (before, context.is_over) == (False, True)
+    Planner.gate.opened.set()
+    for thread in threading.enumerate():
+        if thread.name == "planner":
+            thread.join(PATIENCE)
+
+
 def test_it_says_goodbye_in_order(process: Process) -> None:
     Planner.gate.opened.set()
     process.host.shutdown()

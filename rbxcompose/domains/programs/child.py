@@ -5,17 +5,24 @@ from __future__ import annotations
 import json
 import os
 import select
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
+from uuid import uuid4
 
 from rbxcompose.base.dataclass import dataclass
 
 KEEPER = Path(__file__).with_name("keeper.py")
 MOST_READ = 256 * 1024  # [bytes] at once; a program that writes more waits
 LONGEST_LINE = 2_000  # [bytes]
-_KILLED = 2.0  # [s] for the keeper to end all
+_KILLED = 3.5  # [s] for the keeper to end all
+_CLEANS_UP = 5.0  # [s] for what ends something elsewhere
+_PAUSE = 0.005  # [s] between two looks for what is left
+_MARK = "RBXCOMPOSE_RUN"  # in the environment of all that belongs to one run of a program
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +40,8 @@ class Order:
     cores: Sequence[int] = ()
     descriptors: Sequence[int] = ()
     """Open files that it inherits."""
+    cleanup: Sequence[str] = ()
+    """Run when it has ended, also if nobody is left: it ends what runs elsewhere on its behalf."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,10 +96,11 @@ class Child:
         Raises:
             OSError: if no process can be started.
         """
+        self._mark = uuid4().hex
         self._reports, report = os.pipe()
         self._lines, output = os.pipe()
         wanted = {name: getattr(order, name) for name in order.__slots__}
-        wanted |= {"environment": dict(order.environment), "report": report}
+        wanted |= {"environment": {**order.environment, _MARK: self._mark}, "report": report}
         try:
             self._keeper = subprocess.Popen(
                 [sys.executable, "-I", "-S", str(KEEPER)],
@@ -101,6 +111,10 @@ class Child:
                 start_new_session=True,
                 bufsize=0,
             )
+        except BaseException:
+            os.close(self._reports)
+            os.close(self._lines)
+            raise
         finally:
             os.close(report)
             os.close(output)
@@ -108,6 +122,8 @@ class Child:
         for descriptor in (self._reports, self._lines):
             os.set_blocking(descriptor, False)
         self._heard = {self._reports: b"", self._lines: b""}
+        self._silent: set[int] = set()  # nobody can write there any more
+        self._patience = _KILLED + (_CLEANS_UP if order.cleanup else 0.0)
         self._is_asked = False
         self.pid: int | None = None
 
@@ -127,7 +143,12 @@ class Child:
 
     def wait(self, seconds: float) -> None:
         """Wait until there is something to hear, at most so long [s]."""
-        select.select([*self._heard], [], [], seconds)
+        select.select(self._heard.keys() - self._silent, [], [], seconds)
+
+    @property
+    def memory(self) -> int:
+        """Return what it and all that it started hold in memory [bytes]; shared pages count for each process."""
+        return sum(map(_memory_of, _children_of(self._keeper.pid)))
 
     def ask_to_end(self) -> None:
         """Send the signal; after its time, it is killed."""
@@ -140,10 +161,12 @@ class Child:
         if self._keeper.stdin is not None:
             self._keeper.stdin.close()
         try:
-            self._keeper.wait(_KILLED)
+            self._keeper.wait(self._patience)
         except subprocess.TimeoutExpired:
             self._keeper.kill()
             self._keeper.wait()
+        if self._keeper.returncode:  # it was killed, so that nobody has ended what the program had started
+            _kill_marked(f"{_MARK}={self._mark}".encode())
         for descriptor in self._heard:
             os.close(descriptor)
         self._heard = {}
@@ -160,8 +183,8 @@ class Child:
             case {"event": "started", "pid": int(pid)}:
                 self.pid = pid
                 return Started(pid)
-            case {"event": "failed", "why": [why, what]}:
-                return NotStarted(f"{what}: {why}" if what else str(why))
+            case {"event": "failed", "why": str(why)}:
+                return NotStarted(why)
             case {"event": "ended", "status": int(status)}:
                 self.pid = None
                 return ProgramEnd(status)
@@ -171,7 +194,7 @@ class Child:
                 return Deaf()
 
     def _read(self, descriptor: int, *, is_over: bool) -> Iterator[bytes]:
-        """Yield the whole lines that have come; the rest stays until it is whole, too long or the last one."""
+        """Yield the lines that have come, without what is too long of them; the last one only once it is whole."""
         if descriptor not in self._heard:
             return
         left, size = self._heard[descriptor], 0
@@ -181,31 +204,47 @@ class Child:
             except BlockingIOError:
                 break
             if not data:
+                self._silent.add(descriptor)
                 break
             size += len(data)
             *lines, left = (left + data).split(b"\n")
-            yield from lines
-            if len(left) > LONGEST_LINE:
-                yield left
-                left = b""
+            for line in lines:
+                yield line[:LONGEST_LINE]
+            left = left[:LONGEST_LINE]
         if is_over and left:
             yield left
             left = b""
         self._heard[descriptor] = left
 
 
-def memory_of(pid: int) -> int:
+def _kill_marked(mark: bytes) -> None:
+    """Kill all processes whose environment has this; they may start others meanwhile."""
+    while found := [pid for pid in map(int, filter(str.isdecimal, os.listdir("/proc"))) if _has(pid, mark)]:
+        for pid in found:
+            with suppress(ProcessLookupError, PermissionError):
+                os.kill(pid, signal.SIGKILL)
+        time.sleep(_PAUSE)
+
+
+def _has(pid: int, mark: bytes) -> bool:
+    try:
+        return mark in Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+    except OSError:
+        return False  # it has ended, or is somebody else's
+
+
+def _memory_of(pid: int) -> int:
     """Return what a process and all that it started hold in memory [bytes]; shared pages count for each."""
-    total = 0
-    left = [pid]
-    while left:
-        process = left.pop()
-        try:
-            pages = int(Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()[1])
-            for task in os.listdir(f"/proc/{process}/task"):
-                children = Path(f"/proc/{process}/task/{task}/children").read_text(encoding="ascii")
-                left += [int(text) for text in children.split()]
-        except (OSError, IndexError):
-            continue  # it has just ended
-        total += pages * os.sysconf("SC_PAGE_SIZE")
-    return total
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
+    except (OSError, IndexError):
+        return 0  # it has just ended
+    return pages * os.sysconf("SC_PAGE_SIZE") + sum(map(_memory_of, _children_of(pid)))
+
+
+def _children_of(pid: int) -> list[int]:
+    with suppress(OSError):
+        tasks = os.listdir(f"/proc/{pid}/task")
+        files = [Path(f"/proc/{pid}/task/{task}/children") for task in tasks]
+        return [int(text) for file in files for text in file.read_text(encoding="ascii").split()]
+    return []

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
 from rbxcompose.base.config import (
     Acceleration,
@@ -28,6 +29,7 @@ from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Qos, Serves,
 QosName = Literal["command", "state", "latched", "event", "bulk"]
 _LARGE = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/PointCloud2")
 _TF = "tf2_msgs/msg/TFMessage"
+_ODOMETRY = "nav_msgs/msg/Odometry"
 _COMMANDS = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 
 
@@ -134,16 +136,16 @@ class CapabilitiesModel(Config):
     frames: dict[str, str] = {}
     """Frames that it places at `/tf`, each with its parent."""
 
-    def named_ports(self) -> Iterator[tuple[str, str]]:
-        """Yield the ports that they name, each with the key that does."""
+    def named_ports(self) -> Iterator[tuple[str, str, str, tuple[str, ...]]]:
+        """Yield the ports that they name: the key that does, the port, where it is declared, and its types, if any."""
         if self.drives is not None:
-            yield "drives.commands", self.drives.commands
+            yield "drives.commands", self.drives.commands, "subscribes", _COMMANDS
             if self.drives.odometry:
-                yield "drives.odometry", self.drives.odometry
+                yield "drives.odometry", self.drives.odometry, "publishes", (_ODOMETRY,)
         if self.commands_motion is not None:
-            yield "commands_motion.commands", self.commands_motion.commands
+            yield "commands_motion.commands", self.commands_motion.commands, "publishes", _COMMANDS
         if self.drains is not None:
-            yield "drains.level", self.drains.level
+            yield "drains.level", self.drains.level, "publishes", ()
 
 
 class DeclaredPorts(Config):
@@ -164,24 +166,37 @@ class DeclaredPorts(Config):
     capabilities: CapabilitiesModel = CapabilitiesModel()
     """What it can do, for the checks."""
 
-    @model_validator(mode="after")
-    def _have_names_of_their_own(self) -> DeclaredPorts:
-        topics: dict[str, str] = {}
-        kinds = self.publishes, self.subscribes, self.serves, self.calls, self.serves_actions, self.calls_actions
-        for topic in (topic for kind in kinds for topic in kind):
-            if port_name(topic) in topics:
-                raise ValueError(f"'{topics[port_name(topic)]}' and '{topic}' would be the same port: rename one")
-            topics[port_name(topic)] = topic
-        if self.capabilities.frames and self.publishes.get("/tf", PublishedTopic(type="std_msgs/Empty")).type != _TF:
-            raise ValueError(f"it places frames, so 'publishes' needs '/tf: {_TF}'")
-        for what, port in self.capabilities.named_ports():
+    @field_validator("publishes", "subscribes", "serves", "calls", "serves_actions", "calls_actions")
+    @classmethod
+    def _have_names_of_their_own(cls, given: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+        before = dict(_named(info.data, *_KINDS))
+        for port, topic in _named({**info.data, str(info.field_name): given}, str(info.field_name)):
+            if port in before:
+                raise ValueError(f"'{before[port]}' and '{topic}' would be the same port, '{port}': rename one")
+            before[port] = topic
+        return given
+
+    @field_validator("capabilities")
+    @classmethod
+    def _name_its_ports(cls, given: CapabilitiesModel, info: ValidationInfo) -> CapabilitiesModel:
+        if not all(kind in info.data for kind in _KINDS):
+            return given  # one of them has a mistake, which may be why a port is not there
+        for what, port, kind, types in given.named_ports():
+            topics = dict(_named(info.data, kind))
             if port not in topics:
-                raise ValueError(f"'{what}' names the port '{port}', which is not declared")
-        return self
+                words = f"'{what}' names the port '{port}', which '{kind}' does not have"
+                raise PydanticCustomError("name", "{words}", {"words": words, **_names(port, topics, "ports")})
+            if types and (found := info.data[kind][topics[port]].type) not in types:
+                raise ValueError(f"'{what}' names the port '{port}', which has {found} instead of {' or '.join(types)}")
+        frames = info.data["publishes"].get("/tf")
+        if given.frames and (frames is None or frames.type != _TF):
+            raise ValueError(f"it places frames, so 'publishes' needs '/tf: {_TF}'")
+        return given
 
     def ports(self) -> dict[str, Port[Any]]:
         """Return its ports by name: that of the topic, with underscores for slashes."""
-        return {port_name(port.topic): port.named(port_name(port.topic)).elsewhere() for port in self._declared()}
+        names = (name for name, _ in _named(dict(self), *_KINDS))
+        return {name: port.named(name).elsewhere() for name, port in zip(names, self._declared(), strict=True)}
 
     def _declared(self) -> Iterator[Port[Any]]:
         for topic, given in self.publishes.items():
@@ -220,6 +235,36 @@ _DRIVES = ("max_speed", "max_turn_rate", "stops_after", "acceleration", "turn_ac
 def _settings(name: str, model: Config, fields: tuple[str, ...]) -> Mapping[str, Any]:
     values = ((field, getattr(model, field)) for field in fields)
     return {field: Setting(value, f"capabilities.{name}.{field}") for field, value in values if value is not None}
+
+
+_KINDS = ("publishes", "subscribes", "serves", "calls", "serves_actions", "calls_actions")
+
+
+def _named(data: Mapping[str, Any], *kinds: str) -> Iterator[tuple[str, str]]:
+    """Yield the ports of declared topics, services and actions by name, each with its topic.
+
+    Where a topic is published as well, `tf` is the port that publishes and `tf_in` the one that subscribes.
+    """
+    for kind in kinds:
+        for topic in data.get(kind, ()):
+            both = kind == "subscribes" and topic in data.get("publishes", ())
+            yield f"{port_name(topic)}_in" if both else port_name(topic), topic
+
+
+def _names(name: str, valid: Iterable[str], what: str) -> dict[str, Any]:
+    return {"name": name, "valid": tuple(valid), "what": what}
+
+
+def published(topic: str, publishes: Mapping[str, PublishedTopic]) -> str:
+    """Return a topic that is waited for if it is published.
+
+    Raises:
+        PydanticCustomError: if it is not.
+    """
+    if topic and topic not in publishes:
+        words = f"it waits for the topic '{topic}', which 'publishes' does not have"
+        raise PydanticCustomError("name", "{words}", {"words": words, **_names(topic, publishes, "topics")})
+    return topic
 
 
 def port_name(topic: str) -> str:

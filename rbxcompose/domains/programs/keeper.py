@@ -8,7 +8,9 @@ it ends the program as well. What happens, it writes to a descriptor, a line of 
 from __future__ import annotations
 
 import ctypes
+import errno
 import json
+import math
 import os
 import resource
 import select
@@ -27,6 +29,7 @@ _PDEATHSIG, _SUBREAPER = 1, 36  # options of prctl(2)
 _HARMLESS = 127  # exit code of a child that could not start the command
 _AT_ONCE = 1.0  # [s] for what was killed to end
 _ORPHANED = 1.0  # [s] that a program has when nobody is left to drive the robot
+_CLEANS_UP = 5.0  # [s] for the command that cleans up
 _LIBC = ctypes.CDLL(None)
 _TAKEN = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE)
 
@@ -54,6 +57,7 @@ def main() -> None:
         for descriptor in (1, 2):  # only the program's: their end is its end
             os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
         keep(wanted, child, ended, report)
+        clean_up(wanted)
 
 
 def start(wanted: Order, report: Report) -> int | None:
@@ -64,18 +68,23 @@ def start(wanted: Order, report: Report) -> int | None:
     if child == 0:
         try:
             _become(wanted, keeper)
-        except OSError as error:
-            os.write(fails, json.dumps([error.strerror, error.filename or ""]).encode())
+        except Exception as error:
+            os.write(fails, str(error).encode("utf-8", "replace"))
         finally:
             os._exit(_HARMLESS)
     os.close(fails)
     problem = os.read(failed, 4096)
+    os.close(failed)
     if problem:
         os.waitpid(child, 0)
-        report(event="failed", why=json.loads(problem))
+        report(event="failed", why=problem.decode("utf-8", "replace"))
         return None
     report(event="started", pid=child)
     return child
+
+
+class CannotRunError(Exception):
+    """Why the program cannot be run, in plain words."""
 
 
 def _become(wanted: Order, keeper: int) -> None:
@@ -87,57 +96,122 @@ def _become(wanted: Order, keeper: int) -> None:
         signal.signal(number, signal.SIG_DFL)
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    if files := wanted["open_files"]:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (files, files))
-    if cores := wanted["cores"]:
-        os.sched_setaffinity(0, cores)
-    os.nice(wanted["nice"])
-    os.chdir(wanted["folder"])
-    os.execvpe(wanted["command"][0], wanted["command"], wanted["environment"])  # noqa: S606 -- what a user wants to run, without a shell
+    files, cores, nice = wanted["open_files"], wanted["cores"], wanted["nice"]
+    if files:
+        _limit("open_files", lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (files, files)))
+    if cores:
+        _limit("cores", lambda: os.sched_setaffinity(0, cores))
+    _limit("nice", lambda: os.nice(nice))
+    command, folder, environment = wanted["command"], wanted["folder"], wanted["environment"]
+    if why := obstacle(command[0], folder, environment.get("PATH", os.defpath)):
+        raise CannotRunError(why)
+    file = found(command[0], folder, environment.get("PATH", os.defpath))
+    try:
+        os.chdir(folder)
+        os.execve(file, command, environment)  # noqa: S606 -- what a user wants to run, without a shell
+    except OSError as error:
+        why = "the first line of a script names what runs it: '#!/bin/sh'" if error.errno == errno.ENOEXEC else ""
+        raise CannotRunError(f"{file}: {why or error.strerror}") from error
+
+
+def _limit(name: str, apply: Callable[[], object]) -> None:
+    try:
+        apply()
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise CannotRunError(f"'limits.{name}' cannot be kept here: {why}") from error
+
+
+def found(word: str, folder: str, path: str) -> str:
+    """Return the file that the first word of a command means: relative to `folder`, else by PATH; "" if none."""
+    if "/" in word:
+        return os.path.join(folder, word)
+    files = (os.path.join(folder, place, word) for place in path.split(os.pathsep))
+    return next((file for file in files if os.path.isfile(file) and os.access(file, os.X_OK)), "")
+
+
+def obstacle(word: str, folder: str, path: str) -> str:
+    """Return why a program cannot be run on this machine, "" if it seems that it can."""
+    if not os.path.isdir(folder):
+        return f"there is no folder {folder}"
+    file = found(word, folder, path)
+    if not file:
+        return f"there is no executable '{word}' in PATH"
+    if os.path.isdir(file):
+        return f"{file} is a folder"
+    if not os.path.exists(file):
+        return f"there is no file {file}"
+    if not os.access(file, os.X_OK):
+        return f"{file} is not executable"
+    interpreter = _interpreter(file)
+    return f"{file} is to be run by {interpreter}, which is not there" if not os.path.exists(interpreter) else ""
+
+
+def _interpreter(file: str) -> str:
+    """Return what runs a script by its first line; of anything else, the file itself."""
+    try:
+        with open(file, "rb") as script:
+            first = script.readline(256)
+    except OSError:
+        return file  # it may be run, but not read
+    words = first[2:].split() if first.startswith(b"#!") else []
+    return os.fsdecode(words[0]) if words else file
 
 
 def keep(wanted: Order, child: int, ended: int, report: Report) -> None:
-    """Wait for the end of the program, ask for it when told to, and end what it leaves behind."""
-    deadline: float | None = None
-    while True:
-        pause = None if deadline is None else max(0.0, deadline - time.monotonic())
-        ready, _, _ = select.select([ended, *([0] if deadline is None else ())], [], [], pause)
+    """Wait for the end of the program, ask for it when told to, and end what it leaves behind.
+
+    All that it has started is asked with it, and has the same time.
+    """
+    status, deadline = None, math.inf
+    is_asked = is_deaf = is_orphan = False
+    while status is None or (is_asked and not is_deaf and _children()):
+        pause = None if deadline == math.inf else max(0.0, deadline - time.monotonic())
+        ready, _, _ = select.select([ended, *(() if is_orphan else (0,))], [], [], pause)
         if ended in ready:
             os.read(ended, 4096)
-            if (status := _reaped(child)) is not None:
-                break
+        status = _reaped(child, status)
         if 0 in ready:
-            patience = wanted["patience"] if os.read(0, 1) else min(wanted["patience"], _ORPHANED)
-            _signal_group(child, wanted["signal"])
-            deadline = time.monotonic() + patience
-        if deadline is not None and time.monotonic() >= deadline:
-            report(event="deaf")
+            is_orphan = not os.read(0, 64)
+            if not is_asked:
+                _signal_group(child, wanted["signal"])
+            patience = min(wanted["patience"], _ORPHANED) if is_orphan else wanted["patience"]
+            is_asked, deadline = True, min(deadline, time.monotonic() + patience)
+        if time.monotonic() >= deadline:
+            if not is_deaf:
+                report(event="deaf")
+            is_deaf, deadline = True, time.monotonic() + _AT_ONCE
             _signal_group(child, signal.SIGKILL)
-            deadline = time.monotonic() + _AT_ONCE
     report(event="ended", status=status)
-    if left := _end_all():
+    left = _end_all()
+    if left and not is_deaf:
         report(event="left", number=left)
 
 
-def _reaped(child: int) -> int | None:
-    """Collect the children that have ended; return the wait status of `child` if it is one of them."""
-    found = None
+def _reaped(child: int, status: int | None) -> int | None:
+    """Collect the children that have ended; return the wait status of `child` if it is one of them, else `status`."""
     while True:
         try:
-            pid, status = os.waitpid(-1, os.WNOHANG)
+            pid, how = os.waitpid(-1, os.WNOHANG)
         except ChildProcessError:
-            return found
+            return status
         if pid == 0:
-            return found
+            return status
         if pid == child:
-            found = status
+            status = how
+
+
+def _children() -> set[int]:
+    """Return what has been started by the program and not ended; all of it comes to this process sooner or later."""
+    with open(f"/proc/self/task/{os.getpid()}/children", encoding="ascii") as file:
+        return {int(text) for text in file.read().split()}
 
 
 def _signal_group(child: int, number: int) -> None:
     try:
         os.killpg(child, number)
-    except ProcessLookupError:
-        return  # it ends just now
+    except (ProcessLookupError, PermissionError):
+        return  # it ends just now, or has become somebody else's
 
 
 def _end_all() -> int:
@@ -145,16 +219,35 @@ def _end_all() -> int:
     killed: set[int] = set()
     deadline = time.monotonic() + _AT_ONCE
     while time.monotonic() < deadline:
-        _reaped(0)
-        with open(f"/proc/self/task/{os.getpid()}/children", encoding="ascii") as file:
-            left = {int(text) for text in file.read().split()}
+        _reaped(0, None)
+        left = _children()
         if not left:
             break
         for pid in left:
-            os.kill(pid, signal.SIGKILL)
+            try:
+                os.kill(pid, signal.SIGKILL)
+            except PermissionError:
+                continue  # it has become somebody else's
         killed |= left
         time.sleep(0.005)  # what a killed process has forked comes here when it is gone
     return len(killed)
+
+
+def clean_up(wanted: Order) -> None:
+    """Run the command that ends what runs elsewhere on behalf of the program, such as its container."""
+    command = wanted["cleanup"]
+    if not command:
+        return
+    null = [(os.POSIX_SPAWN_OPEN, number, os.devnull, os.O_RDWR, 0) for number in (0, 1, 2)]
+    try:
+        os.posix_spawn(command[0], command, wanted["environment"], file_actions=null, setsigdef=_TAKEN)
+    except OSError:
+        return  # it is not there any more
+    deadline = time.monotonic() + _CLEANS_UP
+    while _children() and time.monotonic() < deadline:
+        _reaped(0, None)
+        time.sleep(0.005)
+    _end_all()
 
 
 if __name__ == "__main__":

@@ -30,10 +30,10 @@ class EndKind(StrEnum):
 
 
 _VERBS = {
-    EndKind.PUBLISHER: ("publishes", "publishes:"),
-    EndKind.SUBSCRIBER: ("subscribes to", "subscribes:"),
-    EndKind.QUERYABLE: ("serves", "serves:"),
-    EndKind.QUERIER: ("calls", "calls:"),
+    EndKind.PUBLISHER: ("publishes", "publishes"),
+    EndKind.SUBSCRIBER: ("subscribes to", "subscribes"),
+    EndKind.QUERYABLE: ("serves", "serves"),
+    EndKind.QUERIER: ("calls", "calls"),
 }
 
 
@@ -103,12 +103,16 @@ class ProgramWatch:
 
     def _undeclared(self, session: Collection[KeyOnBus]) -> Iterator[str]:
         for key in sorted(session, key=lambda one: (one.kind, one.name)):
-            if OWN.search(key.name) or _ACTION.sub("", key.name) in self._actions:
+            known = self._declared.get((key.kind, key.name))
+            action = _ACTION.sub("", key.name)
+            if known is None and (OWN.search(key.name) or action in self._actions):
                 continue
             verb, where = _VERBS[key.kind]
-            known = self._declared.get((key.kind, key.name))
-            if known is None:
-                yield f"{verb} '{key.name}', which '{where.rstrip(':')}' does not declare"
+            if known is None and action != key.name:
+                if key.name.endswith("/send_goal"):  # one of its five ends stands for all
+                    yield f"{verb} the action '{action}', which '{where}_actions' does not declare"
+            elif known is None:
+                yield f"{verb} '{key.name}', which '{where}' does not declare"
             elif known.key.type != key.type:
                 yield f"{verb} '{key.name}' as {_ros(key.type)}, declared as {_ros(known.key.type)}"
             elif known.key.hash != key.hash:
@@ -122,7 +126,7 @@ class ProgramWatch:
             heard = self.count(end.port) > 0
             is_there = (kind, name) in there or (kind is EndKind.PUBLISHER and heard)
             if session and not is_there and kind is not EndKind.QUERIER:
-                yield f"declares '{name}', but never {_VERBS[kind][0]} it"
+                yield f"declares '{_ACTION.sub('', name)}', but never {_VERBS[kind][0]} it"
             elif kind is EndKind.PUBLISHER and not heard and (end.rate is not None or not session):
                 yield f"has published nothing on '{name}' for {PATIENCE:g} s"
 

@@ -344,7 +344,11 @@ class Host:
     @property
     def is_at_rest(self) -> bool:
         """Return whether everything that the components of this process move is at rest."""
-        return all(entry.component.is_at_rest for entry in self.hosted.values() if entry.component)
+        return all(
+            entry.component.is_at_rest and not entry.has_to("brake")
+            for entry in self.hosted.values()
+            if entry.component
+        )
 
     def summary(self) -> dict[str, dict[str, str]]:
         """Return the components' facts for the summary: instance -> label -> text."""

@@ -435,6 +435,10 @@ class Hosted:
         """Return whether the component is in a call in its own thread, so that no other thread must use it."""
         return self.worker is not None and self.worker.is_busy
 
+    def has_to(self, label: str) -> bool:
+        """Return whether such a call of the component has been handed to its own thread and has not returned."""
+        return self.worker is not None and self.worker.has_to(label)
+
     @property
     def moves(self) -> str:
         """Return in words how it moves the robot or is about to; empty if it does not."""
@@ -480,6 +484,11 @@ class Hosted:
     def is_stopped(self) -> bool:
         """Return whether the robot is held by a stop."""
         return self.host.is_stopped
+
+    @property
+    def is_over(self) -> bool:
+        """Return whether nobody waits any more: never for what runs in the scheduler's thread."""
+        return False
 
     @property
     def address(self) -> BusAddress:

@@ -60,7 +60,7 @@ class Worker:
         self._waiting: list[_Waiting] = []
         self._label = ""  # of the call that runs
         self._since = 0.0  # [s] of robot time
-        self._is_closed = False
+        self.is_closed = False
         self._calls: SimpleQueue[Call | None] = SimpleQueue()
         self._thread = threading.Thread(target=self._run, name=owner, daemon=True)
         self._thread.start()
@@ -72,7 +72,7 @@ class Worker:
 
     def submit(self, label: str, call: Call, depth: int | None = None) -> None:
         """Queue `call`; if `depth` calls with this label are waiting already, drop the oldest of them."""
-        if self._is_closed:
+        if self.is_closed:
             return
         same = [one for one in self._waiting if one.label == label]
         if depth is not None and len(same) >= depth:
@@ -83,17 +83,21 @@ class Worker:
 
     def send(self, call: Call) -> None:
         """Run `call` in the scheduler's thread, unless the component is gone by then. Any thread may call this."""
-        self._post(self._owner, lambda: None if self._is_closed else call())
+        self._post(self._owner, lambda: None if self.is_closed else call())
 
     def busy_for(self) -> tuple[str, float]:
         """Return the label of the current call, and how long it has been running [s]."""
         return (self._label, self._clock.now() - self._since) if self.is_busy else ("", 0.0)
 
+    def has_to(self, label: str) -> bool:
+        """Return whether a call with this label runs or waits for its turn."""
+        return self._label == label or any(one.label == label for one in self._waiting)
+
     def look(self) -> str:
         """Return in words which call takes long, empty if none does; a call that takes too long is a failure."""
         label, seconds = self.busy_for()
         most = self._configures_within if label in (CONFIGURE, ACTIVATE) else LONGEST
-        if seconds > most and not self._is_closed:
+        if seconds > most and not self.is_closed:
             error = HungError(f"{label} has not returned for {most:g} s")
             error.add_note(self._stack())
             self._failed(error)
@@ -101,7 +105,7 @@ class Worker:
 
     def close(self, patience: float) -> bool:
         """Drop the waiting calls and end the thread; return whether it has ended within `patience` [s]."""
-        self._is_closed = True
+        self.is_closed = True
         self._waiting.clear()
         self._calls.put(None)
         if self._thread is not threading.current_thread():
@@ -125,7 +129,7 @@ class Worker:
 
     def _returned(self, error: Exception | None) -> None:
         self._label = ""
-        if self._is_closed:
+        if self.is_closed:
             return
         if error is not None:
             self._failed(error)
@@ -279,6 +283,11 @@ class HandedOver:
     def is_stopped(self) -> bool:
         """Return whether the robot is held by a stop."""
         return self._context.is_stopped
+
+    @property
+    def is_over(self) -> bool:
+        """Return whether nobody waits any more for the call that runs."""
+        return self._worker.is_closed
 
     @property
     def address(self) -> BusAddress:

@@ -28,6 +28,7 @@ from rbxcompose.runtime.supervision.plan_change import LONGEST, Changing, WhenDo
 from rbxcompose.runtime.supervision.shutdown import END_BOUND, Closing, rest_time
 from rbxcompose.runtime.supervision.silence import LOOK, Silence
 from rbxcompose.runtime.supervision.stop_latch import StopLatch
+from rbxcompose.sdk.registry import component_type
 from rbxcompose.sdk.robot_events import ComponentNoted, MissionOver, RobotHeld
 
 FINE, MISSION_FAILED, ROBOT_FAILED, INTERRUPTED = 0, 3, 4, 130
@@ -103,7 +104,8 @@ class Conductor:
         fresh = [instance for instance in waiting if instance.name not in self.members[instance.process].requested]
         if self.phase is Phase.STARTING and waiting[:1] != fresh[:1]:
             return  # the answer of the first one is pending, or it is being restarted in place
-        fresh = list(self.hosts.reached(fresh))
+        slow = {instance.name for instance in waiting if component_type(instance.type).blocking}
+        fresh = [instance for instance in self.hosts.reached(fresh) if slow.isdisjoint(instance.starts_after)]
         if fresh:
             group = fresh[0].process
             names = [one.name for one in takewhile(lambda instance: instance.process == group, fresh)]

@@ -17,7 +17,7 @@ from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.recording.codes import UNWRITABLE
 from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import LiveReload
-from rbxcompose.tools.run_view import is_fit, run_plan
+from rbxcompose.tools.run_view import is_fit, real_time_only, run_plan
 
 GROUP = "run"
 IS_COMMON = True
@@ -61,6 +61,10 @@ def run(arguments: argparse.Namespace) -> int:
         return 1
     if compilation.plan.follows_clock and arguments.rate.is_stepped:
         return misused("up", "the robot follows /clock ('bus.clock'), so --rate cannot be given with it")
+    if arguments.rate.is_stepped and (names := real_time_only(compilation.robot)):
+        runs = "runs a program, which keeps" if len(names) == 1 else "run programs, which keep"
+        words = ", ".join(f"'{name}'" for name in names)
+        return misused("up", f"{words} {runs} real time, so --rate cannot be given")
     options = _options(arguments)
     if options.record is not None and not options.is_stepped:
         return misused("up", "--record needs --rate; a run in real time is recorded by 'rbxcompose record'")

@@ -28,7 +28,7 @@ class RosModel(Config):
     """The Python that has rclpy, such as that of an environment of pip, in place of `setup`; without both, that of the
     environment in which `up` runs."""
     domain: int = Field(0, ge=0, le=232)
-    """The domain of its nodes."""
+    """The domain of its nodes, if they are bridged; else that of `bus` counts."""
     discovery: Literal["localhost", "subnet"] = "localhost"
     """How far its nodes look for each other."""
     bridge: Literal["auto", "always", "never"] = "auto"
@@ -83,11 +83,12 @@ def installation_of(model: RosModel, base: Mapping[str, str]) -> RosInstallation
         environment["AMENT_PREFIX_PATH"] = ":".join(paths)
     else:
         python = shutil.which("python3", path=environment.get("PATH")) or "python3"
-    environment["ROS_DOMAIN_ID"] = str(model.domain)
     environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = model.discovery.upper()
     is_ours = environment.get("RMW_IMPLEMENTATION") == ZENOH
     is_bridged = model.bridge == "always" or (model.bridge == "auto" and not is_ours)
-    if model.bridge == "never":
+    if is_bridged:
+        environment["ROS_DOMAIN_ID"] = str(model.domain)
+    else:  # on the robot's bus, that of the robot counts
         environment["RMW_IMPLEMENTATION"] = ZENOH
     for name in ("PYTHONHOME", "PYTHONPATH") if model.python else ():
         environment.pop(name, None)  # they are of our Python

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import re
+import shlex
 import signal
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, cast
 from uuid import uuid4
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from rbxcompose.base.clock import SteppedClock
-from rbxcompose.base.config import Config, LocalPath, Time
+from rbxcompose.base.clock import MonotonicClock, SteppedClock
+from rbxcompose.base.config import Config, LocalPath, Secret, Time
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import OutsideError
@@ -24,28 +28,19 @@ from rbxcompose.bus.tokens import SPACE, EndpointToken, EntityKind, NodeToken, p
 from rbxcompose.bus.transport import Closable
 from rbxcompose.bus.wire import WireProfile, ros_qos
 from rbxcompose.bus.zenoh_session import as_file, guest_settings
+from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
-from rbxcompose.domains.programs.child import (
-    Child,
-    Deaf,
-    LeftBehind,
-    Line,
-    NotStarted,
-    Order,
-    ProgramEnd,
-    Started,
-    memory_of,
-)
-from rbxcompose.domains.programs.declaration import DeclaredPorts
+from rbxcompose.domains.programs.child import Child, Deaf, LeftBehind, Line, NotStarted, Order, ProgramEnd, Started
+from rbxcompose.domains.programs.declaration import DeclaredPorts, port_name, published
 from rbxcompose.domains.programs.output import OutputLog
 from rbxcompose.domains.programs.watch import DeclaredKey, EndKind, KeyOnBus, ProgramWatch
-from rbxcompose.msgs.action_msgs import CancelGoal
+from rbxcompose.msgs.action_msgs import CancelGoal, GoalStatusArray
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.processes import describe_exit
 from rbxcompose.sdk import Capability, Component, component
 from rbxcompose.sdk.capabilities import RunsProgram, Setting
-from rbxcompose.sdk.ports import Calls, In, Out, Port, Qos, Serves, ServesAction
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Qos, Serves, ServesAction
 from rbxcompose.sdk.updater import FrequencyTask, TaskStatus
 
 LOOKS = 1.0  # [s] between two looks at what its session declares, and at its memory
@@ -55,15 +50,33 @@ _STRANGER = 0.5  # [s] after which it does not seem to use the configuration tha
 _PAUSE = 0.05  # [s] between two looks at a program that is not ready yet
 _TOKENS = {EndKind.PUBLISHER: EntityKind.PUBLISHER, EndKind.SUBSCRIBER: EntityKind.SUBSCRIPTION}
 _TOKENS |= {EndKind.QUERYABLE: EntityKind.SERVER}
+_ACTIONS = ServesAction, CallsAction
 _MEGABYTE = 1_000_000
 
 
 def _words(value: Any) -> Any:
     if isinstance(value, str):
-        words = value.split()
-        help_text = f"no shell reads it; write its words: [{', '.join(words)}]"
+        help_text = f"no shell reads it; write its words: [{', '.join(map(_quoted, _split(value)))}]"
+        if _SHELL.search(value):
+            help_text = f"only a shell reads that: [sh, -c, {json.dumps(value)}]"
         raise PydanticCustomError("command", "a command is a list of words", {"help": help_text})
+    if isinstance(value, Sequence) and value and value[0] == "":
+        raise PydanticCustomError("command", "a command begins with an executable", {"help": "such as [./program]"})
     return value
+
+
+_SHELL, _PLAIN = re.compile(r"[|&;<>$`]"), re.compile(r"[\w./=+-]*[A-Za-z/][\w./=+-]*", re.ASCII)
+
+
+def _split(text: str) -> list[str]:
+    try:
+        return shlex.split(text)
+    except ValueError:  # a quote without its end
+        return text.split()
+
+
+def _quoted(word: str) -> str:
+    return word if _PLAIN.fullmatch(word) else json.dumps(word)
 
 
 def _is_pattern(text: str) -> str:
@@ -137,6 +150,8 @@ class RunConfig(DeclaredPorts):
 
     environment: dict[str, str] = {}
     """Variables of its environment, besides those of `up`."""
+    secrets: dict[str, Secret] = {}
+    """The same for what nobody else may see, such as `{TOKEN: "${secret.token}"}`."""
     ready: ReadyModel | None = None
     """When it is ready; without it, as soon as it runs."""
     stop: StopModel = StopModel()
@@ -146,11 +161,12 @@ class RunConfig(DeclaredPorts):
     levels: LevelsModel = LevelsModel()
     """How its output is read."""
 
-    @model_validator(mode="after")
-    def _waits_for_its_own(self) -> RunConfig:
-        if self.ready is not None and self.ready.topic and self.ready.topic not in self.publishes:
-            raise ValueError(f"'ready' waits for the topic '{self.ready.topic}', which 'publishes' does not have")
-        return self
+    @field_validator("ready")
+    @classmethod
+    def _waits_for_its_own(cls, given: ReadyModel | None, info: ValidationInfo) -> ReadyModel | None:
+        if given is not None and "publishes" in info.data:
+            published(given.topic, info.data["publishes"])
+        return given
 
 
 R = TypeVar("R", bound=RunConfig)
@@ -200,6 +216,15 @@ class Runner(Component[R]):
         """Return whether it speaks Zenoh itself."""
         return True
 
+    @property
+    def most_memory(self) -> float | None:
+        """Return what its processes may hold in memory [MB]."""
+        return self.config.limits.memory
+
+    def described(self, status: int) -> str:
+        """Return in words how it has ended."""
+        return describe_exit(status)
+
     # Lifecycle
 
     def configure(self) -> None:
@@ -213,10 +238,12 @@ class Runner(Component[R]):
         self.tokens: dict[KeyOnBus, Closable] = {}
         self.heard: dict[str, Closable] = {}
         self.session = ""
+        self.joining: dict[str, str] = {}
         self.output = OutputLog({level: text for level, text in self._levels() if text})
-        self.is_inert = isinstance(self.context.clock, SteppedClock)
+        self.is_inert = type(self.context.clock) is SteppedClock
+        self.real_time = MonotonicClock()  # that of processes, also where robot time is that of a simulator
         self.ends = {} if self.is_inert else {end.port: end for end in self._declared()}
-        actions = {str(self.bound[name]) for name, port in self._elsewhere() if isinstance(port, ServesAction)}
+        actions = {str(self.bound[name]) for name, port in self._elsewhere() if isinstance(port, _ACTIONS)}
         self.watched = ProgramWatch(self.ends.values(), actions, self.now)
         for end in self.ends.values():
             if end.rate is not None:
@@ -229,10 +256,18 @@ class Runner(Component[R]):
         if self.is_inert:
             self.warn("does not run: robot time is stepped, and programs of others keep real time")
             return
+        with self._leaving_nothing():
+            self._start()
+
+    def _start(self) -> None:
         address = self.context.address
-        self.guest = guest = Guest(BusPlace(address.router, address.domain), stays=True)
+        try:
+            self.guest = guest = Guest(BusPlace(address.router, address.domain), stays=True)
+        except NotDoneError as error:
+            raise OutsideError(f"cannot be started: {error}") from error
+        self.joining = self._joining()
         self.is_over = False
-        order = self.order({**os.environ, **self._joining()})
+        order = self.order({**os.environ, **self.joining})
         self.connect()
         if order is not None:
             self.child = Child(order)
@@ -244,18 +279,27 @@ class Runner(Component[R]):
         """Hear what it writes, whether it still runs, and compare what it does with what it declares."""
         if self.guest is None:
             return
-        self.attend()
-        self._hear()
-        if self.child is None:
-            return
-        if self.ends_at is not None and self.now >= self.ends_at:
-            self.child.ask_to_end()
-        if self.is_over or self.now - self.looked < LOOKS:
-            return
-        self.looked = self.now
-        self._mind_memory(self.child)
-        if self.joins_bus and self.guest is not None:
-            self._compare(self.guest)
+        with self._leaving_nothing():
+            self.attend()
+            self._hear()
+            if self.child is None:
+                return
+            if self.ends_at is not None and self.real_time.now() >= self.ends_at:
+                self.child.ask_to_end()
+            if self.is_over or self.real_time.now() - self.looked < LOOKS:
+                return
+            self.looked = self.real_time.now()
+            self._mind_memory(self.child)
+            if self.joins_bus and self.guest is not None:
+                self._compare(self.guest)
+
+    @contextmanager
+    def _leaving_nothing(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException:
+            self._release()
+            raise
 
     def stop(self) -> None:
         """Cancel the goals of actions that claim a part of the robot."""
@@ -265,8 +309,9 @@ class Runner(Component[R]):
         """End it; a base first gets the time in which it brakes by itself."""
         self._cancel_goals()
         drives = self.config.capabilities.drives
-        self.is_ending, self.ends_at = True, self.now + ((drives.stops_after or 0.0) if drives else 0.0)
-        if self.child is not None and self.ends_at <= self.now:
+        self.is_ending, now = True, self.real_time.now()
+        self.ends_at = now + ((drives.stops_after or 0.0) if drives else 0.0)
+        if self.child is not None and self.ends_at <= now:
             self.child.ask_to_end()
 
     @property
@@ -279,8 +324,8 @@ class Runner(Component[R]):
         if self.child is not None and not self.is_over:
             self.is_ending = True
             self.child.ask_to_end()
-            deadline = self.now + self.config.stop.within + _ANSWERS
-            while not self.is_over and self.now < deadline:
+            deadline = self.real_time.now() + self.config.stop.within + _ANSWERS
+            while not self.is_over and self.real_time.now() < deadline:
                 self.child.wait(_PAUSE)
                 self._hear()
 
@@ -296,25 +341,34 @@ class Runner(Component[R]):
         self.session = f"{uuid4().int % 15 + 1:x}{uuid4().hex[1:]}"
         file = RobotFolder.of(address.robot).path / f"{self.name}.zenoh.json5"
         replace_file(file, as_file(guest_settings(address.router, self.session)).encode())
-        keys = {
-            f"RBXCOMPOSE_KEY_{name.upper()}": self._key(str(self.bound[name]), port)
-            for name, port in self._elsewhere()
-            if isinstance(port, Out | In | Serves | Calls)
-        }
+        keys = {f"RBXCOMPOSE_KEY_{name.upper()}": key for name, key in self._keys()}
         return {
             "ZENOH_CONFIG": str(file),
             "ZENOH_SESSION_CONFIG_URI": str(file),
             "ROS_DOMAIN_ID": str(address.domain),
+            "PYTHONUNBUFFERED": "1",  # a line is written when it is printed, as to a terminal
             "RBXCOMPOSE_ROBOT": address.robot,
             "RBXCOMPOSE_COMPONENT": self.name,
             "RBXCOMPOSE_NAMESPACE": address.namespace,
             "RBXCOMPOSE_ROUTER": address.router,
             **keys,
             **self.config.environment,
+            **{name: secret.reveal() for name, secret in self.config.secrets.items()},
         }
 
-    def _key(self, name: str, port: Port[Any]) -> str:
-        address, interface = self.context.address, cast(Any, port.interface)
+    def _keys(self) -> Iterator[tuple[str, str]]:
+        """Yield the Zenoh key of each end; an action has five."""
+        for name, port in self._elsewhere():
+            if not isinstance(port, _ACTIONS):
+                yield name, self._key(str(self.bound[name]), port.interface)
+                continue
+            names, action = ActionNames.of(str(self.bound[name])), cast(Any, port.interface)
+            parts = action.SendGoal, action.GetResult, CancelGoal, action.FeedbackMessage, GoalStatusArray
+            for part, interface in zip(ActionNames.__slots__, parts, strict=True):
+                yield f"{name}_{part}", self._key(getattr(names, part), interface)
+
+    def _key(self, name: str, interface: Any) -> str:
+        address = self.context.address
         return data_key(address.domain, name, interface.TYPE, WireProfile(address.wire).hash_of(interface))
 
     def _elsewhere(self) -> Iterator[tuple[str, Port[Any]]]:
@@ -324,15 +378,18 @@ class Runner(Component[R]):
         kinds = {Out: EndKind.PUBLISHER, In: EndKind.SUBSCRIBER, Serves: EndKind.QUERYABLE, Calls: EndKind.QUERIER}
         wire = WireProfile(self.context.address.wire)
         for name, port in self._elsewhere():
-            if (kind := kinds.get(type(port))) is not None and (interface := port.interface) is not None:
-                key = KeyOnBus(kind, str(self.bound[name]), dds_type(interface.TYPE), wire.hash_of(interface))
+            full, kind, interface = str(self.bound[name]), kinds.get(type(port)), cast(Any, port.interface)
+            if isinstance(port, ServesAction):  # one of its ends stands for all
+                full, kind, interface = ActionNames.of(full).send_goal, EndKind.QUERYABLE, interface.SendGoal
+            if kind is not None:
+                key = KeyOnBus(kind, full, dds_type(interface.TYPE), wire.hash_of(interface))
                 yield DeclaredKey(name, key, port.rate if isinstance(port, Out) else None)
 
     def _listen(self, guest: Guest) -> None:
         """Count the messages of its topics: of those with a rate all, of the others until one has come."""
         for name, port in self._elsewhere():
             if isinstance(port, Out):
-                key = self._key(str(self.bound[name]), port)
+                key = self._key(str(self.bound[name]), port.interface)
                 self.heard[name] = guest.transport.subscribe(key, port.qos, partial(self._arrived, name))
 
     def _arrived(self, name: str, arrival: object) -> None:
@@ -340,12 +397,13 @@ class Runner(Component[R]):
 
     def _wait_until_ready(self, guest: Guest) -> None:
         ready = self.config.ready
-        deadline = self.now + (ready.within if ready is not None else 10.0)
+        deadline = self.real_time.now() + (ready.within if ready is not None else 10.0)
         self.is_ready = False
         while not self._is_ready(ready, guest):
-            if self.now >= deadline:
-                self._release()
+            if self.real_time.now() >= deadline:
                 raise OutsideError(f"is not ready after {ready.within if ready is not None else 10.0:g} s")
+            if self.context.is_over:
+                raise OutsideError("is not ready yet, and the robot goes down")
             if self.child is not None:
                 self.child.wait(_PAUSE)
             self._hear()
@@ -354,9 +412,9 @@ class Runner(Component[R]):
 
     def _wait_until_linked(self, guest: Guest) -> None:
         """Wait until what it publishes reaches every process of the robot."""
-        began = self.now
+        began = self.real_time.now()
         while not (is_linked := guest.is_linked(self.session, _ANSWERS)):
-            if self.now - began > (_STRANGER if is_linked is None else _LINKS):
+            if self.real_time.now() - began > (_STRANGER if is_linked is None else _LINKS):
                 break
             guest.run(lambda: False, _PAUSE)
 
@@ -364,7 +422,7 @@ class Runner(Component[R]):
         if ready is None or ready.output is not None or ready.ended:
             return self.is_ready or (ready is None and self.child is None)  # as its events say
         if ready.topic:
-            return self.watched.count(_port_of(ready.topic)) > 0
+            return self.watched.count(port_name(ready.topic)) > 0
         return bool(guest.tokens(ready.token))
 
     # Running
@@ -389,7 +447,7 @@ class Runner(Component[R]):
                     self._happened(event)
         self._log(lines)
         if self.child is not None and self.child.is_over and not self.is_over:
-            self._ended("ended without a word: its keeper is gone")
+            self._ended("was killed, since its keeper was")
 
     def _happened(self, event: object) -> None:
         match event:
@@ -399,13 +457,13 @@ class Runner(Component[R]):
                 within, name = self.config.stop.within, self.config.stop.signal
                 self.warn(f"did not end within {within:g} s of {name}, and was killed")
             case LeftBehind(number):
-                processes = "process" if number == 1 else "processes"
-                self.warn(f"left {number} {processes} in the background, which were killed: it must stay in front")
+                left = "one process, which was" if number == 1 else f"{number} processes, which were"
+                self.warn(f"left behind {left} killed: what it starts must end with it")
             case ProgramEnd(status) if self.config.ready is not None and self.config.ready.ended and not status:
                 self.is_over = self.is_ready = True
                 self.state = TaskStatus(Level.OK, "has ended, as it should")
             case ProgramEnd(status):
-                self._ended(describe_exit(status))
+                self._ended(self.described(status))
 
     def _ended(self, how: str) -> None:
         self.is_over = True
@@ -413,12 +471,23 @@ class Runner(Component[R]):
         if self.is_ending:
             self.info(how)
             return
-        while self.child is not None and not self.child.is_over:  # it ends what was left behind
-            self.child.wait(_PAUSE)
-            for event in self.child.events():
-                self._happened(event)
-        self._release()
+        self._hear_the_rest()
         raise OutsideError(how)
+
+    def _hear_the_rest(self) -> None:
+        """Wait for the keeper, which ends what was left behind; what was written to the last is logged."""
+        is_over = False
+        while self.child is not None and not is_over:
+            is_over = self.child.is_over  # before what may be the last look
+            for event in self.child.events():
+                if isinstance(event, Line):
+                    self._log([event.text])
+                else:
+                    self._happened(event)
+            if not is_over:
+                self.child.wait(_PAUSE)
+        for level, text in self.output.take((), math.inf):
+            self.context.log(level, text)
 
     def _log(self, lines: Iterable[str]) -> None:
         for level, text in self.output.take(lines, self.now):
@@ -429,11 +498,10 @@ class Runner(Component[R]):
         yield Level.WARN, self.config.levels.warn
 
     def _mind_memory(self, child: Child) -> None:
-        most = self.config.limits.memory
-        if most is None or child.pid is None or self.is_ending:
+        most = self.most_memory
+        if most is None or self.is_ending:
             return
-        if (used := memory_of(child.pid) / _MEGABYTE) > most:
-            self._release()
+        if (used := child.memory / _MEGABYTE) > most:
             raise OutsideError(f"uses {used:.0f} MB, and may use {most:g}")
 
     def _compare(self, guest: Guest) -> None:
@@ -509,10 +577,6 @@ class Runner(Component[R]):
 _NODE = KeyOnBus(EndKind.QUERIER, "", "", "")  # stands for the token of the node
 
 
-def _port_of(topic: str) -> str:
-    return topic.strip("/").replace("/", "_")
-
-
 class ProgramConfig(RunConfig):
     """What is run."""
 
@@ -534,7 +598,8 @@ class Program(Runner[ProgramConfig]):
     @classmethod
     def capabilities(cls, config: ProgramConfig) -> tuple[Capability, ...]:
         """Return what the manifest says that it can do, and what `up` looks for."""
-        found = RunsProgram(Setting(config.command, "command"), Setting(config.folder, "folder"))
+        environment = Setting(config.environment, "environment")
+        found = RunsProgram(Setting(config.command, "command"), Setting(config.folder, "folder"), environment)
         return (*config.declared_capabilities(), found)
 
     def order(self, environment: Mapping[str, str]) -> Order:

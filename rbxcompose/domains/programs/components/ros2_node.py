@@ -18,7 +18,8 @@ from rbxcompose.domains.programs.child import Order
 from rbxcompose.domains.programs.components.program import Command, RunConfig, Runner, StopModel, order_of
 from rbxcompose.domains.programs.sections.ros2 import ros2
 from rbxcompose.runtime.folder import RobotFolder
-from rbxcompose.sdk import component
+from rbxcompose.sdk import Capability, component
+from rbxcompose.sdk.capabilities import RunsRosNode, Setting
 
 Parameter = bool | int | float | str | list[bool] | list[int] | list[float] | list[str] | dict[str, Any]
 
@@ -88,8 +89,14 @@ class Ros2Node(Runner[Ros2NodeConfig]):
         lidar: {type: ros2_node, package: a_lidar, executable: driver, publishes: {scan: sensor_msgs/LaserScan}}
     """
 
+    @classmethod
+    def capabilities(cls, config: Ros2NodeConfig) -> tuple[Capability, ...]:
+        """Return what the manifest says that it can do, and what `up` looks for."""
+        found = RunsRosNode(Setting(config.ros2.python, "ros2.python"), Setting(config.ros2.setup, "ros2.setup"))
+        return (*config.declared_capabilities(), found)
+
     def configure(self) -> None:
-        """Find its ROS 2."""
+        """Prepare for its ROS 2."""
         super().configure()
         self.bridge: ros_bridge.RosBridge | None = None
         self.channels: list[int] = []
@@ -155,7 +162,6 @@ class Ros2Node(Runner[Ros2NodeConfig]):
         for text in self.bridge.problems(self.channels):
             self.warn(text)
         if (how := self.bridge.hear()) and not self.is_ending:
-            self._release()
             raise OutsideError(how)
 
     def disconnect(self) -> None:
