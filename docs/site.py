@@ -38,6 +38,7 @@ MENU: Mapping[str, str | Mapping[str, str]] = {
         "Seeing": "seeing.md",
         "Several hosts": "systems.md",
         "ROS 2": "interop.md",
+        "Programs of others": "programs.md",
     },
     "Tools": {
         "Seeing a robot": "inspection.md",
