@@ -26,7 +26,7 @@ _MARK = "RBXCOMPOSE_RUN"  # in the environment of all that belongs to one run of
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class ProgramOrder:
     """What to start, and how to end it."""
 
     command: Sequence[str]
@@ -45,14 +45,14 @@ class Order:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class WrittenLine:
     """A line that it wrote, to which of its outputs does not matter."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
-class Started:
+class ProgramStarted:
     """It runs."""
 
     pid: int
@@ -84,13 +84,13 @@ class LeftBehind:
     number: int
 
 
-Event = Line | Started | NotStarted | Deaf | ProgramEnd | LeftBehind
+Event = WrittenLine | ProgramStarted | NotStarted | Deaf | ProgramEnd | LeftBehind
 
 
 class Child:
     """A program and its keeper; nothing here waits but `close`."""
 
-    def __init__(self, order: Order) -> None:
+    def __init__(self, order: ProgramOrder) -> None:
         """Start it.
 
         Raises:
@@ -137,7 +137,7 @@ class Child:
         is_over = self.is_over  # before reading, else the last lines may come after the look
         reports = list(self._read(self._reports, is_over=is_over))  # before its lines, which then include the last ones
         for line in self._read(self._lines, is_over=is_over):
-            yield Line(line.decode("utf-8", "replace"))
+            yield WrittenLine(line.decode("utf-8", "replace"))
         for report in reports:
             yield self._event(json.loads(report))
 
@@ -182,7 +182,7 @@ class Child:
         match report:
             case {"event": "started", "pid": int(pid)}:
                 self.pid = pid
-                return Started(pid)
+                return ProgramStarted(pid)
             case {"event": "failed", "why": str(why)}:
                 return NotStarted(why)
             case {"event": "ended", "status": int(status)}:

@@ -74,7 +74,7 @@ class ServedAction(Config):
     """The part of the robot that a goal needs for itself; such goals are cancelled when the robot is stopped."""
 
 
-Published = Annotated[PublishedTopic, BeforeValidator(_as_type, json_schema_input_type=PublishedTopic | str)]
+PublishedPort = Annotated[PublishedTopic, BeforeValidator(_as_type, json_schema_input_type=PublishedTopic | str)]
 Subscribed = Annotated[SubscribedTopic, BeforeValidator(_as_type, json_schema_input_type=SubscribedTopic | str)]
 ActionServed = Annotated[ServedAction, BeforeValidator(_as_type, json_schema_input_type=ServedAction | str)]
 
@@ -151,7 +151,7 @@ class CapabilitiesModel(Config):
 class DeclaredPorts(Config):
     """The ports and capabilities that a manifest declares for a program."""
 
-    publishes: dict[TopicName, Published] = {}
+    publishes: dict[TopicName, PublishedPort] = {}
     """Topics that it publishes: a type, or a map with `type`, `rate`, `qos` and `unit`."""
     subscribes: dict[TopicName, Subscribed] = {}
     """Topics that it subscribes to: a type, or a map with `type`, `qos` and `optional`."""

@@ -132,4 +132,4 @@ class ProgramWatch:
 
 
 def _ros(dds: str) -> str:
-    return re.sub(r"(\w+)::(\w+)::dds_::(\w+)_", r"\1/\2/\3", dds)
+    return dds.replace("::dds_::", "/").replace("::", "/").removesuffix("_")

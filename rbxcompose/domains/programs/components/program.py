@@ -31,7 +31,16 @@ from rbxcompose.bus.zenoh_session import as_file, guest_settings
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
-from rbxcompose.domains.programs.child import Child, Deaf, LeftBehind, Line, NotStarted, Order, ProgramEnd, Started
+from rbxcompose.domains.programs.child import (
+    Child,
+    Deaf,
+    LeftBehind,
+    NotStarted,
+    ProgramEnd,
+    ProgramOrder,
+    ProgramStarted,
+    WrittenLine,
+)
 from rbxcompose.domains.programs.declaration import DeclaredPorts, port_name, published
 from rbxcompose.domains.programs.output import OutputLog
 from rbxcompose.domains.programs.watch import DeclaredKey, EndKind, KeyOnBus, ProgramWatch
@@ -88,7 +97,7 @@ def _is_pattern(text: str) -> str:
 
 
 Pattern = Annotated[str, Field(min_length=1, max_length=500), AfterValidator(_is_pattern)]
-Command = Annotated[
+CommandWords = Annotated[
     tuple[str, ...], BeforeValidator(_words, json_schema_input_type=tuple[str, ...]), Field(min_length=1)
 ]
 
@@ -198,7 +207,7 @@ class Runner(Component[R]):
         coasting = (drives.stops_after or 0.0) if drives is not None else 0.0
         return coasting + config.stop.within + 1.0
 
-    def order(self, environment: Mapping[str, str]) -> Order | None:
+    def order(self, environment: Mapping[str, str]) -> ProgramOrder | None:
         """Return what to start, with these variables beside its own; None if something else starts it."""
         raise NotImplementedError
 
@@ -239,6 +248,8 @@ class Runner(Component[R]):
         self.heard: dict[str, Closable] = {}
         self.session = ""
         self.joining: dict[str, str] = {}
+        ready = self.config.ready
+        self.awaited = re.compile(ready.output) if ready is not None and ready.output is not None else None
         self.output = OutputLog({level: text for level, text in self._levels() if text})
         self.is_inert = type(self.context.clock) is SteppedClock
         self.real_time = MonotonicClock()  # that of processes, also where robot time is that of a simulator
@@ -434,11 +445,11 @@ class Runner(Component[R]):
         lines, ready = list[str](), self.config.ready
         for event in self.child.events():
             match event:
-                case Line(text):
+                case WrittenLine(text):
                     lines.append(text)
-                    if ready is not None and ready.output is not None and re.search(ready.output, text):
+                    if self.awaited is not None and self.awaited.search(text):
                         self.is_ready = True
-                case Started():
+                case ProgramStarted():
                     self.is_ready = self.is_ready or ready is None
                     self.state = TaskStatus(Level.OK, "runs")
                 case _:
@@ -480,7 +491,7 @@ class Runner(Component[R]):
         while self.child is not None and not is_over:
             is_over = self.child.is_over  # before what may be the last look
             for event in self.child.events():
-                if isinstance(event, Line):
+                if isinstance(event, WrittenLine):
                     self._log([event.text])
                 else:
                     self._happened(event)
@@ -580,7 +591,7 @@ _NODE = KeyOnBus(EndKind.QUERIER, "", "", "")  # stands for the token of the nod
 class ProgramConfig(RunConfig):
     """What is run."""
 
-    command: Command
+    command: CommandWords
     """Its words: an executable, found in `folder` if it begins with `./`, else by PATH, and its arguments. No shell
     reads them."""
     folder: LocalPath = Field(".", validate_default=True)
@@ -588,7 +599,7 @@ class ProgramConfig(RunConfig):
 
 
 @component("program")
-class Program(Runner[ProgramConfig]):
+class ForeignProgram(Runner[ProgramConfig]):
     """Runs a program of others that speaks Zenoh, with the ports that the manifest declares for it.
 
     Example:
@@ -602,14 +613,14 @@ class Program(Runner[ProgramConfig]):
         found = RunsProgram(Setting(config.command, "command"), Setting(config.folder, "folder"), environment)
         return (*config.declared_capabilities(), found)
 
-    def order(self, environment: Mapping[str, str]) -> Order:
+    def order(self, environment: Mapping[str, str]) -> ProgramOrder:
         """Return the command."""
         return order_of(self.config, self.config.command, self.config.folder, environment)
 
 
-def order_of(config: RunConfig, command: Iterable[str], folder: str, environment: Mapping[str, str]) -> Order:
+def order_of(config: RunConfig, command: Iterable[str], folder: str, environment: Mapping[str, str]) -> ProgramOrder:
     """Return what to start, with the limits of a configuration."""
-    return Order(
+    return ProgramOrder(
         tuple(command),
         str(Path(folder)),
         environment,
