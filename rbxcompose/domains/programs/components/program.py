@@ -74,7 +74,7 @@ def _words(value: Any) -> Any:
     return value
 
 
-_SHELL, _PLAIN = re.compile(r"[|&;<>$`]"), re.compile(r"[\w./=+-]*[A-Za-z/][\w./=+-]*", re.ASCII)
+_SHELL, _PLAIN = re.compile(r"[|&;<>$`]"), re.compile(r"(?![^A-Za-z/]*$)[\w./=+-]+", re.ASCII)
 
 
 def _split(text: str) -> list[str]:
