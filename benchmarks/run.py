@@ -115,7 +115,8 @@ def paths_of(subject: str) -> list[str]:
 
 def has_changed(subject: str, commit: str) -> bool:
     """Return whether what a subject measures differs from a commit; so it does if that is not known here."""
-    return subprocess.run(["git", "diff", "--quiet", commit, "--", *paths_of(subject)], cwd=ROOT).returncode != 0
+    command = ["git", "diff", "--quiet", commit, "--", *paths_of(subject)]
+    return subprocess.run(command, cwd=ROOT, stderr=subprocess.DEVNULL).returncode != 0  # it may be of a rewritten past
 
 
 def worse(before: list[dict[str, Any]], after: list[dict[str, Any]]) -> list[str]:

@@ -19,6 +19,7 @@ REAL_TIME = {
     "robots and systems": (
         "tests/console/test_gateway_live",
         "tests/programs/test_up",
+        "tests/ros2/test_bridge",
         "tests/runtime/test_apply_for_real",
         "tests/runtime/test_changes_for_real",
         "tests/runtime/test_external_clock",

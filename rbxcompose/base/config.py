@@ -323,17 +323,17 @@ def _secret(value: object) -> Secret:
     return value
 
 
-FOLDER = "folder"
-"""What validators of configurations know the folder of the manifest's file by."""
+FOLDER, CONTENTS = "folder", "contents"
+"""By which validators of a component know the folder of the manifest's file, and the contents of its sections."""
 
 
 def _in_folder(value: object, info: pydantic.ValidationInfo) -> object:
     there = (info.context or {}).get(FOLDER)
-    return os.path.normpath(os.path.join(str(there), value)) if there and isinstance(value, str) else value
+    return os.path.normpath(os.path.join(str(there), value)) if there and isinstance(value, str) and value else value
 
 
-FolderName = Annotated[str, pydantic.BeforeValidator(_in_folder)]
-"""A field that names a folder, relative to that of the file; it holds the whole path."""
+LocalPath = Annotated[str, pydantic.BeforeValidator(_in_folder)]
+"""A field that names a file or a folder, relative to that of the manifest's file; it holds the whole path."""
 PlaceName = Annotated[Place, Refers(PLACE)]
 """A field that names one of the robot's `places` and holds the place itself."""
 LinkName = Annotated[str, Refers(LINK)]

@@ -7,6 +7,7 @@ import signal
 import sys
 import time
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,12 @@ MEMORY = 140_000_000  # [bytes] of address space beyond what it has at its start
 ANSWER = 20_000_000  # [bytes] that it may write in all, to files that are open already
 _HARMLESS = {"compile", "exec", "glob.glob", "glob.glob/2", "builtins.id"}
 _LISTS = ("os.listdir", "os.scandir")
+_PR_SET_PDEATHSIG = 1
+_PR_SET_NO_NEW_PRIVS = 38
+_CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446  # numbers of Landlock's system calls
+_READ_FILE, _READ_FOLDER, _FILE_RIGHTS, _TRUNCATE = 1 << 2, 1 << 3, (1 << 13) - 1, 1 << 14
+_NEW_USER, _NEW_NET = 0x10000000, 0x40000000
+_LIBC = ctypes.CDLL(None, use_errno=True)
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
@@ -30,24 +37,31 @@ def processor_time() -> float:
     return time.process_time()
 
 
-def fence(roots: Iterable[str], used: set[str], start: float) -> None:
+def fence(
+    roots: Iterable[str], used: set[str], start: float, what: str = "a description", also: Iterable[str] = ()
+) -> None:
     """Limit what this process can use from now on, and refuse whatever Python reports that is not needed.
 
     The files and folders that it reads, or tries to read, are added to `used`. `start` is the processor time [s] that
-    the start of such a process takes here.
+    the start of such a process takes here. `what` names the stranger's text in errors, which may cause the events that
+    `also` names as well.
     """
-    real = [os.path.realpath(root) for root in roots]
+    real = tuple(os.path.realpath(root) for root in roots)
+    harmless = frozenset((*_HARMLESS, *also))
+    if _LIBC.unshare(_NEW_NET):
+        _LIBC.unshare(_NEW_USER | _NEW_NET)  # where users may; then there is no network, whatever Python reports
     _limit(start)
+    _confine(real)
 
     def audit(event: str, arguments: tuple[Any, ...]) -> None:
         if event == "open":
             if not _may_open(arguments[0], arguments[2], real):
-                raise PermissionError("a description may only read files of its project")
+                raise PermissionError(f"{what} may only read files of its project, not {arguments[0]!r}")
         elif event in _LISTS:
             if not _may_open(arguments[0], os.O_RDONLY, real):
-                raise PermissionError("a description may only list folders of its project")
-        elif event not in _HARMLESS:
-            raise PermissionError(f"a description may not use {event}")
+                raise PermissionError(f"{what} may only list folders of its project, not {arguments[0]!r}")
+        elif event not in harmless:
+            raise PermissionError(f"{what} may not use {event}")
         else:
             return
         if isinstance(arguments[0], str | bytes):
@@ -67,18 +81,42 @@ def _limit(start: float) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (ANSWER, ANSWER))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
+    resource.setrlimit(resource.RLIMIT_NPROC, (0, 0))  # which root has no limit of
 
 
-def _may_open(file: object, flags: int, roots: list[str]) -> bool:
+class _PathBeneath(ctypes.Structure):
+    """What Landlock allows below an open folder."""
+
+    _pack_ = 1
+    _fields_ = (("allowed", ctypes.c_uint64), ("folder", ctypes.c_int32))
+
+
+def _confine(roots: Iterable[str]) -> None:
+    """Have the kernel refuse this process all files but reading below the roots, where it has Landlock.
+
+    It does so even if a stranger's code gets around what Python reports.
+    """
+    version = _LIBC.syscall(_CREATE_RULESET, None, 0, 1)
+    handled = ctypes.c_uint64(_FILE_RIGHTS | (_TRUNCATE if version >= 3 else 0))
+    if version < 1 or (rules := _LIBC.syscall(_CREATE_RULESET, ctypes.byref(handled), 8, 0)) < 0:
+        return
+    for root in roots:
+        with suppress(OSError):  # which may not be there
+            folder = os.open(root, os.O_PATH | os.O_CLOEXEC)
+            below = _PathBeneath(_READ_FILE | (_READ_FOLDER if os.path.isdir(root) else 0), folder)
+            _LIBC.syscall(_ADD_RULE, rules, 1, ctypes.byref(below), 0)
+            os.close(folder)
+    _LIBC.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
+    _LIBC.syscall(_RESTRICT_SELF, rules, 0)
+    os.close(rules)
+
+
+def _may_open(file: object, flags: int, roots: Iterable[str]) -> bool:
     if isinstance(file, int):  # it is open already
         return True
     return (
         isinstance(file, str | bytes) and not flags & _WRITES and is_below(os.path.realpath(os.fsdecode(file)), roots)
     )
-
-
-_PR_SET_PDEATHSIG = 1
-_LIBC = ctypes.CDLL(None, use_errno=True)
 
 
 def end_with(parent: int, number: signal.Signals) -> None:

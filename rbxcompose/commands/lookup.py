@@ -142,7 +142,7 @@ def find_place(arguments: argparse.Namespace) -> BusPlace:
 
 
 def place_of(folder: RobotFolder) -> BusPlace:
-    """Return the place of a robot's own bus.
+    """Return the place of a robot's own bus; names of message types mean those of the robot from then on.
 
     Raises:
         NotDoneError: if it has no router.
@@ -152,6 +152,10 @@ def place_of(folder: RobotFolder) -> BusPlace:
         raise NotDoneError(no_answer(folder))  # its router is gone, too, or about to go
     if state is None or state.router is None:
         raise NotDoneError(NO_ANSWER.at(None, f"'{folder.path.name}' has no known router"))
+    if texts := folder.read_messages():
+        from rbxcompose.msgs import registry  # most robots have none, and lists need no types
+
+        registry.choose(texts)
     return BusPlace(state.router, state.domain)
 
 

@@ -19,6 +19,7 @@ from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.manifest.files import PROFILE
 from rbxcompose.manifest.reader import ParsedText, Texts
 from rbxcompose.manifest.tree import LEAST_STEPS, PROFILE_STEPS, STEP_BYTES, STEP_VALUES
+from rbxcompose.msgs import registry
 
 NOT_TRIED = kind("RBX7003", Severity.WARNING)
 
@@ -92,6 +93,8 @@ def compile_robot(
             _report_profile(
                 span, compiled([name], keys.get(name, frozenset())), out, {SET, *out.robot.manifest.overlays}
             )
+    if out.robot is not None:
+        registry.choose(out.robot.manifest.messages)  # profiles may have had others
     if out.robot is not None and not out.report.has_errors:
         out.plan = build_plan(out.robot)
     return out

@@ -71,6 +71,22 @@ def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
     return path if path.is_file() else _missing(written, path, span, writer)
 
 
+def folder_named(written: str, writer: Path, span: Span) -> Path | Finding:
+    """Return the folder that a manifest names, or the finding that says why it must not or cannot be used."""
+    is_library = written.startswith(PREFIX)
+    base = library_root() if is_library else _real(writer).parent
+    try:
+        folder = (base / written.removeprefix(PREFIX)).resolve()
+        is_there = folder.is_dir()
+    except (OSError, ValueError, RuntimeError):  # a name too long for the system, a zero byte, a circle of links
+        return UNREADABLE.at(span, f"'{plain(written)}' is not a folder")
+    if not any(folder.is_relative_to(root) for root in (project_of(writer), library_root())):
+        return OUTSIDE.at(span, f"'{plain(written)}' is outside the project")
+    if is_there:
+        return folder
+    return UNREADABLE.at(span, f"the folder '{plain(written)}' does not exist", help=_nearest_folder(folder))
+
+
 def find(written: str) -> Path | Finding:
     """Return the file that a command names: a manifest, a robot's folder, or `rbx:...`."""
     path = _absolute(written, Path.cwd())

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Generic, Literal, Protocol, TypeVar, cast
 
 from pydantic import BeforeValidator
 
-from rbxcompose.base.config import COMPONENT, DEFAULT, Config, Name, Refers, Restart, When
+from rbxcompose.base.config import COMPONENT, DEFAULT, FOLDER, Config, Name, Refers, Restart, When
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Report, Span, nearest, surely_meant
 from rbxcompose.base.printable import plain
@@ -700,7 +700,13 @@ class Reading(Generic[M]):
         """Return a section with fixed keys; None if it is missing or has mistakes."""
         if self.node is None:
             return None
-        return validate(self.section.model, self.node, (self.section.name,), self.report, self.contents.known)
+        known = {**self.contents.known, FOLDER: folder_of(self.node.span)}
+        return validate(self.section.model, self.node, (self.section.name,), self.report, known)
+
+
+def folder_of(span: Span) -> str:
+    """Return the folder of the file in which something is written."""
+    return str(Path(span.file).absolute().parent)
 
 
 def named_entries(root: MappingNode, path: tuple[str, ...], report: Report) -> Iterator[tuple[str, Entry]]:

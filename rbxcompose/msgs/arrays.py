@@ -26,6 +26,11 @@ def zeros(dtype: str, length: int) -> NDArray[Any]:
     return _read_only(np.zeros(length), dtype)
 
 
+def filled(dtype: str, values: tuple[Any, ...]) -> NDArray[Any]:
+    """Return a read-only array of these values."""
+    return _read_only(values, dtype)
+
+
 def holds_numbers(type_: FieldType) -> bool:
     """Return whether a field of this type is a numpy array."""
     return type_.shape is not FieldShape.SINGLE and type_.base in PRIMITIVES and type_.base not in _NO_NUMBERS

@@ -21,6 +21,7 @@ HEADER = b"\x00\x01\x00\x00"  # little-endian CDR, no options
 _LITTLE_ENDIAN = HEADER[:2]
 MOST_ELEMENTS = 1_000_000  # in a sequence of strings or messages, which take far more room in memory than on the wire
 MOST_TRAILING = 16  # bytes that writers such as Fast DDS add to fill the last words
+# rclpy's `serialize_message` adds up to four more for each empty list of 64-bit numbers: never more than the message.
 
 _CODES = {
     "bool": "?",
@@ -93,7 +94,7 @@ def decode(message: type[M], payload: bytes | bytearray | memoryview, most: floa
         if len(data) < len(HEADER) or data[:2] != HEADER[:2]:
             raise CdrError("no little-endian CDR header")
         end = layout.read(data, len(HEADER), values)
-        if len(data) - end > MOST_TRAILING:
+        if len(data) - end > (MOST_TRAILING if layout.fixed else max(MOST_TRAILING, end - len(HEADER))):
             raise CdrLengthError(f"{len(data) - end} bytes too many")
     except (struct.error, CdrLengthError) as error:
         raise CdrLengthError(f"no {message.TYPE}: {error}") from error
@@ -325,7 +326,8 @@ class _Layout:
         if not message.FIELDS:
             self._add_step(lambda value: value, _Nothing())
         arguments = [
-            self._add_field(parse_type(text), prefix + attribute(name)) for name, text in message.FIELDS.items()
+            self._add_field(message, parse_type(text), prefix + attribute(name))
+            for name, text in message.FIELDS.items()
         ]
         return self._add_making(message, arguments)
 
@@ -346,13 +348,13 @@ class _Layout:
             self._lines.append(f"{setter}({made}, {value})")
         return made
 
-    def _add_field(self, type_: FieldType, path: str) -> str:
+    def _add_field(self, message: type[Message], type_: FieldType, path: str) -> str:
         if type_.shape is FieldShape.SINGLE and type_.is_message:
-            return self._add(registry.message(type_.base), f"{path}.")
+            return self._add(registry.inside(message, type_.base), f"{path}.")
         if type_.shape is FieldShape.SINGLE and type_.base in _CODES:
             self._numbers.append((path, type_.base))
         else:
-            self._add_step(attrgetter(path), _codec(type_))
+            self._add_step(attrgetter(path), _codec(message, type_))
         self._count += 1
         return f"v[{self._count - 1}]"
 
@@ -384,14 +386,14 @@ def _getter(paths: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
     return lambda message: (get(message),)
 
 
-def _codec(type_: FieldType) -> _Codec:
+def _codec(message: type[Message], type_: FieldType) -> _Codec:
     if holds_numbers(type_):
         return _Array(type_)
     if type_.base in OCTETS:
         return _Octets(type_)
     if type_.base == "bool":
         return _Flags(type_)
-    element: _Codec = _layout(registry.message(type_.base)) if type_.is_message else _Text(type_.text_limit)
+    element: _Codec = _layout(registry.inside(message, type_.base)) if type_.is_message else _Text(type_.text_limit)
     return element if type_.shape is FieldShape.SINGLE else _Elements(type_, element)
 
 

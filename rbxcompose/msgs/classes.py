@@ -9,7 +9,7 @@ from typing import Any, ClassVar, ForwardRef
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.msgs import definitions
-from rbxcompose.msgs.arrays import ArrayMessage, holds_numbers, zeros
+from rbxcompose.msgs.arrays import ArrayMessage, filled, holds_numbers, zeros
 from rbxcompose.msgs.types import Action, Message, Service, declared
 
 _ZEROS: Mapping[str, Any] = {
@@ -31,24 +31,32 @@ def class_path(name: str, known: Container[str]) -> str:
     return f"{bare}Message" if is_shared else bare.replace("_", ".")
 
 
-def make_class(name: str, structures: Mapping[str, definitions.Structure], home: str = "rbxcompose.msgs") -> type[Any]:
+def make_class(
+    name: str,
+    structures: Mapping[str, definitions.Structure],
+    home: str = "rbxcompose.msgs",
+    classes: dict[str, type[Any]] = declared,
+) -> type[Any]:
     """Return the class of an interface, such as `std_srvs/srv/SetBool`; made at the first call.
 
     `structures` has those of the interface and of all messages inside it, whose classes are made as well. A class
-    belongs to the Python module of its ROS package in `home`.
+    belongs to the Python module of its ROS package in `home`, and is kept in `classes`.
 
     Raises:
         KeyError: if `structures` lacks one.
     """
     with _lock:
-        return declared.get(name) or _Maker(name, structures, home).interface()
+        return classes.get(name) or _Maker(name, structures, home, classes).interface()
 
 
 class _Maker:
     """Makes the classes of one interface."""
 
-    def __init__(self, name: str, structures: Mapping[str, definitions.Structure], home: str) -> None:
+    def __init__(
+        self, name: str, structures: Mapping[str, definitions.Structure], home: str, classes: dict[str, type[Any]]
+    ) -> None:
         self._name = name
+        self._classes = classes
         self._structures = structures
         self._home = home
         self._module = f"{home}.{name.split('/')[0]}"
@@ -90,7 +98,7 @@ class _Maker:
     def _message(self, name: str, doc: str) -> type[Any]:
         structure = self._structures[name]
         fields = {definitions.attribute(definition.name): self._field(definition) for definition in structure.fields}
-        constants = {constant.name: constant.value for constant in structure.constants}
+        constants = {definitions.attribute(constant.name): constant.value for constant in structure.constants}
         has_arrays = any(holds_numbers(definition.type) for definition in structure.fields)
         annotations = {
             **{name: ClassVar[type(value)] for name, value in constants.items()},
@@ -117,6 +125,7 @@ class _Maker:
             "__doc__": doc,
             "TYPE": name,
             "HASH": _TypeHash(self._structures),
+            **({} if self._classes is declared else {"CLASSES": self._classes}),
         }
         return new_class(path.split(".")[-1], (base,), exec_body=lambda namespace: namespace.update(head, **body))
 
@@ -127,21 +136,24 @@ class _Maker:
         """Return the annotation and the default value of a field."""
         type_ = definition.type
         least = type_.length if type_.shape is definitions.FieldShape.ARRAY else 0
+        given = definition.default
         if holds_numbers(type_):
             # Not the type itself, since numpy is imported when the first array is made.
-            return ForwardRef(f"NDArray[np.{type_.base}]"), field(default_factory=partial(zeros, type_.base, least))
+            array: Any = ForwardRef(f"NDArray[np.{type_.base}]")
+            make = partial(filled, type_.base, given) if isinstance(given, tuple) else partial(zeros, type_.base, least)
+            return array, field(default_factory=make)
         if type_.shape is not definitions.FieldShape.SINGLE and type_.base in definitions.OCTETS:
-            return bytes, bytes(least)
+            return bytes, bytes(given) if isinstance(given, tuple) else bytes(least)  # type: ignore[arg-type]
         if type_.is_message:
             return self._nested(type_, least)
-        value = _ZEROS.get(type_.base, 0) if definition.default is None else definition.default
+        zero = _ZEROS.get(type_.base, 0)
         if type_.shape is definitions.FieldShape.SINGLE:
-            return type(value), value
-        return tuple[type(value), ...], (value,) * least  # type: ignore[misc]
+            return type(zero), zero if given is None else given
+        return tuple[type(zero), ...], (zero,) * least if given is None else given  # type: ignore[misc]
 
     def _nested(self, type_: definitions.FieldType, least: int) -> tuple[Any, Any]:
         # A part of a service or an action is made before what holds it.
-        made: Any = declared.get(type_.base) or make_class(type_.base, self._structures, self._home)
+        made: Any = self._classes.get(type_.base) or make_class(type_.base, self._structures, self._home, self._classes)
         if type_.shape is definitions.FieldShape.SINGLE:
             return made, field(default_factory=made)
         repeated: Callable[[], Any] = lambda: (made(),) * least  # noqa: E731

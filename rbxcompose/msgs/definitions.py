@@ -5,8 +5,10 @@ import json
 import keyword
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import field as dataclass_field
 from enum import Enum
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
@@ -16,19 +18,33 @@ KINDS = ("msg", "srv", "action")
 INTEGERS = ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64")
 FLOATS = ("float32", "float64")
 OCTETS = ("uint8", "byte", "char")  # arrays of these are bytes in Python
+RANGES = {
+    **dict.fromkeys(OCTETS, (0, 255)),
+    **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
+    **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
+}
 PRIMITIVES = ("bool", "byte", "char", *INTEGERS, *FLOATS, "string")
 
 _TYPE = re.compile(r"(?P<base>[A-Za-z][\w/]*)(?:<=(?P<limit>\d+))?(?P<array>\[(?P<most><=)?(?P<length>\d*)\])?")
 _CONSTANT = re.compile(r"(?P<type>\S+)\s+(?P<name>[A-Z][A-Z0-9_]*)\s*=\s*(?P<value>.+)")
 _FIELD = re.compile(r"(?P<type>\S+)\s+(?P<name>[a-z][a-z0-9_]*)(?:\s+(?P<default>\S.*))?")
 _CODE_AND_COMMENT = re.compile(r"""(?P<code>(?:"[^"]*"|'[^']*'|[^#"'])*)(?:#\s?(?P<comment>.*))?""")
+_ITEM = re.compile(r"""(?:"[^"]*+"|'[^']*+'|[^,\s"'][^,"']*+)""")  # of a list of defaults
+_DOUBTFUL = re.compile(r"__|_$")  # what ROS has in no name
+_TAKEN = ("self", "TYPE", "HASH", "FIELDS", "ARRAYS", "CLASSES")
 _TRUTH = {"true": True, "1": True, "false": False, "0": False}
 
 Value = bool | int | float | str
+Default = Value | tuple[Value, ...]
 
 
 class DefinitionError(ValueError):
-    """Raised when an interface text is not valid ROS 2."""
+    """Raised when an interface text is not valid ROS 2, in a line if `line` is not 0; `problem` is what is wrong."""
+
+    def __init__(self, problem: str, name: str = "", line: int = 0) -> None:
+        where = f"{name}, line {line}: " if line else f"{name}: " if name else ""
+        super().__init__(f"{where}{problem}")
+        self.problem, self.line = problem, line
 
 
 class FieldShape(Enum):
@@ -79,8 +95,9 @@ class FieldDefinition:
 
     name: str
     type: FieldType
-    default: Value | None = None
+    default: Default | None = None
     comment: str = ""
+    line: int = dataclass_field(default=0, compare=False)  # where its text has it
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,8 +111,8 @@ class Structure:
 
 
 def attribute(field: str) -> str:
-    """Return the Python name of a field: the same, with an underscore appended to a keyword."""
-    return f"{field}_" if keyword.iskeyword(field) else field
+    """Return the Python name of a field or constant: the same, with an underscore appended to a word that is taken."""
+    return f"{field}_" if keyword.iskeyword(field) or field in _TAKEN else field
 
 
 def parse_type(text: str, package: str = "") -> FieldType:
@@ -137,31 +154,40 @@ def parse(name: str, text: str) -> tuple[Structure, ...]:
     kind = name.split("/")[1]
     endings = {"msg": ("",), "srv": ("_Request", "_Response"), "action": ("_Goal", "_Result", "_Feedback")}[kind]
     sections: list[list[tuple[int, str]]] = [[]]
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(text.split("\n"), 1):
         if line.rstrip() == "---":
             sections.append([])
         else:
             sections[-1].append((number, line))
     if len(sections) != len(endings):
-        raise DefinitionError(f"{name}: {len(sections)} sections, not {len(endings)}")
+        words = f"a .{kind} file has {len(endings)} parts with '---' between them, not {len(sections)}"
+        raise DefinitionError(words if len(endings) > 1 else "a .msg file has no '---'", name)
     return tuple(_structure(name + ending, lines) for ending, lines in zip(endings, sections, strict=True))
 
 
 def _structure(name: str, lines: list[tuple[int, str]]) -> Structure:
     heading: list[str] = []
-    members: list[Constant | FieldDefinition] = []
+    members: dict[str, Constant | FieldDefinition] = {}
     for number, line in lines:
         try:
             code, comment = _split(line)
             if code:
-                members.append(_member(code, comment, package=name.split("/")[0]))
+                member = _member(code, comment, name.split("/")[0], number)
+                if members.setdefault(member.name, member) is not member:
+                    raise DefinitionError(f"there is a second '{member.name}'")
             elif comment and not members:
                 heading.append(comment)
         except ValueError as error:
-            raise DefinitionError(f"{name}, line {number}: {error}") from error
-    fields = tuple(member for member in members if isinstance(member, FieldDefinition))
-    constants = tuple(member for member in members if isinstance(member, Constant))
+            raise DefinitionError(str(error), name, number) from error
+    fields = tuple(member for member in members.values() if isinstance(member, FieldDefinition))
+    constants = tuple(member for member in members.values() if isinstance(member, Constant))
     return Structure(name, fields, constants, " ".join(heading))
+
+
+def code_of(line: str) -> str:
+    """Return what stands in a line before a comment; empty if that cannot be told."""
+    found = _CODE_AND_COMMENT.fullmatch(line)
+    return found["code"].strip() if found else ""
 
 
 def _split(line: str) -> tuple[str, str]:
@@ -171,14 +197,29 @@ def _split(line: str) -> tuple[str, str]:
     return found["code"].strip(), (found["comment"] or "").strip()
 
 
-def _member(code: str, comment: str, package: str) -> Constant | FieldDefinition:
+def _member(code: str, comment: str, package: str, line: int) -> Constant | FieldDefinition:
     if constant := _CONSTANT.fullmatch(code):
         return Constant(constant["name"], _value(parse_type(constant["type"]), constant["value"]), comment)
-    if field := _FIELD.fullmatch(code):
+    field = _FIELD.fullmatch(code)
+    if field and not _DOUBTFUL.search(field["name"]):
         type_ = parse_type(field["type"], package)
-        default = _value(type_, field["default"]) if field["default"] else None
-        return FieldDefinition(field["name"], type_, default, comment)
+        default = _default(type_, field["default"]) if field["default"] else None
+        return FieldDefinition(field["name"], type_, default, comment, line)
     raise DefinitionError(f"neither a field nor a constant: {code!r}")
+
+
+def _default(type_: FieldType, text: str) -> Default:
+    """Return the default of a field: of several values, they stand in brackets."""
+    if type_.shape is FieldShape.SINGLE or type_.is_message:
+        return _value(type_, text)
+    if text[0] != "[" or text[-1] != "]":
+        raise DefinitionError(f"the default of {type_} is a list in brackets")
+    values = tuple(_value(FieldType(type_.base), found.group().strip()) for found in _ITEM.finditer(text[1:-1]))
+    if type_.length and (
+        len(values) > type_.length or (type_.shape is FieldShape.ARRAY and len(values) < type_.length)
+    ):
+        raise DefinitionError(f"{len(values)} values where {type_} is expected")
+    return values
 
 
 def _value(type_: FieldType, text: str) -> Value:
@@ -190,7 +231,12 @@ def _value(type_: FieldType, text: str) -> Value:
         if text.lower() not in _TRUTH:
             raise DefinitionError(f"not a truth value: {text!r}")
         return _TRUTH[text.lower()]
-    return float(text) if type_.base in FLOATS else int(text, 0)
+    if type_.base in FLOATS:
+        return float(text)
+    number, (low, high) = int(text, 0), RANGES[type_.base]
+    if not low <= number <= high:
+        raise DefinitionError(f"{number} is no {type_}")
+    return number
 
 
 def parts(name: str, written: tuple[Structure, ...]) -> dict[str, Structure]:
@@ -254,16 +300,17 @@ def read(name: str, root: Path = INTERFACES) -> tuple[Structure, ...]:
 
 
 class Structures(dict[str, Structure]):
-    """Every structure that the texts below a folder define, by name; a text is read when one of it is asked for."""
+    """Every structure of the standard interfaces, and of `own` texts; a text is read when one of it is asked for."""
 
-    def __init__(self, root: Path = INTERFACES) -> None:
+    def __init__(self, own: Mapping[str, str] = MappingProxyType({})) -> None:
         super().__init__()
-        self._root = root
+        self._own = own
 
     def __missing__(self, name: str) -> Structure:
-        interface = _interface(name)
+        interface = interface_of(name)
+        own = self._own.get(interface)
         try:
-            found = parts(interface, read(interface, self._root))
+            found = parts(interface, read(interface) if own is None else parse(interface, own))
         except OSError as error:
             raise KeyError(name) from error
         self.update(found)
@@ -276,7 +323,7 @@ class Structures(dict[str, Structure]):
             return False
 
 
-def _interface(structure: str) -> str:
+def interface_of(structure: str) -> str:
     """Return the interface of which a structure is a part."""
     package, kind, bare = structure.split("/")
     return f"{package}/{kind}/{bare.split('_')[0]}"

@@ -142,7 +142,7 @@ def _collect(message: type[Message], prefix: str, singles: list[str], others: li
     for name, text in message.FIELDS.items():
         type_, path = parse_type(text), prefix + attribute(name)
         if type_.shape is FieldShape.SINGLE and type_.is_message:
-            _collect(registry.message(type_.base), f"{path}.", singles, others)
+            _collect(registry.inside(message, type_.base), f"{path}.", singles, others)
         elif type_.shape is FieldShape.SINGLE and type_.base in FLOATS:
             singles.append(path)
         elif type_.shape is not FieldShape.SINGLE and (test := _test_of_many(type_)) is not None:

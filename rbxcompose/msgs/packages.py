@@ -1,9 +1,9 @@
 """Interface texts for export: one with all messages inside it, as in MCAP, or a package for a ROS 2 workspace."""
 
 from collections.abc import Callable, Iterable
-from pathlib import Path
 
-from rbxcompose.msgs.definitions import INTERFACES, KINDS, FieldType, interface_names, read
+from rbxcompose.msgs.definitions import INTERFACES, KINDS, FieldType, interface_names, parse
+from rbxcompose.msgs.registry import chosen, text_of
 
 OWN = "rbxcompose_msgs"
 """The package that no ROS 2 installation has."""
@@ -38,17 +38,17 @@ ament_package()
 
 def all_names() -> list[str]:
     """Return the sorted names of all interfaces that have a text."""
-    return sorted(name for kind in KINDS for name in interface_names(kind))
+    return sorted({*chosen().texts, *(name for kind in KINDS for name in interface_names(kind))})
 
 
-def text_of(name: str) -> str:
-    """Return the text of an interface, such as `std_srvs/srv/SetBool`."""
-    return _path(INTERFACES, name).read_text(encoding="utf-8")
+def own_packages() -> list[str]:
+    """Return the packages of a robot's own types that are no standard ones."""
+    return sorted({name.split("/")[0] for name in chosen().texts} - {path.name for path in INTERFACES.iterdir()})
 
 
 def parts_of(name: str) -> list[str]:
     """Return the names of all messages inside an interface, each once, containers first."""
-    return parts(name, lambda one: [field.type for structure in read(one) for field in structure.fields])
+    return parts(name, lambda one: [field.type for each in parse(one, text_of(one)) for field in each.fields])
 
 
 def whole_text(name: str) -> str:
@@ -98,8 +98,3 @@ def short(name: str) -> str:
     """Return `geometry_msgs/Twist` for `geometry_msgs/msg/Twist`."""
     package, _, bare = name.split("/")
     return f"{package}/{bare}"
-
-
-def _path(root: Path, name: str) -> Path:
-    package, kind, bare = name.split("/")
-    return root / package / kind / f"{bare}.{kind}"

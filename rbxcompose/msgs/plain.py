@@ -12,7 +12,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Span, kind, suggest
 from rbxcompose.msgs import registry
-from rbxcompose.msgs.definitions import FLOATS, OCTETS, FieldShape, FieldType, attribute, parse_type
+from rbxcompose.msgs.definitions import FLOATS, OCTETS, RANGES, FieldShape, FieldType, attribute, parse_type
 from rbxcompose.msgs.types import Message
 
 M = TypeVar("M", bound=Message)
@@ -22,12 +22,6 @@ KeyPath = tuple[Key, ...]  # from the message: ("pose", "position", "x") or ("tr
 NO_FIELD = kind("RBX9023")
 WRONG_VALUE = kind("RBX9024")
 
-_RANGES = {
-    "byte": (0, 255),
-    "char": (0, 255),
-    **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
-    **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
-}
 _FLOAT32 = struct.Struct("<f")
 _DIGITS = range(6, 9)  # significant digits; a float32 never needs more than nine
 
@@ -151,7 +145,7 @@ class _Reading(Generic[M]):
             return self._wrong(path, f"expected a number ({base}), without a unit")
         if base in FLOATS:
             return self._float(base, value, path)
-        low, high = _RANGES[base]
+        low, high = RANGES[base]
         if not isinstance(value, int) or not low <= value <= high:
             return self._wrong(path, f"expected a whole number from {low} to {high} ({base})")
         return value

@@ -18,11 +18,12 @@ class Interface:
     __slots__ = ()
     TYPE: ClassVar[str]
     HASH: ClassVar[str]
+    CLASSES: ClassVar[dict[str, type[Any]]] = declared  # where it is, and what it is made of
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         if "TYPE" in vars(cls):
-            declared[cls.TYPE] = cls
+            cls.CLASSES[cls.TYPE] = cls
 
 
 class Message(Interface):

@@ -115,6 +115,8 @@ STATE, LOCK, SOCKET = "state.json", "lock", "control.sock"
 _BUS = "bus"
 FINDINGS = "findings.json"
 """What `check` found when the robot came up, as `check --format json` writes it."""
+MESSAGES = "messages.json"
+"""The texts of the robot's own message types, by name: what guests on its bus need to read them."""
 _VERSION = 1
 _PASSING = (STATE, SOCKET, LOCK)  # files removed when the robot is down; the log stays
 _LARGEST = 16_000_000  # [B] of a state
@@ -381,6 +383,19 @@ class RobotFolder:
         """Keep what `check` found."""
         replace_file(self.path / FINDINGS, text.encode(), mode=0o600)
 
+    def write_messages(self, texts: Mapping[str, str]) -> None:
+        """Keep the texts of the robot's own message types."""
+        replace_file(self.path / MESSAGES, json.dumps(dict(texts)).encode(), mode=0o600)
+
+    def read_messages(self) -> dict[str, str]:
+        """Return the texts of the robot's own message types; none if they cannot be read."""
+        try:
+            with open_regular(self.path / MESSAGES, follow=False) as file:
+                read = json.loads(file.read(_LARGEST))
+        except (OSError, ValueError):
+            return {}
+        return {str(name): str(text) for name, text in read.items()} if isinstance(read, dict) else {}
+
     def sweep(self) -> None:
         """Remove what a killed run has left: temporary files, outputs, its socket. Needs the lock."""
         for path in self._leftovers():
@@ -400,3 +415,4 @@ class RobotFolder:
         yield from self.sockets.glob("*")
         yield self.path / SOCKET
         yield self.path / FINDINGS
+        yield self.path / MESSAGES

@@ -270,6 +270,16 @@ class RunsProgram(Capability):
 
 
 @dataclass(frozen=True, slots=True)
+class RunsRosNode(Capability):
+    """It runs a node of ROS 2 in real time; `up` looks for that ROS 2 before anything starts."""
+
+    python: Setting[str]
+    """Its Python, if the manifest names it."""
+    setup: Setting[str]
+    """Its setup file, if the manifest names it."""
+
+
+@dataclass(frozen=True, slots=True)
 class RunsContainer(Capability):
     """It runs an image in real time; `up` looks for it and for what runs it before anything starts."""
 

@@ -111,6 +111,7 @@ class Component(Generic[C]):
     process: ClassVar[str] = "robot"  # default process group
     blocking: ClassVar[bool] = False  # may wait or compute for a long time: runs in a thread of its own
     configures_within: ClassVar[float] = 30.0  # [s] for a blocking one to be configured, or active; else it has failed
+    has_parameters: ClassVar[bool] = True  # its settings are parameters of ROS 2
     simulated: ClassVar[bool] = False  # exists only in simulation
     made_by: ClassVar[str] = ""  # says which section creates it, for a type that users do not list themselves
     type_name: ClassVar[str] = ""  # set by the decorator

@@ -11,6 +11,7 @@ from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
 from rbxcompose.compiler.model.robot import ends_of
 from rbxcompose.compiler.plan.model import Instance, Plan, Wire
+from rbxcompose.msgs import registry
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
 from rbxcompose.msgs.rcl_interfaces import Parameter, ParameterValue
 from rbxcompose.msgs.types import Message
@@ -51,7 +52,9 @@ class Bench:
         self.scheduler = Scheduler()
         self.records: list[Record] = []
         self.events: list[Notice] = []
-        self.plan = plan.in_one_process() if plan else Plan("bench", "bench.yaml", tuple(instances))
+        own = registry.chosen().texts
+        self.plan = plan.in_one_process() if plan else Plan("bench", "bench.yaml", tuple(instances), messages=own)
+        registry.choose(self.plan.messages)
         bus = self.plan.bus
         self.bus = Bus(
             self.scheduler, self.clock, domain=bus.domain, namespace=bus.namespace, wire=bus.wire, log=self._note
@@ -78,6 +81,7 @@ class Bench:
     def run_until(self, reached: Callable[[], bool], most: float = 600.0) -> bool:
         """Advance time until `reached()` holds, by at most `most` [s] of robot time; return whether it does."""
         end = self.clock.now() + most
+        registry.choose(self.plan.messages)
         self.scheduler.advance(self.clock.now())
         while not reached():
             due = self.scheduler.next_due()

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from rbxcompose.base.clock import SteppedClock
 from rbxcompose.compiler.systems.exchange import exchanges
 from rbxcompose.compiler.systems.model import System
+from rbxcompose.msgs import registry
 from rbxcompose.runtime.process_group.exchange import Way, carry
 from rbxcompose.testing.bench import Bench
 
@@ -31,6 +32,7 @@ class SystemBench:
         for (name, _), each in shared.items():
             for wire in each.takes:
                 giver, given = givers[wire.shared]
+                registry.choose(self.robots[name].plan.messages)
                 way = Way(self.robots[giver].bus, given.own, self.robots[name].bus, wire.own)
                 carry(way, wire.type, wire.qos)
         self.advance(0.0)
@@ -62,6 +64,7 @@ class SystemBench:
         now = self.clock.now()
         while True:
             for robot in self.robots.values():
+                registry.choose(robot.plan.messages)
                 robot.scheduler.advance(now)
             if min(self._due(), default=now + 1.0) > now:
                 return

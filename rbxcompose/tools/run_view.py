@@ -20,7 +20,7 @@ from rbxcompose.runtime.folder import RobotFolder, RunOptions
 from rbxcompose.runtime.log import NAME, Follower, Record
 from rbxcompose.runtime.supervision import launch
 from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
-from rbxcompose.sdk.capabilities import RunsContainer, RunsProgram, ServesPage
+from rbxcompose.sdk.capabilities import RunsContainer, RunsProgram, RunsRosNode, ServesPage
 from rbxcompose.sdk.registry import declared
 from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import LiveReload
@@ -141,4 +141,6 @@ def is_fit(robot: Robot, sources: Mapping[str, str]) -> bool:
 
 def real_time_only(robot: Robot) -> list[str]:
     """Return the components that run programs of others, for which robot time cannot be stepped."""
-    return [component.name for what in (RunsProgram, RunsContainer) for component, _ in robot.declared(what)]
+    return [
+        component.name for what in (RunsProgram, RunsContainer, RunsRosNode) for component, _ in robot.declared(what)
+    ]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
 from rbxcompose.commands.main import main
+from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import parse
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.packages import all_names, package_files, parts_of, whole_text
@@ -117,3 +119,79 @@ def test_a_package_names_the_packages_that_its_types_are_made_of() -> None:
 @for_all("name", [name for name in all_names() if "/msg/" in name])
 def test_a_recording_has_the_same_text_of_a_message(name: str) -> None:
     assert definition_of(name) == whole_text(name)
+
+
+@pytest.fixture
+def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Return the folder of a robot with a type of its own, which is the current one."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["msg", "new", "my_msgs/Grasp"]) == 0
+    Path("robot.yaml").write_text("rbx: 1\nkind: Robot\nname: one\nmsgs: {own: msgs}\ncomponents: {}\n")
+    yield tmp_path
+    registry.choose({})
+
+
+def test_types_are_listed_those_of_the_robot_first(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["msg", "ls", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert listed[0] == {"type": "my_msgs/msg/Grasp", "own": True}
+    assert {"type": "geometry_msgs/msg/Twist", "own": False} in listed
+    assert main(["msg", "ls", str(robot)]) == 0
+    assert "my_msgs/msg/Grasp" in capsys.readouterr().out
+
+
+def test_a_type_of_the_robot_is_shown(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (["my_msgs/Grasp"], ["my_msgs/msg/Grasp", str(robot)]):
+        assert main(["msg", "show", *words]) == 0
+        assert "\nfloat64 width  # [m]\n" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["my_msgs/Foo", "my_msgs/msg/Foo", "my_msgs/srv/Foo", "my_msgs/action/Foo"])
+def test_a_new_type_can_be_used_at_once(robot: Path, name: str) -> None:
+    assert main(["msg", "new", name]) == 0
+    assert main(["check", "robot.yaml"]) == 0
+    kind = name.split("/")[1] if name.count("/") == 2 else "msg"
+    assert f"my_msgs/{kind}/Foo" in registry.chosen().texts
+
+
+@pytest.mark.parametrize(
+    "name", ["Foo", "my_msgs/foo", "My/Foo", "my_msgs/what/Foo", "images/Foo", "my_msgs/msg/a/Foo"]
+)
+def test_a_name_that_no_type_can_have_is_refused(robot: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["msg", "new", name]) == 1
+    assert "RBX9102" in capsys.readouterr().err
+    assert not [path for path in robot.rglob("*.*") if path.stem.lower() == "foo"]
+
+
+def test_an_existing_type_is_not_overwritten(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["msg", "new", "my_msgs/Grasp"]) == 1
+    assert "already exists" in capsys.readouterr().err
+
+
+def test_stubs_tell_a_type_checker_what_a_type_has(robot: Path) -> None:
+    assert main(["msg", "stubs"]) == 0
+    text = (robot / "typings/rbxcompose/msgs/my_msgs.pyi").read_text()
+    assert "class Grasp(Message):" in text
+    assert "    width: float = 0.0  # [m]\n" in text
+    compile(text, "my_msgs.pyi", "exec")
+
+
+def test_stubs_of_a_robot_without_types_of_its_own_are_refused(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("robot.yaml").write_text("rbx: 1\nkind: Robot\nname: one\ncomponents: {}\n")
+    assert main(["msg", "stubs"]) == 1
+    assert "RBX9049" in capsys.readouterr().err
+
+
+def test_packages_of_the_robot_are_exported_too(robot: Path) -> None:
+    assert main(["msg", "export", "src", "robot.yaml"]) == 0
+    assert {path.name for path in (robot / "src").iterdir()} == {"rbxcompose_msgs", "my_msgs"}
+    assert (
+        '"msg/Grasp.msg"\n  DEPENDENCIES builtin_interfaces std_msgs'
+        in (robot / "src/my_msgs/CMakeLists.txt").read_text()
+    )
+    assert (robot / "src/my_msgs/msg/Grasp.msg").read_text() == (robot / "msgs/my_msgs/msg/Grasp.msg").read_text()
+
+
+def test_a_robot_that_cannot_be_read_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["msg", "ls", str(tmp_path / "robot.yaml")]) == 1
+    assert "RBX1301" in capsys.readouterr().err

@@ -172,7 +172,12 @@ def check_robot(
 ) -> Checked:
     robot = _MISSION_FILE.sub("../../missions/", text)
     others = dict.fromkeys(_NAMED_MISSION.findall(robot), example)  # a page shows a robot before its mission
-    others |= {"robot.urdf": URDF, "../../missions/patrol.yaml": PATROL, "../../missions/example.yaml": example}
+    others |= {
+        "robot.urdf": URDF,
+        "msgs/my_msgs/msg/Grasp.msg": "float64 width\n",
+        "../../missions/patrol.yaml": PATROL,
+        "../../missions/example.yaml": example,
+    }
     home = folder / "robots" / "example"
     return check_text(robot, home, others=others, profiles=profiles, overlays=overlays, real=real, environment={})
 

@@ -14,7 +14,7 @@ SHOWN = "\n".join(re.findall(r"^```yaml.*?^```$", PAGE, re.MULTILINE | re.DOTALL
 
 
 def test_it_shows_every_section_and_every_kind_of_step() -> None:
-    keys = set(re.findall(r"^([a-z_]+):", SHOWN, re.MULTILINE))
+    keys = set(re.findall(r"^([a-z0-9_]+):", SHOWN, re.MULTILINE))
     assert {section.name for section in sections()} - keys == set()
     steps = set(re.findall(r"(?:- |\{|\[|^)([a-z_]+):", SHOWN, re.MULTILINE))
     assert set(kinds()) - steps == set()

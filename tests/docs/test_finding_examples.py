@@ -34,6 +34,10 @@ NOT_SHOWN = {
         ("RBX2017", "RBX2018", "RBX3640", "RBX3641", "RBX3710", "RBX3720"), "the mistake is on the command line"
     ),
     "RBX2020": "the mistake needs a xacro file; a test of it has one",
+    **dict.fromkeys(
+        ("RBX1322", "RBX3026", "RBX3027", "RBX3028", "RBX3029"),
+        "the mistake is in the text of a message, or its folder",
+    ),
     "RBX7003": "the example would be too large to read",
     "RBX4115": "the example is cut short: nobody wants to read 40 levels",
     "RBX4146": "the mistake is in two files",

@@ -93,7 +93,7 @@ def test_each_known_key_is_carried_over_or_reported(program: str, monkeypatch: p
 
     monkeypatch.setattr(ForeignMap, "_ask", noted)
     groups: defaultdict[str, list[Path]] = defaultdict(list)
-    for path in sorted((EXAMPLES / program).iterdir()):
+    for path in sorted(path for path in (EXAMPLES / program).iterdir() if path.is_file()):
         groups[path.stem].append(path)
     matters: dict[Key, bool] = {}
     for paths in groups.values():

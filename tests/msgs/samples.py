@@ -44,6 +44,10 @@ SAMPLES = {  # every kind of field, and a keyword as a name
         string[2] pair
         Small[] smalls
         Small[2] two
+        int16[<=3] some [1, -2]
+        uint8[2] octets [1, 255]
+        string[] names ["a", 'b, c', d]
+        bool[2] bits [true, False]
         Nothing[] nothings
     """,
     "rbx_samples/action/Fibonacci": "int32 order\n---\nint32[] sequence\n---\nint32[] sequence",

@@ -14,6 +14,7 @@ from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, K
 from rbxcompose.msgs.geometry_msgs import PoseWithCovariance, Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.std_msgs import Bool, Empty, Float32, Int32, String
+from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
 from rbxcompose.msgs.types import Message, declared
 from rbxcompose.msgs.unique_identifier_msgs import UUID
 from tests.loops import for_all
@@ -110,6 +111,16 @@ def test_padding_of_other_writers_is_accepted_and_no_more() -> None:
     assert decode(String, payload + bytes(16)) == String(data="hi")
     with pytest.raises(CdrError, match="no std_msgs/msg/String: 17 bytes too many"):
         decode(String, payload + bytes(17))
+
+
+def test_lists_may_be_followed_by_as_many_bytes_as_rclpy_leaves_for_empty_ones() -> None:
+    trajectory = JointTrajectory(points=(JointTrajectoryPoint(),) * 50)
+    payload = encode(trajectory)
+    assert decode(JointTrajectory, payload + bytes(50 * 4 * 4)) == trajectory
+    with pytest.raises(CdrError, match="bytes too many"):
+        decode(JointTrajectory, payload + bytes(len(payload)))
+    with pytest.raises(CdrError, match="17 bytes too many"):
+        decode(Twist, encode(Twist()) + bytes(17))
 
 
 @pytest.mark.parametrize("count", [1, 3])

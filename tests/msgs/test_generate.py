@@ -108,6 +108,8 @@ def test_fields_start_at_zero_or_at_the_default_of_the_text() -> None:
     assert (everything.rgb, everything.switches, everything.pair) == (bytes(3), (False, False), ("", ""))
     assert everything.vector.dtype == np.float64
     assert len(everything.two) == 2
+    assert (everything.some.tolist(), everything.some.dtype, everything.octets) == ([1, -2], np.int16, b"\x01\xff")
+    assert (everything.names, everything.bits) == (("a", "b, c", "d"), (True, False))
 
 
 def test_a_keyword_gets_an_underscore_and_keeps_its_name_on_the_wire() -> None:

@@ -1,14 +1,21 @@
+import importlib
+import pickle
 import subprocess
 import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
 
 from rbxcompose.msgs import registry
+from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.definitions import KINDS
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
+from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.std_srvs import SetBool
+from rbxcompose.msgs.types import declared
 
 FINDERS: dict[str, Any] = {"msg": registry.message, "srv": registry.service, "action": registry.action}
 
@@ -56,3 +63,62 @@ registry.message("nav_msgs/Odometry")()
 assert "numpy" in sys.modules
 """
     subprocess.run([sys.executable, "-c", script], check=True, cwd=sys.path[0] or ".")
+
+
+ONE = {
+    "toy_msgs/msg/Ball": "float64 size\nstd_msgs/Header header\nSpot[] spots",
+    "toy_msgs/msg/Spot": "uint8 TYPE=3\nuint8 colour",
+}
+OTHER = {"toy_msgs/msg/Ball": "string name", "toy_msgs/srv/Roll": "Ball ball\n---\nbool ok"}
+
+
+@pytest.fixture
+def _nothing_left() -> Iterator[None]:
+    yield
+    registry.choose({})
+
+
+@pytest.mark.usefixtures("_nothing_left")
+def test_types_of_a_robot_are_found_by_name_and_in_a_module_like_standard_ones() -> None:
+    registry.choose(ONE)
+    ball, spot = registry.message("toy_msgs/Ball"), registry.message("toy_msgs/msg/Spot")
+    assert "toy_msgs/msg/Ball" in registry.names("msg")
+    toy_msgs: Any = importlib.import_module("rbxcompose.msgs.toy_msgs")
+    assert (toy_msgs.Ball, toy_msgs.Spot) == (ball, spot)
+    assert {"Ball", "Spot"} <= set(dir(toy_msgs))
+    made: Any = ball(size=2.0, spots=(spot(colour=1),), header=Header(frame_id="a"))  # type: ignore[call-arg]
+    assert decode(ball, encode(made)) == pickle.loads(pickle.dumps(made)) == made
+    assert (made.spots[0].TYPE_, spot.TYPE) == (3, "toy_msgs/msg/Spot")
+    assert "toy_msgs/msg/Ball" not in declared
+
+
+@pytest.mark.usefixtures("_nothing_left")
+def test_types_of_two_robots_with_the_same_name_exist_side_by_side() -> None:
+    registry.choose(ONE)
+    one = registry.message("toy_msgs/Ball")
+    with registry.choosing(OTHER):
+        other = registry.message("toy_msgs/Ball")
+        assert list(other.FIELDS) == ["name"]
+        assert registry.service("toy_msgs/Roll").Request.FIELDS == {"ball": "toy_msgs/msg/Ball"}
+        assert decode(one, encode(one(size=3.0))) == one(size=3.0)  # type: ignore[call-arg]
+    assert registry.message("toy_msgs/Ball") is one
+    assert one.HASH != other.HASH
+    with pytest.raises(KeyError):
+        registry.service("toy_msgs/Roll")
+    registry.choose({})
+    with pytest.raises(ImportError):
+        exec("from rbxcompose.msgs.toy_msgs import Ball")
+
+
+@pytest.mark.usefixtures("_nothing_left")
+def test_a_thread_has_the_types_of_the_process_unless_it_has_chosen_others() -> None:
+    registry.choose(ONE)
+    with ThreadPoolExecutor(1) as thread:
+        assert thread.submit(lambda: list(registry.message("toy_msgs/Ball").FIELDS)).result() == [
+            "size",
+            "header",
+            "spots",
+        ]
+        thread.submit(registry.choose, OTHER).result()
+        assert thread.submit(lambda: list(registry.message("toy_msgs/Ball").FIELDS)).result() == ["name"]
+    assert list(registry.message("toy_msgs/Ball").FIELDS) == ["size", "header", "spots"]

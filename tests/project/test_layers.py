@@ -32,14 +32,15 @@ DOMAINS = {
     "bases": "body servos worlds",
     "console": "body",
     "navigation": "bases body vision worlds",
+    "programs": "body",
     "servos": "body devices",
     "vision": "bases body worlds",
     "worlds": "body",
 }
 """Which other domains a domain may import; one that is not named here imports none."""
 IMPURE = ("bus", "runtime", "testing", "tools")
-"""What the core of a domain does not import: all of it but its plug-ins, and what belongs to its commands."""
-PLUG_IN = re.compile(r"components|sections|commands|command_\w+|controllers|importers|bus_types|checks")
+"""What the core of a domain does not import: all of it but its plug-ins, a bridge, and what belongs to its commands."""
+PLUG_IN = re.compile(r"bridge|components|sections|commands|command_\w+|controllers|importers|bus_types|checks")
 
 
 def imports(path: Path) -> set[str]:

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-PYTHON = Path(__file__).parents[2] / ".ros2/bin/python"
+ENVIRONMENT = Path(__file__).parents[2] / ".ros2"
 
 
 @pytest.fixture(scope="session")
 def ros2_python() -> Path:
     """Return the Python that has rclpy."""
-    if not PYTHON.exists():
+    if not (ENVIRONMENT / ".made").exists():
         pytest.skip("needs a ROS 2: make ros2")
-    return PYTHON
+    return ENVIRONMENT / "bin/python"

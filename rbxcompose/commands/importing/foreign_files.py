@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, MutableMapping
+from collections.abc import Iterable, Iterator, Mapping, MutableMapping
 from dataclasses import field
 from pathlib import Path
 from typing import Generic, TypeVar
@@ -21,7 +21,7 @@ from rbxcompose.manifest.tree import KEY, Entry, MappingNode, ScalarNode, Sequen
 from rbxcompose.manifest.walk import TAG
 
 PYTHON_OBJECT = kind("RBX2292", Severity.WARNING)
-_XML = (".srdf", ".urdf")
+_AS_TEXT = (".srdf", ".urdf", ".xml", ".launch", ".py")  # others are YAML
 _PYTHON = "!!python/"
 _OF_YAML = ("str", "int", "float", "bool", "null", "seq", "map")
 _OF_PYTHON = ("unicode", "str", "bytes", "int", "long", "float", "bool", "none", "tuple", "list", "dict")
@@ -71,12 +71,16 @@ class Given(Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class ForeignFile:
-    """A file of another program: its name in findings, its tree, which is empty for XML, its text, and its path."""
+    """A file of another program: its name in findings, its tree if it is YAML, its text, and its path.
+
+    `arguments` are those that were given with it.
+    """
 
     name: str
     root: TreeNode
     text: str = ""
     path: Path | None = None
+    arguments: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_files(paths: Iterable[Path], report: Report, sources: MutableMapping[str, str]) -> list[ForeignFile]:
@@ -88,7 +92,7 @@ def _read(path: Path, report: Report, sources: MutableMapping[str, str]) -> Fore
     shown = shown_name(path)
     text, findings = read_source(path, shown, sources, what="an imported file")
     root: TreeNode | None = None
-    if text is not None and path.suffix in _XML:
+    if text is not None and path.suffix in _AS_TEXT:
         return ForeignFile(shown, MappingNode(), text, path.absolute())
     if text is not None:
         root, findings = read_text(text, shown, _PLAIN_TAGS)

@@ -14,6 +14,7 @@ NOT_CARRIED_OVER = kind("RBX2230", Severity.WARNING)
 OTHER_PROGRAM = kind("RBX2231")
 DISAGREES = kind("RBX2232")
 RENAMED_TOPIC = kind("RBX2294", Severity.WARNING)
+LEFT_OPEN = kind("RBX2299", Severity.WARNING)
 
 NOTHING_LEFT = kind("RBX2238")
 CLOCK = "'bus: {clock: external}' makes robot time follow '/clock'"  # instead of `use_sim_time`
@@ -24,10 +25,14 @@ _IMPORTERS: dict[str, Importer] = {}  # those that have been imported, by name
 
 @dataclass(frozen=True, slots=True)
 class ImportedFiles:
-    """The text of a manifest, empty if nothing could be read, and the files beside it by name."""
+    """The text of a manifest, empty if nothing could be read, and the files beside it by name.
+
+    `included` are the texts of further files that were read, by their names in findings.
+    """
 
     text: str
     beside: Mapping[str, str] = field(default_factory=dict)
+    included: Mapping[str, str] = field(default_factory=dict)
 
 
 Import = Callable[[Sequence[ForeignFile], str, Report], str | ImportedFiles]
@@ -36,18 +41,22 @@ Import = Callable[[Sequence[ForeignFile], str, Report], str | ImportedFiles]
 
 @dataclass(frozen=True, slots=True)
 class Importer:
-    """How the files of one program are imported; `about` says in half a sentence what they are."""
+    """How the files of one program are imported; `about` says in half a sentence what they are.
+
+    `has_arguments` means that its files take arguments: words `NAME:=VALUE` of the command line.
+    """
 
     name: str
     about: str
     run: Import
+    has_arguments: bool = False
 
 
-def importer(name: str, about: str) -> Callable[[Import], Import]:
+def importer(name: str, about: str, *, has_arguments: bool = False) -> Callable[[Import], Import]:
     """Declare the function that imports the files of a program, under the name of its module."""
 
     def declare(run: Import) -> Import:
-        _IMPORTERS[name] = Importer(name, about, run)
+        _IMPORTERS[name] = Importer(name, about, run, has_arguments)
         return run
 
     return declare

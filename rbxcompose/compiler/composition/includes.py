@@ -14,6 +14,7 @@ from rbxcompose.compiler.composition.overlay import settled
 from rbxcompose.compiler.composition.robot_manifest import About, Claim, IncludedPart, Inclusion, Inclusions
 from rbxcompose.compiler.sections.args import args
 from rbxcompose.compiler.sections.include import Include, include
+from rbxcompose.compiler.sections.msgs import foresee
 from rbxcompose.compiler.sections.needs import needs
 from rbxcompose.compiler.sections.provides import provides
 from rbxcompose.manifest import tree
@@ -319,6 +320,7 @@ class Parts:
         if path not in self._files:
             root = self.documents.read(path, PART, span)
             if root is not None:
+                foresee(root, path)
                 root = self.documents.meant(model_for(PART, root), root)
                 self.documents.check(model_for(PART, root), root)
             self._files[path] = _File(root, tuple(claims_of(Contents(root, path, self.documents)))) if root else None

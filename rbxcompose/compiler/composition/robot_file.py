@@ -14,6 +14,7 @@ from rbxcompose.compiler.composition.layers import Chosen, Composed, compose_rob
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.composition.scopes import fill_scopes
 from rbxcompose.compiler.doubts import has_a_section_twice, without_half_entries
+from rbxcompose.compiler.sections.msgs import foresee, msgs
 from rbxcompose.manifest import registry
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.files import find, project_of, shown_name
@@ -24,6 +25,7 @@ from rbxcompose.manifest.section import ROBOT, Contents, Section
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, all_nodes, at, key_span
 from rbxcompose.manifest.validate import UNKNOWN_KEY
 from rbxcompose.manifest.yaml_nodes import is_moderate
+from rbxcompose.msgs import registry as types
 
 
 def without_strayed(root: MappingNode, keys: Container[str], report: Report) -> MappingNode:
@@ -97,6 +99,7 @@ def read_sections(
         is_simulated=sim,
         is_whole=is_whole,
     )
+    types.choose(contents.of(msgs))  # before anything that may name a type is read
     documents.report.extend(_taken_names(contents))
     for section in registry.sections_in_use(ROBOT):
         if section.is_composed:
@@ -190,6 +193,8 @@ def load_robot(
     root = documents.read(file, ROBOT)
     if root is None:
         return None
+    types.choose({})
+    foresee(root, file)
     root = documents.meant(registry.model_for(ROBOT, root), root)
     composed = compose_robot(root, file, Chosen(profiles, overlays, sets), documents)
     manifest = _manifest(composed, file, sim, environment or {}, documents)

@@ -12,6 +12,7 @@ from rbxcompose.base.findings import Finding, Related, Span
 from rbxcompose.compiler.sections.bus import BusModel, bus
 from rbxcompose.compiler.sections.components import ComponentEntry, components
 from rbxcompose.compiler.sections.missions import MissionEntry, missions
+from rbxcompose.compiler.sections.msgs import msgs
 from rbxcompose.compiler.sections.places import places
 from rbxcompose.compiler.sections.process import process
 from rbxcompose.compiler.sections.start import start
@@ -252,6 +253,11 @@ class RobotManifest:
     def missions(self) -> Mapping[str, MissionEntry]:
         """Return the missions."""
         return self.contents.of(missions)
+
+    @property
+    def messages(self) -> Mapping[str, str]:
+        """Return the texts of its own message types, by name."""
+        return self.contents.of(msgs)
 
     @property
     def bus(self) -> BusModel:

@@ -22,6 +22,7 @@ def build_plan(robot: Robot) -> Plan:
         bus=BusPlan(bus.domain, bus.namespace or "", bus.port, bus.wire, bus.router, bus.clock, bus.access, bus.links),
         start=manifest.start,
         is_simulated=manifest.is_simulated,
+        messages=dict(manifest.messages),
     )
 
 

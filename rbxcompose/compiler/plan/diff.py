@@ -18,7 +18,7 @@ from rbxcompose.missions.program.program import Program
 EMPTY = "{}"
 BOUNDS = "limits of "  # begins the keys of what bounds settings that may change while the robot runs
 LONGEST = 1000  # characters of a text that a person would still read in a difference
-WHOLE = ("robot", "bus", "is_simulated")  # keys whose change restarts every process
+WHOLE = ("robot", "bus", "is_simulated", "messages")  # keys whose change restarts every process
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +115,7 @@ def _of_plan(plan: Plan) -> dict[str, str]:
         "start": plan.start or "no mission",
         "is_simulated": _text(plan.is_simulated),
         **dict(_flat(plan.bus, "bus")),
+        **{f"messages.{name}": f"SHA-256 {_digest(text)}" for name, text in plan.messages.items()},
     }
 
 
@@ -212,5 +213,9 @@ def _text(value: Any) -> str:
         case set() | frozenset():
             return f"[{', '.join(sorted(map(_text, value)))}]"
         case str() if len(value) > LONGEST:
-            return f"{len(value):,} characters, SHA-256 {hashlib.sha256(value.encode()).hexdigest()[:16]}"
+            return f"{len(value):,} characters, SHA-256 {_digest(value)}"
     return str(value) or '""'
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -25,6 +25,7 @@ from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import Program
+from rbxcompose.msgs import registry
 from rbxcompose.sdk.registry import component_names, component_type
 
 VERSION = 1
@@ -52,7 +53,7 @@ def dump(plan: Plan, *, reveals_secrets: bool = False, keeps_order: bool = False
 
 
 def load(text: str) -> Plan:
-    """Return the plan that `dump` wrote.
+    """Return the plan that `dump` wrote; names of message types mean those of its robot from then on.
 
     Raises:
         PlanTextError: if the text is not a plan, or names a component type that is not installed.
@@ -61,6 +62,7 @@ def load(text: str) -> Plan:
         data = json.loads(text)
         if not isinstance(data, dict) or data.pop(VERSION_KEY, None) != VERSION:
             raise PlanTextError(f"this is not a plan of version {VERSION}")
+        registry.choose(_decode(data.get("messages", {}), Mapping[str, str]))
         plan = _decode(data, Plan)
     except PlanTextError:
         raise

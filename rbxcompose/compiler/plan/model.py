@@ -149,6 +149,7 @@ class Plan:
     is_simulated: bool = True
     share: Share | None = None  # None: the robot runs on one host
     exchange: Exchange | None = None  # None: nothing is shared with other robots
+    messages: Mapping[str, str] = field(default_factory=dict)  # texts of the robot's own message types, by name
 
     @property
     def everywhere(self) -> tuple[Instance, ...]:

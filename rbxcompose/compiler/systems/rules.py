@@ -13,6 +13,8 @@ from rbxcompose.compiler.systems.neighbours import overlapping_starts
 from rbxcompose.compiler.systems.share import hosts_of, listens
 from rbxcompose.compiler.systems.traffic import Crossing, TopicEnd
 from rbxcompose.manifest.tree import key_span, value_span
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.definitions import type_hash
 from rbxcompose.sdk.capabilities import ConnectedBy, Drives
 from rbxcompose.sdk.ports import In, Out, Qos
 
@@ -73,6 +75,8 @@ def _wrong_takers(
         where, given = f"'{end.end.component}' of '{taker.name}'", first.end.host
         if end.type != first.type:
             yield OTHER_TYPE.at(span, f"{where} takes {shared} for {_typed(end)}, and it is {_typed(first)}")
+        elif len({_definition(taker, end.type), _definition(robot, end.type), ""}) > 2:
+            yield OTHER_TYPE.at(span, f"{where} has another definition of {end.type} than '{robot.name}'")
         elif exchange.is_called(first) and robot.model.callers and not exchange.may_call(robot, taker):
             message = f"{where} calls {shared}, and '{taker.name}' is not among the callers of '{robot.name}'"
             names = ", ".join([*robot.model.callers, taker.name])
@@ -90,6 +94,12 @@ def _wrong_takers(
             does = "publishes" if isinstance(end.end.port, Out) else "serves"
             message = f"'{end.end.component}' of '{other.name}' {does} {shared}, which '{robot.name}' shares"
             yield TAKEN_NAME.at(span, message, help="give it another name there")
+
+
+def _definition(robot: PlacedRobot, name: str) -> str:
+    """Return the hash of a type of a robot's own, empty for another one."""
+    own = robot.plan.messages
+    return type_hash(name, registry.types_of(own).structures) if name in own else ""
 
 
 def _typed(topic_end: TopicEnd) -> str:

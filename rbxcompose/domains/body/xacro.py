@@ -5,10 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import stat
-import subprocess
-import sys
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -33,10 +30,8 @@ _LARGEST = 24_000_000  # [bytes]
 NO_PREFIX = kind("RBX2014", Severity.WARNING, is_fixable=True)
 BINDING = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 _SHOWN = 60  # characters of a name in a message
-DEADLINE = 12.0  # [s] of real time, on a busy machine; the processes limit their processor time themselves
 KEPT = 64  # answers
 _LARGEST_READ = 8_000_000  # [bytes] of a file that xacro reads
-_RUN = "import sys; sys.path.insert(0, sys.argv[1]); from rbxcompose.domains.body.xacro_child import main; main()"
 NOT_EXPANDED = kind("RBX2007")
 _NAMESPACE = "http://www.ros.org/wiki/xacro"
 _UNKNOWN = (
@@ -176,32 +171,10 @@ def _digest(path: str) -> str:
 
 
 def _asked(requests: Sequence[XacroRequest]) -> list[XacroAnswer | None]:
-    package = str(Path(rbxcompose.__file__).parents[1])
-    with subprocess.Popen(
-        [sys.executable, "-E", "-s", "-B", "-c", _RUN, package],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,  # xacro warns there of what is deprecated
-        env={},
-        start_new_session=True,
-    ) as process:
-        try:
-            output, _ = process.communicate(f"[{','.join(item.text for item in requests)}]".encode(), timeout=DEADLINE)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            output = b""
-    written = list(_split(output))
-    if len(written) != len(requests):
-        return [None] * len(requests)
+    from rbxcompose.base.fenced_answers import fenced_answers  # which few robots need
+
+    written = fenced_answers("rbxcompose.domains.body.xacro_child", [item.text for item in requests])
     return [read_answer(data, request.roots) for data, request in zip(written, requests, strict=True)]
-
-
-def _split(output: bytes) -> Iterator[bytes]:
-    """Yield the answers, each of which follows its length."""
-    while output:
-        end = 8 + int.from_bytes(output[:8], "little")
-        yield output[8:end]
-        output = output[end:]
 
 
 @dataclass(frozen=True, slots=True)

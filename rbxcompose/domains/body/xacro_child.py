@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import glob
-import json
 import os
 import re
-import sys
 import xml.dom.minidom
 from collections import defaultdict
 from collections.abc import Callable, Iterator
@@ -18,8 +16,9 @@ from xml.dom import expatbuilder, minidom
 import xacro
 from xacro import substitution_args
 
+from rbxcompose.base.fenced_answers import answer_all
 from rbxcompose.base.files import read_regular
-from rbxcompose.base.processes import fence, is_below, processor_time
+from rbxcompose.base.processes import fence, is_below
 from rbxcompose.base.requests import to_data
 from rbxcompose.domains.body.xacro_answer import BareFile, BareTag, XacroAnswer
 from rbxcompose.manifest.tree import DEPTH
@@ -256,27 +255,11 @@ def _reason(error: BaseException) -> str:
 
 
 def main() -> None:
-    """Answer requests, each in a process of its own: the length in 8 bytes and the answer, or 0 if there is none."""
-    start = processor_time()
-    answers = [_begun(request, start) for request in json.load(sys.stdin)]
-    for process, file in answers:
-        _, status = os.waitpid(process, 0)
-        answer = os.pread(file, os.fstat(file).st_size, 0) if status == 0 else b""
-        sys.stdout.buffer.write(len(answer).to_bytes(8, "little") + answer)
-    sys.stdout.buffer.flush()
+    """Answer requests."""
+    answer_all(_answer)
 
 
-def _begun(request: dict[str, Any], start: float) -> tuple[int, int]:
-    """Return the process that answers a request, and the file that it writes the answer to."""
-    file = os.memfd_create("answer")  # a file, since its size can be limited
-    process = os.fork()
-    if process == 0:
-        os.closerange(3, file)  # those of other requests
-        for standard in (0, 1, 2):
-            os.dup2(os.open(os.devnull, os.O_RDWR), standard)
-        used: set[str] = set()
-        fence(request["roots"], used, start)
-        found = to_data(replace(expand(request), used=tuple(sorted(used))))
-        answer = json.dumps(found, ensure_ascii=False).encode(errors="replace")
-        os._exit(0 if os.write(file, answer) == len(answer) else 1)
-    return process, file
+def _answer(request: dict[str, Any], start: float) -> Any:
+    used: set[str] = set()
+    fence(request["roots"], used, start)
+    return to_data(replace(expand(request), used=tuple(sorted(used))))

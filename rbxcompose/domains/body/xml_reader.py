@@ -83,8 +83,17 @@ def read_urdf(text: str, file: str) -> XmlElement | Finding:
 
     `file` is its name in findings. Elements that carry a `PLACE` have that instead of their own.
     """
+    return _read(text, file, is_urdf=True)
+
+
+def read_xml(text: str, file: str) -> XmlElement | Finding:
+    """Return the root of any other XML, or the first mistake that keeps a text from being that."""
+    return _read(text, file, is_urdf=False)
+
+
+def _read(text: str, file: str, *, is_urdf: bool) -> XmlElement | Finding:
     try:
-        return _Reader(file).read(text)
+        return _Reader(file, is_urdf=is_urdf).read(text)
     except _RefusedError as refused:
         return refused.finding
 
@@ -100,8 +109,8 @@ class _RefusedError(Exception):
 class _Reader:
     """Builds the tree, within limits."""
 
-    def __init__(self, file: str) -> None:
-        self.file = file
+    def __init__(self, file: str, *, is_urdf: bool) -> None:
+        self.file, self.is_urdf = file, is_urdf
         self.open: list[XmlElement] = []
         self.root: XmlElement | None = None
         self.elements = 0
@@ -134,14 +143,15 @@ class _Reader:
             raise _RefusedError(NOT_XML.at(self._here("<?xml"), message, help='write encoding="utf-8"'))
 
     def _doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
-        raise _RefusedError(NOT_XML.at(self._here(" "), "a URDF file may not have a DOCTYPE", help="remove it"))
+        what = "a URDF" if self.is_urdf else "this"
+        raise _RefusedError(NOT_XML.at(self._here(" "), f"{what} file may not have a DOCTYPE", help="remove it"))
 
     def _begun(self, name: str, attributes: dict[str, str]) -> None:
         self.elements += 1
-        if not self.open and name != ROOT:
+        if self.is_urdf and not self.open and name != ROOT:
             message = f"the root of a URDF file is '<{ROOT}>', and here it is '<{plain(name, _SHOWN)}>'"
             raise _RefusedError(NOT_URDF.at(self._tag(name), message))
-        if name.startswith(XACRO):
+        if self.is_urdf and name.startswith(XACRO):
             help_text = "expand it first: 'xacro FILE.xacro -o FILE.urdf'"
             raise _RefusedError(NOT_URDF.at(self._tag(name), "xacro must expand this file first", help=help_text))
         if len(self.open) >= DEPTH:

@@ -216,10 +216,10 @@ class FoxgloveServer:
 
         try:
             type_ = registry.service(type_name)
-            request, _, response = packages.text_of(type_name).partition("\n---")
+            request, _, response = registry.text_of(type_name).partition("\n---")
         except (KeyError, OSError):
             return None
-        nested = packages.whole_text(type_name).removeprefix(packages.text_of(type_name))
+        nested = packages.whole_text(type_name).removeprefix(registry.text_of(type_name))
 
         def schema(kind: str, text: str) -> foxglove.MessageSchema:
             made = foxglove.Schema(name=f"{type_name}_{kind}", encoding=ROS, data=f"{text.strip()}\n{nested}".encode())

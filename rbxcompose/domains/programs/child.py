@@ -38,6 +38,8 @@ class Order:
     open_files: int | None = None
     nice: int = 0
     cores: Sequence[int] = ()
+    descriptors: Sequence[int] = ()
+    """Open files that it inherits."""
     cleanup: Sequence[str] = ()
     """Run when it has ended, also if nobody is left: it ends what runs elsewhere on its behalf."""
 
@@ -105,7 +107,7 @@ class Child:
                 stdin=subprocess.PIPE,
                 stdout=output,
                 stderr=output,
-                pass_fds=(report,),
+                pass_fds=(report, *order.descriptors),
                 start_new_session=True,
                 bufsize=0,
             )

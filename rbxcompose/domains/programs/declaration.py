@@ -33,6 +33,10 @@ _ODOMETRY = "nav_msgs/msg/Odometry"
 _COMMANDS = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 
 
+def _usual(message: str) -> str:
+    return "bulk" if message in _LARGE else "command" if message in _COMMANDS else "state"
+
+
 def _as_type(value: Any) -> Any:
     return {"type": value} if isinstance(value, str) else value
 
@@ -45,7 +49,7 @@ class PublishedTopic(Config):
     rate: Frequency | None = Field(None, gt=0)
     """How often they come at least; fewer are a warning, none an error."""
     qos: QosName | None = None
-    """What the topic is for; without it, `bulk` for pictures and clouds, else `state`."""
+    """What the topic is for; without it, `command` for velocities, `bulk` for pictures and clouds, else `state`."""
     unit: str = ""
     """What a bare number in the message means: `%`."""
 
@@ -196,11 +200,11 @@ class DeclaredPorts(Config):
 
     def _declared(self) -> Iterator[Port[Any]]:
         for topic, given in self.publishes.items():
-            qos = given.qos or ("bulk" if given.type in _LARGE else "state")
+            qos = given.qos or _usual(given.type)
             yield Out(registry.message(given.type), topic, qos=qos, unit=given.unit, rate=given.rate)
         for topic, taken in self.subscribes.items():
             message = registry.message(taken.type)
-            qos = taken.qos or ("bulk" if taken.type in _LARGE else "command" if taken.type in _COMMANDS else "state")
+            qos = taken.qos or _usual(taken.type)
             yield In(message, topic, qos=qos, is_open=taken.optional, may_be_silent=taken.optional)
         for topic, service in self.serves.items():
             yield Serves(registry.service(service), topic)

@@ -11,7 +11,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.compiler.model.flow import setting_span
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
 from rbxcompose.domains.programs.keeper import found, obstacle
-from rbxcompose.sdk.capabilities import RunsContainer, RunsProgram
+from rbxcompose.sdk.capabilities import RunsContainer, RunsProgram, RunsRosNode
 
 CANNOT_RUN = kind("RBX9427")
 NO_ENGINE = kind("RBX9428")
@@ -28,12 +28,17 @@ class NoEngineError(Exception):
 
 
 def program_findings(robot: Robot, environment: Mapping[str, str], ask: Ask) -> Iterator[Finding]:
-    """Yield why the programs and containers of a robot cannot run here, with the environment of `up`."""
+    """Yield why the programs, containers and nodes of a robot cannot run here, with the environment of `up`."""
     path = environment.get("PATH", os.defpath)
     for component, runs in robot.declared(RunsProgram):
         yield from _of_program(robot, component, runs, runs.environment.value.get("PATH", path))
     for component, runs_image in robot.declared(RunsContainer):
         yield from _of_container(robot, component, runs_image, path, ask)
+    for component, node in robot.declared(RunsRosNode):
+        for place, needed in ((node.python, os.X_OK), (node.setup, os.R_OK)):
+            if place.value and not os.access(place.value, needed):
+                words = f"'{component.name}' cannot be started: ROS 2 is not at {plain(place.value)}"
+                yield CANNOT_RUN.at(setting_span(robot, (component, place.field)), words)
 
 
 def _of_program(robot: Robot, component: RobotComponent, runs: RunsProgram, path: str) -> Iterator[Finding]:

@@ -12,7 +12,7 @@ from rbxcompose.sdk.updater import TaskStatus
 
 PATIENCE = 10.0  # [s] after which a program should have declared and published what it says
 _ACTION = re.compile(r"/_action/\w+$")
-_OWN = re.compile(
+OWN = re.compile(
     r"^/(rosout|parameter_events)$|/_buf|"
     r"/(get|set|list|describe)_parameters$|/(get_parameter_types|set_parameters_atomically|get_type_description)$|"
     r"/_service_event$"
@@ -105,7 +105,7 @@ class ProgramWatch:
         for key in sorted(session, key=lambda one: (one.kind, one.name)):
             known = self._declared.get((key.kind, key.name))
             action = _ACTION.sub("", key.name)
-            if known is None and (_OWN.search(key.name) or action in self._actions):
+            if known is None and (OWN.search(key.name) or action in self._actions):
                 continue
             verb, where = _VERBS[key.kind]
             if known is None and action != key.name:

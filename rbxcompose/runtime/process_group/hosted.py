@@ -323,7 +323,8 @@ class Hosted:
         ]
         if self.worker is not None:
             made.bound = {name: handed_over(end, ports[name], self.worker) for name, end in self._ends.items()}
-        self.host.parameters.serve(self)
+        if cls.has_parameters:
+            self.host.parameters.serve(self)
         self.do(CONFIGURE, made.configure, then=self._configured)
 
     def _configured(self) -> None:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from fnmatch import fnmatchcase
 
@@ -10,7 +11,7 @@ from rbxcompose.bus.names import name_problem
 from rbxcompose.bus.tokens import EndpointToken, EntityKind
 from rbxcompose.bus.wire import ros_qos
 from rbxcompose.msgs import registry
-from rbxcompose.msgs.definitions import INTERFACES, FieldType, parse_type
+from rbxcompose.msgs.definitions import FieldType, parse_type
 from rbxcompose.msgs.packages import joined, parts, short
 from rbxcompose.sdk.ports import Qos
 
@@ -131,11 +132,10 @@ def _types(name: str) -> list[FieldType]:
 
 
 def _text(name: str) -> str:
-    package, kind, bare = name.split("/")
-    written = INTERFACES / package / kind / f"{bare}.{kind}"
-    if kind == "msg" and written.is_file():
-        return written.read_text(encoding="utf-8")
-    # A part of an action, or a type of another package: its fields are what counts.
+    if "/msg/" in name:
+        with suppress(KeyError):  # a type of another package
+            return registry.text_of(name)
+    # Of a part of an action or such a type, its fields are what counts.
     return "".join(f"{_short_type(type_)} {field}\n" for field, type_ in registry.message(name).FIELDS.items())
 
 

@@ -248,6 +248,7 @@ def run_process(launch: Launch, order: Fork, channel: Channel) -> None:
 
 
 def _import_what_is_common(plan: Plan) -> None:
+    registry.choose(plan.messages)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # its threads would not survive the fork
     import numpy  # noqa: F401 - messages with arrays need it, and importing it later would hold up what runs
 

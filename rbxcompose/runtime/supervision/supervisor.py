@@ -218,6 +218,7 @@ class Supervisor:
         self._control = ControlServer(self._folder, self._selector)
         is_stepped = self._launch.options.is_stepped
         self._control.handle = RequestHandler(self, self.settings.changes, is_stepped=is_stepped).handle
+        self._write_messages()
         self._write_state()
         try:
             self.conductor.begin()
@@ -414,6 +415,7 @@ class Supervisor:
                 self._lock = lock
             self._control.open_again()
             self._restore_router()
+            self._write_messages()
             self._folder.write_state(self.state())
         except OSError as error:
             self._complain(f"files of the robot were removed and cannot be restored: {error}")
@@ -507,6 +509,13 @@ class Supervisor:
             state = SILENT
         note = self.conductor.kept.notes.get(name, "")
         return ComponentState(name, type_name, state, process, pid, restarts, waits_for, note)
+
+    def _write_messages(self) -> None:
+        if texts := self._launch.plan.messages:
+            try:
+                self._folder.write_messages(texts)
+            except OSError as error:  # the robot does not depend on it
+                self._complain(f"the texts of its messages cannot be written: {error}")
 
     def _write_state(self) -> None:
         self._is_state_old = False

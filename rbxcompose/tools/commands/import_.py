@@ -7,6 +7,8 @@ Exit codes: 0 fine, 1 errors found (what was understood is written nevertheless)
 
 import argparse
 import json
+import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +23,7 @@ from rbxcompose.manifest.files import shown_name
 
 GROUP = "write"
 OTHERWISE = "imported"  # the name of a robot if the first file's has no letter
+_ARGUMENT = re.compile(r"[A-Za-z_]\w*:=")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     programs = parser.add_subparsers(dest="program", metavar="PROGRAM", required=True)
     for name, importer in importers().items():
         program = programs.add_parser(name, help=f"import {importer.about}", description=f"Import {importer.about}.")
-        program.add_argument("files", nargs="+", metavar="FILE", help="its files; together they make one robot")
+        words = ", and arguments as NAME:=VALUE" if importer.has_arguments else ""
+        program.add_argument("files", nargs="+", metavar="FILE", help=f"its files{words}; together they make one robot")
         out_option("write the manifest to this new file, or as robot.yaml to this folder")(program)
         program.add_argument("--name", metavar="NAME", help="the robot's name (default: that of the first file)")
         add_json_option(program)
@@ -38,9 +42,13 @@ def run(arguments: argparse.Namespace) -> int:
     """Read the files, write the manifest, and report the findings."""
     report, sources = Report(broken_importers()), dict[str, str]()
     out = robot_file(arguments.out) if arguments.out is not None else None
-    name = _name(arguments)
-    files = read_files(map(Path, arguments.files), report, sources)
+    has_arguments = importers()[arguments.program].has_arguments
+    given = [word.split(":=", 1) for word in arguments.files if has_arguments and _ARGUMENT.match(word)]
+    paths = [Path(word) for word in arguments.files if not (has_arguments and _ARGUMENT.match(word))]
+    name = _name(arguments.name, paths)
+    files = [replace(file, arguments=dict(given)) for file in read_files(paths, report, sources)]
     made = imported(arguments.program, files, name, report)
+    sources.update(made.included)
     findings = Report(
         [replace(one, fix=None) for one in report]
     )  # fixes are for manifests, which `check --fix` corrects
@@ -50,10 +58,10 @@ def run(arguments: argparse.Namespace) -> int:
     return _answer(made, findings, sources, out, in_json=arguments.json)
 
 
-def _name(arguments: argparse.Namespace) -> str:
-    if arguments.name is not None:
-        return read_name(arguments.name, "the robot")
-    return name_like(Path(arguments.files[0]).stem) or OTHERWISE
+def _name(wanted: str | None, paths: Sequence[Path]) -> str:
+    if wanted is not None:
+        return read_name(wanted, "the robot")
+    return name_like(paths[0].stem.removesuffix(".launch") if paths else "") or OTHERWISE
 
 
 def _write(path: Path, made: ImportedFiles) -> Finding | None:

@@ -1,66 +1,190 @@
-"""Show the definition of a message, service or action, or write our own as a ROS 2 package.
+"""List and show types of messages, services and actions, begin your own, export packages of them.
 
-ROS 2 knows all types of a robot except those of the package `rbxcompose_msgs`: `msg export ros2_ws/src` writes it.
+A robot's own types are those in the folders of its section `msgs`: `msg new my_msgs/Grasp` begins one, and `msg stubs`
+tells editors and type checkers about `from rbxcompose.msgs.my_msgs import Grasp`. ROS 2 knows all types of a robot
+except its own and those of the package `rbxcompose_msgs`: `msg export ros2_ws/src PATH` writes their packages.
 """
 
 import argparse
+import os
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import rbxcompose
-from rbxcompose.commands.console import emit, refuse
+from rbxcompose.base.files import replace_file
+from rbxcompose.base.findings import kind
+from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, table, write_report
 from rbxcompose.commands.messages import NO_TYPE, to_json
-from rbxcompose.commands.new_files import write_new
+from rbxcompose.commands.new_files import NAME, write_new
+from rbxcompose.commands.targets import add_path_argument, robot_path
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.message_texts import wrong_package, wrong_type
 from rbxcompose.manifest.files import shown_name
-from rbxcompose.msgs.definitions import Structures, type_hash
-from rbxcompose.msgs.packages import OWN, all_names, package_files, parts_of, short, whole_text
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.definitions import KINDS, parse, parts, type_hash
+from rbxcompose.msgs.generate import all_structures, modules
+from rbxcompose.msgs.packages import OWN, all_names, own_packages, package_files, parts_of, short, whole_text
 
 GROUP = "data"
 LICENCE = "Apache-2.0"
+NO_OWN = kind("RBX9049")
+_BEGUN = {
+    "msg": """# What it tells, with units.
+std_msgs/Header header
+float64 width  # [m]
+""",
+    "srv": """# What is asked for.
+float64 width  # [m]
+---
+bool success
+string message
+""",
+    "action": """# What is to be done.
+float64 width  # [m]
+---
+bool success
+string message
+---
+float64 width  # so far [m]
+""",
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="show|export", required=True)
+    actions = parser.add_subparsers(dest="action", metavar="ls|show|new|stubs|export", required=True)
     parser.set_defaults(action="show")
+    ls = actions.add_parser("ls", help="list all types, those of the robot first")
     show = actions.add_parser(
         "show", help="print a definition with all types that it uses, and its type hash (the default)"
     )
     show.add_argument("type", metavar="TYPE", help="such as geometry_msgs/Twist")
-    export = actions.add_parser("export", help=f"write the package {OWN} for a ROS 2 workspace")
-    export.add_argument("folder", metavar="DIR", type=Path, help=f"the folder in which to create {OWN}")
-    for subparser in (show, export):
+    new = actions.add_parser("new", help="write a type of your own to start from, and the folders of its package")
+    new.add_argument("type", metavar="TYPE", help="such as my_msgs/Grasp, my_msgs/srv/Open or my_msgs/action/Close")
+    new.add_argument("--into", metavar="DIR", type=Path, default=Path("msgs"), help="the folder of packages (msgs)")
+    stubs = actions.add_parser("stubs", help="write the classes of the robot's types for editors and type checkers")
+    stubs.add_argument("--into", metavar="DIR", type=Path, default=Path("typings"), help="the folder (typings)")
+    for subparser in (ls, show, stubs):
+        add_path_argument(subparser)
+    export = actions.add_parser("export", help=f"write {OWN}, and a robot's own packages, for a ROS 2 workspace")
+    export.add_argument("folder", metavar="DIR", type=Path, help="the folder in which to create the packages")
+    export.add_argument("path", nargs="?", metavar="PATH", help="the robot whose own packages are written, too")
+    for subparser in (ls, show, new, stubs, export):
         subparser.add_argument("--json", action="store_true", help="answer in JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Show a type, or write the package."""
-    if arguments.action == "export":
-        return _export(arguments.folder, arguments.json)
-    return _show(arguments.type, arguments.json)
+    """Carry out the chosen action."""
+    match arguments.action:
+        case "export":
+            return _export(arguments)
+        case "new":
+            return _new(arguments)
+        case "show":
+            return _show(arguments)
+        case "ls":
+            return _ls(arguments)
+    return _stubs(arguments)
 
 
-def _show(wanted: str, as_json: bool) -> int:
-    names = all_names()
+def _choose_robot(path: str | None) -> int:
+    """Let names mean the types of a robot, or of the only one here, if there is one; return the exit code."""
+    with suppress(NotDoneError):
+        path = robot_path(path)
+    if path is None:
+        return 0
+    compilation = compile_robot(path, environment=os.environ)
+    if compilation.robot is None:
+        write_report(compilation.report, compilation.sources)
+        return FINDINGS
+    return 0
+
+
+def _ls(arguments: argparse.Namespace) -> int:
+    if code := _choose_robot(arguments.path):
+        return code
+    own = registry.chosen().texts
+    names = [*sorted(own), *(name for name in all_names() if name not in own)]
+    if arguments.json:
+        emit(to_json([{"type": name, "own": name in own} for name in names]))
+    else:
+        emit(table([("type", ""), *((name, "the robot's own" if name in own else "") for name in names)]))
+    return 0
+
+
+def _show(arguments: argparse.Namespace) -> int:
+    wanted, names = arguments.type, all_names()
+    if arguments.path is not None or not any(wanted in (name, short(name)) for name in names):
+        if code := _choose_robot(arguments.path):
+            return code
+        names = all_names()
     name = next((name for name in names if wanted in (name, short(name))), None)
     if name is None:
         words = f"unknown type '{wanted}'"
         return refuse(NO_TYPE.misspelt(None, words, wanted, [*names, *map(short, names)], "known types"))
-    hashed, text = type_hash(name, Structures()), whole_text(name)
-    if as_json:
+    hashed, text = type_hash(name, registry.chosen().structures), whole_text(name)
+    if arguments.json:
         emit(to_json({"type": name, "hash": hashed, "text": text, "parts": parts_of(name)}))
     else:
         emit(f"# {name}\n# {hashed}\n{text}".rstrip("\n"))
     return 0
 
 
-def _export(folder: Path, as_json: bool) -> int:
-    target = folder / OWN
-    finding = write_new(target, package_files(OWN, rbxcompose.__version__, LICENCE))
+def _new(arguments: argparse.Namespace) -> int:
+    package, *kinds, bare = arguments.type.split("/") if "/" in arguments.type else (arguments.type, "", "")
+    kind_ = kinds[0] if kinds else "msg"
+    if len(kinds) > 1 or kind_ not in KINDS:
+        words = f"'{arguments.type}' is no name of a type"
+        return refuse(NAME.at(None, words, help="such as my_msgs/Grasp, my_msgs/srv/Open or my_msgs/action/Close"))
+    name = f"{package}/{kind_}/{bare}"
+    if why := wrong_package(package) or wrong_type(bare):
+        return refuse(NAME.at(None, why))
+    path = f"{name}.{kind_}"
+    if finding := write_new(arguments.into, {path: _BEGUN[kind_]}):
+        return refuse(finding)
+    if arguments.json:
+        emit(to_json({"type": name, "file": str(arguments.into / path)}))
+    else:
+        emit(
+            f"{shown_name(arguments.into / path)} is written; name '{arguments.into}' in the section 'msgs' of a robot"
+        )
+    return 0
+
+
+def _stubs(arguments: argparse.Namespace) -> int:
+    compilation = compile_robot(robot_path(arguments.path), environment=os.environ)
+    own = registry.chosen().texts if compilation.robot is not None else {}
+    if compilation.robot is None or not own:
+        write_report(compilation.report, compilation.sources)
+        return FINDINGS if compilation.robot is None else refuse(NO_OWN.at(None, "the robot has no types of its own"))
+    packages = {name.split("/")[0] for name in own}
+    files = {package: arguments.into / "rbxcompose" / "msgs" / f"{package}.pyi" for package in sorted(packages)}
+    structures = {part: one for name in own for part, one in parts(name, parse(name, own[name])).items()}
+    texts = modules({**all_structures(), **structures})
+    for package, file in files.items():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(file, texts[package].encode())
+    if arguments.json:
+        emit(to_json({package: str(file) for package, file in files.items()}))
+    else:
+        emit("\n".join(f"{shown_name(file)} is written" for file in files.values()))
+    return 0
+
+
+def _export(arguments: argparse.Namespace) -> int:
+    if arguments.path is not None and (code := _choose_robot(arguments.path)):
+        return code
+    folder, packages = arguments.folder, [OWN, *(own_packages() if arguments.path is not None else ())]
+    files = {package: package_files(package, rbxcompose.__version__, LICENCE) for package in packages}
+    finding = write_new(
+        folder, {f"{package}/{path}": text for package in files for path, text in files[package].items()}
+    )
     if finding is not None:
         return refuse(replace(finding, help="choose another folder"))
-    if as_json:
-        emit(to_json({"package": OWN, "folder": str(target)}))
+    if arguments.json:
+        emit(to_json({"packages": packages, "folder": str(folder)}))
     else:
-        emit(f"{shown_name(target)} is written; in the workspace: colcon build --packages-select {OWN}")
+        where = ", ".join(shown_name(folder / package) for package in packages)
+        emit(f"{where} is written; in the workspace: colcon build --packages-select {' '.join(packages)}")
     return 0

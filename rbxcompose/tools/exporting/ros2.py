@@ -12,7 +12,8 @@ import yaml
 
 from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.compiler.plan.model import Plan
-from rbxcompose.msgs.packages import OWN, package_files
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.packages import OWN, own_packages, package_files
 from rbxcompose.sdk.capabilities import WritesFrame
 from rbxcompose.sdk.ports import Out, Qos
 from rbxcompose.sdk.registry import component_type
@@ -100,6 +101,9 @@ def packages(plans: list[Plan], version: str) -> dict[str, str]:
     """Return the files of all packages by their paths in the workspace's folder `src`."""
     found = {f"{OWN}/{name}": text for name, text in package_files(OWN, version, LICENCE).items()}
     for plan in plans:
+        with registry.choosing(plan.messages):
+            for own in own_packages():
+                found |= {f"{own}/{name}": text for name, text in package_files(own, version, LICENCE).items()}
         found |= {f"{plan.robot}_view/{name}": text for name, text in _view(plan, version).items()}
     return found
 

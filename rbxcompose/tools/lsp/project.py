@@ -18,6 +18,7 @@ from rbxcompose.compiler.schema.documents import installed_schema, makers
 from rbxcompose.manifest.files import ROBOT_FILE, project_of, shown_name
 from rbxcompose.manifest.reader import Texts, read_file
 from rbxcompose.missions.language.reader import read_program
+from rbxcompose.msgs import registry
 
 ROBOT, MISSION, OVERLAY = "Robot", "Mission", "Overlay"
 _KIND = re.compile(r"^kind:[ ]*[\"']?(\w+)", re.MULTILINE)
@@ -110,11 +111,16 @@ class Project:
         return list(dict.fromkeys([*found, *self._alone.get(path, ())]))
 
     def robot_of(self, path: Path) -> Robot | None:
-        """Return a robot that a file belongs to, as last read successfully; None before it was compiled."""
+        """Return a robot that a file belongs to, as last read successfully; None before it was compiled.
+
+        Names of message types mean those of this robot from then on.
+        """
         robots = self._concerned(path)
         if not robots and (base := self._base_of(path)):
             robots = self._concerned(base)
-        return next((robot for one in robots if one in self._watched and (robot := self._watched[one].robot)), None)
+        found = next((robot for one in robots if one in self._watched and (robot := self._watched[one].robot)), None)
+        registry.choose(found.manifest.messages if found else {})
+        return found
 
     def _base_of(self, path: Path) -> Path | None:
         """Return the robot that an overlay is assumed to belong to: the one beside it."""

@@ -581,6 +581,8 @@ class TrialReader:
             self._robots[key] = compile_robot(shown, profiles=profiles, environment=self.environment)
             self.report.extend(finding for finding in self._robots[key].report if not _is_of_profile(finding))
             self.sources.update(self._robots[key].sources)
+        if (robot := self._robots[key].robot) is not None:
+            registry.choose(robot.manifest.messages)
         if chosen is not None and (
             lost := [finding for finding in self._robots[key].report if _is_of_profile(finding)]
         ):

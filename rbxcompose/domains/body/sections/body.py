@@ -19,7 +19,7 @@ from rbxcompose.domains.body.description import BodyPart, Description, VirtualJo
 from rbxcompose.domains.body.files import BodyFile
 from rbxcompose.domains.body.link_pairs import CollisionMatrix, digest_of, read_matrix
 from rbxcompose.manifest.fields import FileName, PieceAttachment
-from rbxcompose.manifest.files import project_of, resolve, shown_name
+from rbxcompose.manifest.files import folder_named, resolve, shown_name
 from rbxcompose.manifest.reader import UNREADABLE, read_source
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import AlwaysRun, Contents, Reading, WantedComponent, Wiring
@@ -261,21 +261,12 @@ def _packages(
     for name, written in read.packages.items():
         span = value_span(node, (*path, name))
         writer = _writer(reading, span)
-        folder = _folder(written, writer)
-        if folder is None or not folder.is_relative_to(project_of(writer)):
+        folder = folder_named(written, writer, span)
+        if isinstance(folder, Finding):
             message = f"the folder of package '{plain(name, 60)}' is not in the project: '{plain(written)}'"
             return UNREADABLE.at(span, message)
         found[name] = folder
     return found
-
-
-def _folder(written: str, writer: Path) -> Path | None:
-    """Return the folder that a manifest names, None if there is none."""
-    try:
-        folder = (writer.resolve().parent / written).resolve()
-        return folder if folder.is_dir() else None
-    except (OSError, ValueError, RuntimeError):  # a name too long for the system, a zero byte, a circle of links
-        return None
 
 
 def as_xacro_text(value: object) -> str:

@@ -18,7 +18,14 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Related, Report, Severity, Span, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.importing.foreign_files import ForeignFile, ForeignMap, Given, maps_in
-from rbxcompose.commands.importing.importer import CLOCK, NOT_CARRIED_OVER, OTHER_PROGRAM, RENAMED_TOPIC, importer
+from rbxcompose.commands.importing.importer import (
+    CLOCK,
+    LEFT_OPEN,
+    NOT_CARRIED_OVER,
+    OTHER_PROGRAM,
+    RENAMED_TOPIC,
+    importer,
+)
 from rbxcompose.commands.importing.manifest_text import (
     Row,
     angle,
@@ -38,7 +45,6 @@ from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, Tree
 from rbxcompose.manifest.validate import WRONG_TYPE, label_of, to_plain
 
 ROUND = kind("RBX2298", Severity.WARNING)
-LEFT_OPEN = kind("RBX2299", Severity.WARNING)
 
 GLOBAL, LOCAL, COMMON = "global_costmap", "local_costmap", "costmap"
 SLIM = 0.01  # [m] around the origin that a footprint covers at least

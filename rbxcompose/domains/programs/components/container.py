@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from rbxcompose.base.config import Config, FolderName
+from rbxcompose.base.config import Config, LocalPath
 from rbxcompose.base.requests import OutsideError
 from rbxcompose.domains.programs.child import Order
 from rbxcompose.domains.programs.components.program import ProgramLimits, RunConfig, Runner
@@ -51,7 +51,7 @@ def _is_word(text: str) -> str:
 class MountModel(Config):
     """A folder or a file of this machine in a container."""
 
-    folder: FolderName
+    folder: LocalPath
     """Its path here, relative to the manifest's file."""
     writable: bool = False
     """Whether the container may write there."""

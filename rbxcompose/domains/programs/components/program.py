@@ -19,7 +19,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, fie
 from pydantic_core import PydanticCustomError
 
 from rbxcompose.base.clock import MonotonicClock, SteppedClock
-from rbxcompose.base.config import Config, FolderName, Secret, Time
+from rbxcompose.base.config import Config, LocalPath, Secret, Time
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import OutsideError
@@ -178,6 +178,7 @@ class Runner(Component[R]):
     blocking = True  # a program may take its time to get ready
     configures_within = 620.0
     process = "programs"
+    has_parameters = False  # the program may have some under the same name
     rate = 10.0
 
     @classmethod
@@ -197,9 +198,18 @@ class Runner(Component[R]):
         coasting = (drives.stops_after or 0.0) if drives is not None else 0.0
         return coasting + config.stop.within + 1.0
 
-    def order(self, environment: Mapping[str, str]) -> Order:
-        """Return what to start, with these variables beside its own."""
+    def order(self, environment: Mapping[str, str]) -> Order | None:
+        """Return what to start, with these variables beside its own; None if something else starts it."""
         raise NotImplementedError
+
+    def connect(self) -> None:
+        """Make what it needs on the bus besides its own session, before it starts."""
+
+    def attend(self) -> None:
+        """Look after that, at each step."""
+
+    def disconnect(self) -> None:
+        """Take that away."""
 
     @property
     def joins_bus(self) -> bool:
@@ -257,17 +267,23 @@ class Runner(Component[R]):
             raise OutsideError(f"cannot be started: {error}") from error
         self.joining = self._joining()
         self.is_over = False
-        self.child = Child(self.order({**os.environ, **self.joining}))
+        order = self.order({**os.environ, **self.joining})
+        self.connect()
+        if order is not None:
+            self.child = Child(order)
         self._listen(guest)
         self._wait_until_ready(guest)
         self.watched.began(self.now)
 
     def step(self, dt: float) -> None:
         """Hear what it writes, whether it still runs, and compare what it does with what it declares."""
-        if self.child is None:
+        if self.guest is None:
             return
         with self._leaving_nothing():
+            self.attend()
             self._hear()
+            if self.child is None:
+                return
             if self.ends_at is not None and self.real_time.now() >= self.ends_at:
                 self.child.ask_to_end()
             if self.is_over or self.real_time.now() - self.looked < LOOKS:
@@ -301,7 +317,7 @@ class Runner(Component[R]):
     @property
     def is_at_rest(self) -> bool:
         """Return whether it has ended, once the robot goes down."""
-        return self.is_over or not self.is_ending
+        return self.child is None or self.is_over or not self.is_ending
 
     def deactivate(self) -> None:
         """End it if it still runs."""
@@ -404,7 +420,7 @@ class Runner(Component[R]):
 
     def _is_ready(self, ready: ReadyModel | None, guest: Guest) -> bool:
         if ready is None or ready.output is not None or ready.ended:
-            return self.is_ready  # as its events say
+            return self.is_ready or (ready is None and self.child is None)  # as its events say
         if ready.topic:
             return self.watched.count(port_name(ready.topic)) > 0
         return bool(guest.tokens(ready.token))
@@ -475,7 +491,7 @@ class Runner(Component[R]):
 
     def _log(self, lines: Iterable[str]) -> None:
         for level, text in self.output.take(lines, self.now):
-            self.context.log(level, text)
+            self.context.log(Level.OK if self.is_ending else level, text)  # its end is wanted, however loud
 
     def _levels(self) -> Iterator[tuple[Level, str | None]]:
         yield Level.ERROR, self.config.levels.error
@@ -552,6 +568,7 @@ class Runner(Component[R]):
         for closable in (*self.tokens.values(), *self.heard.values()):
             closable.close()
         self.tokens, self.heard = {}, {}
+        self.disconnect()
         if self.guest is not None:
             self.guest.__exit__(None, None, None)
             self.guest = None
@@ -566,7 +583,7 @@ class ProgramConfig(RunConfig):
     command: Command
     """Its words: an executable, found in `folder` if it begins with `./`, else by PATH, and its arguments. No shell
     reads them."""
-    folder: FolderName = Field(".", validate_default=True)
+    folder: LocalPath = Field(".", validate_default=True)
     """Where it runs, relative to the manifest's file."""
 
 

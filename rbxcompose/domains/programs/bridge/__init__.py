@@ -1,0 +1,1 @@
+"""The bridge to a ROS 2 with other middleware: bytes go through a socket to a process of its own Python."""

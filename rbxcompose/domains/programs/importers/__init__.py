@@ -1,0 +1,1 @@
+"""Importers of files that start programs."""

@@ -1,0 +1,1 @@
+"""Sections of the manifest about programs of others."""
