@@ -21,12 +21,13 @@ from rbxcompose.domains.programs.child import (
     Deaf,
     Event,
     LeftBehind,
-    Line,
     NotStarted,
-    Order,
     ProgramEnd,
-    Started,
+    ProgramStarted,
+    StartOrder,
+    WrittenLine,
 )
+from rbxcompose.runtime.processes import Process
 
 MOST = 20.0  # [s] that any of these may take on a busy machine
 KILLED, TERMINATED = ProgramEnd(int(signal.SIGKILL)), ProgramEnd(int(signal.SIGTERM))
@@ -67,7 +68,7 @@ def run(mark: Mark, tmp_path: Path) -> Iterator[Run]:
 
     def start(*command: str, patience: float = MOST, folder: str = "", **limits: int | tuple[int, ...]) -> Child:
         environment = {"PATH": os.environ["PATH"], "MARK": mark.value}
-        order = Order(command, folder or str(tmp_path), environment, signal.SIGTERM, patience, **limits)  # type: ignore[arg-type]
+        order = StartOrder(command, folder or str(tmp_path), environment, signal.SIGTERM, patience, **limits)  # type: ignore[arg-type]
         made.append(Child(order))
         return made[-1]
 
@@ -94,6 +95,13 @@ def until(child: Child, holds: Callable[[list[Event]], bool]) -> list[Event]:
     return events
 
 
+def eventually(holds: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + MOST
+    while not holds():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
 def to_its_end(child: Child) -> list[Event]:
     """Return all that happens."""
     events = until(child, lambda events: child.is_over)
@@ -101,22 +109,22 @@ def to_its_end(child: Child) -> list[Event]:
 
 
 def without_start(events: list[Event]) -> list[Event]:
-    return [event for event in events if not isinstance(event, Started)]
+    return [event for event in events if not isinstance(event, ProgramStarted)]
 
 
 def has_said(text: str) -> Callable[[list[Event]], bool]:
-    return lambda events: Line(text) in events
+    return lambda events: WrittenLine(text) in events
 
 
 def test_it_is_told_what_it_writes_and_how_it_ends_in_this_order(run: Run) -> None:
     first, *rest = to_its_end(run(*shell("echo one; echo two >&2; exit 3")))
-    assert isinstance(first, Line | Started)
-    assert without_start([first, *rest]) == [Line("one"), Line("two"), ProgramEnd(3 << 8)]
+    assert isinstance(first, WrittenLine | ProgramStarted)
+    assert without_start([first, *rest]) == [WrittenLine("one"), WrittenLine("two"), ProgramEnd(3 << 8)]
 
 
 def test_it_gets_the_folder_the_environment_and_the_limits(run: Run, tmp_path: Path, mark: Mark) -> None:
     child = run(*shell("pwd; echo $MARK; ulimit -n; nice"), open_files=64, nice=3)
-    lines = [event.text for event in to_its_end(child) if isinstance(event, Line)]
+    lines = [event.text for event in to_its_end(child) if isinstance(event, WrittenLine)]
     assert lines == [str(tmp_path), mark.value, "64", str(os.nice(0) + 3)]
 
 
@@ -144,7 +152,7 @@ def test_all_that_it_has_started_is_asked_with_it_and_has_the_same_time(run: Run
     until(child, has_said("ready"))
     child.ask_to_end()
     events = to_its_end(child)
-    assert Line("ended in order") in events
+    assert WrittenLine("ended in order") in events
     assert events[-1] == TERMINATED
 
 
@@ -166,7 +174,9 @@ def test_who_is_suspended_is_killed_after_its_time(run: Run) -> None:
     child = run(*shell("echo ready; exec sleep 100"), patience=0.2)
     until(child, lambda events: child.pid is not None and has_said("ready")(events))
     assert child.pid is not None
-    os.kill(child.pid, signal.SIGSTOP)
+    stopped = Process.of(child.pid)
+    stopped.send_signal(signal.SIGSTOP)
+    eventually(lambda: stopped.is_stopped)
     child.ask_to_end()
     assert without_start(to_its_end(child)) == [Deaf(), KILLED]
 
@@ -208,17 +218,19 @@ def test_a_limit_that_cannot_be_kept_is_told_by_its_name(run: Run) -> None:
 
 
 def test_half_a_line_is_told_when_it_ends(run: Run) -> None:
-    assert without_start(to_its_end(run("printf", "half"))) == [ProgramEnd(0), Line("half")]
+    assert without_start(to_its_end(run("printf", "half"))) == [ProgramEnd(0), WrittenLine("half")]
 
 
 def test_a_line_without_end_is_cut_and_what_follows_is_not(run: Run) -> None:
     script = "import sys; sys.stdout.write('x' * 10_000_000 + '\\nand on\\n')"
-    lines = [event.text for event in to_its_end(run(*python(script))) if isinstance(event, Line)]
+    lines = [event.text for event in to_its_end(run(*python(script))) if isinstance(event, WrittenLine)]
     assert lines == ["x" * LONGEST_LINE, "and on"]
 
 
 def test_bytes_that_are_no_text_are_no_error(run: Run) -> None:
-    lines = [event for event in to_its_end(run(*shell("head -c 100000 /dev/urandom"))) if isinstance(event, Line)]
+    lines = [
+        event for event in to_its_end(run(*shell("head -c 100000 /dev/urandom"))) if isinstance(event, WrittenLine)
+    ]
     assert lines
 
 
@@ -227,7 +239,7 @@ def test_a_flood_is_taken_in_pieces_so_that_its_component_can_do_other_things(ru
     longest = 0
     for _ in range(20):
         child.wait(1.0)
-        longest = max(longest, sum(len(event.text) + 1 for event in child.events() if isinstance(event, Line)))
+        longest = max(longest, sum(len(event.text) + 1 for event in child.events() if isinstance(event, WrittenLine)))
     child.ask_to_end()
     to_its_end(child)
     assert 0 < longest <= module.MOST_READ + 65536
@@ -246,7 +258,7 @@ def test_memory_is_that_of_all_its_processes(run: Run) -> None:
         f"""{sys.executable} -c 'held = b"x" * 40_000_000; print("ready", flush=True); import time; time.sleep(100)'"""
     )
     child = run(*shell(f"{holding} & {holding} & wait"))
-    until(child, lambda events: events.count(Line("ready")) == 2)
+    until(child, lambda events: events.count(WrittenLine("ready")) == 2)
     assert 80_000_000 < child.memory < 250_000_000
 
 
@@ -254,7 +266,7 @@ def test_memory_is_that_of_all_its_processes(run: Run) -> None:
 def test_nothing_is_left_when_its_keeper_is(run: Run, mark: Mark, where: str) -> None:
     child = run(*shell("trap '' TERM; sleep 100 & setsid sh -c 'setsid sleep 100 &'; echo ready; wait; sleep 100"))
     until(child, has_said("ready"))
-    assert len(mark.processes()) >= 3
+    eventually(lambda: len(mark.processes()) >= 3)
     if where == "killed":
         child._keeper.kill()
         assert not [event for event in to_its_end(child) if isinstance(event, ProgramEnd)]
@@ -264,9 +276,9 @@ def test_nothing_is_left_when_its_keeper_is(run: Run, mark: Mark, where: str) ->
 
 HOST = """
 import os, signal, sys, time
-from rbxcompose.domains.programs.child import Child, Order
+from rbxcompose.domains.programs.child import Child, StartOrder
 script = "setsid sh -c 'setsid sleep 100 &'; trap '' TERM; echo ready; sleep 100 & wait; sleep 100"
-child = Child(Order(("sh", "-c", script), ".", dict(os.environ), signal.SIGTERM, 20.0))
+child = Child(StartOrder(("sh", "-c", script), ".", dict(os.environ), signal.SIGTERM, 20.0))
 while True:
     child.wait(1.0)
     print(list(child.events()), flush=True)
@@ -279,10 +291,7 @@ def test_nothing_is_left_when_the_process_of_its_component_is_killed(mark: Mark)
         assert host.stdout is not None
         assert any("ready" in line for line in host.stdout)
         host.kill()
-    deadline = time.monotonic() + MOST
-    while mark.processes():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    eventually(lambda: mark.processes() == [])
 
 
 def test_others_cannot_see_its_environment(run: Run, mark: Mark) -> None:

@@ -21,12 +21,13 @@ MOST_READ = 256 * 1024  # [bytes] at once; a program that writes more waits
 LONGEST_LINE = 2_000  # [bytes]
 _KILLED = 3.5  # [s] for the keeper to end all
 _CLEANS_UP = 5.0  # [s] for what ends something elsewhere
+_LOOKS = 3  # in a row that find nothing: a process that is just starting another program has no environment
 _PAUSE = 0.005  # [s] between two looks for what is left
 _MARK = "RBXCOMPOSE_RUN"  # in the environment of all that belongs to one run of a program
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class StartOrder:
     """What to start, and how to end it."""
 
     command: Sequence[str]
@@ -45,14 +46,14 @@ class Order:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class WrittenLine:
     """A line that it wrote, to which of its outputs does not matter."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
-class Started:
+class ProgramStarted:
     """It runs."""
 
     pid: int
@@ -84,13 +85,13 @@ class LeftBehind:
     number: int
 
 
-Event = Line | Started | NotStarted | Deaf | ProgramEnd | LeftBehind
+Event = WrittenLine | ProgramStarted | NotStarted | Deaf | ProgramEnd | LeftBehind
 
 
 class Child:
     """A program and its keeper; nothing here waits but `close`."""
 
-    def __init__(self, order: Order) -> None:
+    def __init__(self, order: StartOrder) -> None:
         """Start it.
 
         Raises:
@@ -137,7 +138,7 @@ class Child:
         is_over = self.is_over  # before reading, else the last lines may come after the look
         reports = list(self._read(self._reports, is_over=is_over))  # before its lines, which then include the last ones
         for line in self._read(self._lines, is_over=is_over):
-            yield Line(line.decode("utf-8", "replace"))
+            yield WrittenLine(line.decode("utf-8", "replace"))
         for report in reports:
             yield self._event(json.loads(report))
 
@@ -182,7 +183,7 @@ class Child:
         match report:
             case {"event": "started", "pid": int(pid)}:
                 self.pid = pid
-                return Started(pid)
+                return ProgramStarted(pid)
             case {"event": "failed", "why": str(why)}:
                 return NotStarted(why)
             case {"event": "ended", "status": int(status)}:
@@ -219,7 +220,10 @@ class Child:
 
 def _kill_marked(mark: bytes) -> None:
     """Kill all processes whose environment has this; they may start others meanwhile."""
-    while found := [pid for pid in map(int, filter(str.isdecimal, os.listdir("/proc"))) if _has(pid, mark)]:
+    looks = 0
+    while looks < _LOOKS:
+        found = [pid for pid in map(int, filter(str.isdecimal, os.listdir("/proc"))) if _has(pid, mark)]
+        looks = 0 if found else looks + 1
         for pid in found:
             with suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)

@@ -19,7 +19,7 @@ NO_IMAGE = kind("RBX9429")
 ENGINES = ("docker", "podman")
 _PATIENCE = 10.0  # [s] for an engine to answer
 
-Ask = Callable[[Sequence[str]], str]
+AskEngine = Callable[[Sequence[str]], str]
 """Runs a command and returns why it has failed, "" if it has not."""
 
 
@@ -27,7 +27,7 @@ class NoEngineError(Exception):
     """Raised if no engine runs containers here; the text says why."""
 
 
-def program_findings(robot: Robot, environment: Mapping[str, str], ask: Ask) -> Iterator[Finding]:
+def program_findings(robot: Robot, environment: Mapping[str, str], ask: AskEngine) -> Iterator[Finding]:
     """Yield why the programs, containers and nodes of a robot cannot run here, with the environment of `up`."""
     path = environment.get("PATH", os.defpath)
     for component, runs in robot.declared(RunsProgram):
@@ -55,7 +55,7 @@ def _of_program(robot: Robot, component: RobotComponent, runs: RunsProgram, path
 
 
 def _of_container(
-    robot: Robot, component: RobotComponent, runs: RunsContainer, path: str, ask: Ask
+    robot: Robot, component: RobotComponent, runs: RunsContainer, path: str, ask: AskEngine
 ) -> Iterator[Finding]:
     image = runs.image.value
     try:
@@ -69,7 +69,7 @@ def _of_container(
         yield NO_IMAGE.at(span, f"the image '{image}' is not on this machine", help=f"{name} pull {image}")
 
 
-def engine_of(wanted: str, path: str, ask: Ask) -> str:
+def engine_of(wanted: str, path: str, ask: AskEngine) -> str:
     """Return the file of the wanted engine, with `auto` that of the first one that works.
 
     Raises:

@@ -132,4 +132,5 @@ class ProgramWatch:
 
 
 def _ros(dds: str) -> str:
-    return re.sub(r"(\w+)::(\w+)::dds_::(\w+)_", r"\1/\2/\3", dds)
+    package, kind, *_, name = dds.split("::")
+    return f"{package}/{kind}/{name.removesuffix('_')}"

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from string import ascii_letters, digits
 from typing import Annotated, Any, Literal, TypeVar, cast
 from uuid import uuid4
 
@@ -31,7 +32,16 @@ from rbxcompose.bus.zenoh_session import as_file, guest_settings
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
-from rbxcompose.domains.programs.child import Child, Deaf, LeftBehind, Line, NotStarted, Order, ProgramEnd, Started
+from rbxcompose.domains.programs.child import (
+    Child,
+    Deaf,
+    LeftBehind,
+    NotStarted,
+    ProgramEnd,
+    ProgramStarted,
+    StartOrder,
+    WrittenLine,
+)
 from rbxcompose.domains.programs.declaration import DeclaredPorts, port_name, published
 from rbxcompose.domains.programs.output import OutputLog
 from rbxcompose.domains.programs.watch import DeclaredKey, EndKind, KeyOnBus, ProgramWatch
@@ -57,7 +67,7 @@ _MEGABYTE = 1_000_000
 def _words(value: Any) -> Any:
     if isinstance(value, str):
         help_text = f"no shell reads it; write its words: [{', '.join(map(_quoted, _split(value)))}]"
-        if _SHELL.search(value):
+        if _SHELL & set(value):
             help_text = f"only a shell reads that: [sh, -c, {json.dumps(value)}]"
         raise PydanticCustomError("command", "a command is a list of words", {"help": help_text})
     if isinstance(value, Sequence) and value and value[0] == "":
@@ -65,7 +75,7 @@ def _words(value: Any) -> Any:
     return value
 
 
-_SHELL, _PLAIN = re.compile(r"[|&;<>$`]"), re.compile(r"[\w./=+-]*[A-Za-z/][\w./=+-]*", re.ASCII)
+_SHELL, _PLAIN = set("|&;<>$`"), set(f"{ascii_letters}{digits}_./=+-")
 
 
 def _split(text: str) -> list[str]:
@@ -76,7 +86,7 @@ def _split(text: str) -> list[str]:
 
 
 def _quoted(word: str) -> str:
-    return word if _PLAIN.fullmatch(word) else json.dumps(word)
+    return word if set(word) <= _PLAIN and not word.replace(".", "").isdigit() and word else json.dumps(word)
 
 
 def _is_pattern(text: str) -> str:
@@ -88,7 +98,7 @@ def _is_pattern(text: str) -> str:
 
 
 Pattern = Annotated[str, Field(min_length=1, max_length=500), AfterValidator(_is_pattern)]
-Command = Annotated[
+CommandWords = Annotated[
     tuple[str, ...], BeforeValidator(_words, json_schema_input_type=tuple[str, ...]), Field(min_length=1)
 ]
 
@@ -198,7 +208,7 @@ class Runner(Component[R]):
         coasting = (drives.stops_after or 0.0) if drives is not None else 0.0
         return coasting + config.stop.within + 1.0
 
-    def order(self, environment: Mapping[str, str]) -> Order | None:
+    def order(self, environment: Mapping[str, str]) -> StartOrder | None:
         """Return what to start, with these variables beside its own; None if something else starts it."""
         raise NotImplementedError
 
@@ -240,6 +250,8 @@ class Runner(Component[R]):
         self.session = ""
         self.joining: dict[str, str] = {}
         self.output = OutputLog({level: text for level, text in self._levels() if text})
+        ready = self.config.ready
+        self.marks_ready = re.compile(ready.output) if ready is not None and ready.output is not None else None
         self.is_inert = type(self.context.clock) is SteppedClock
         self.real_time = MonotonicClock()  # that of processes, also where robot time is that of a simulator
         self.ends = {} if self.is_inert else {end.port: end for end in self._declared()}
@@ -434,11 +446,11 @@ class Runner(Component[R]):
         lines, ready = list[str](), self.config.ready
         for event in self.child.events():
             match event:
-                case Line(text):
+                case WrittenLine(text):
                     lines.append(text)
-                    if ready is not None and ready.output is not None and re.search(ready.output, text):
+                    if self.marks_ready is not None and self.marks_ready.search(text):
                         self.is_ready = True
-                case Started():
+                case ProgramStarted():
                     self.is_ready = self.is_ready or ready is None
                     self.state = TaskStatus(Level.OK, "runs")
                 case _:
@@ -480,7 +492,7 @@ class Runner(Component[R]):
         while self.child is not None and not is_over:
             is_over = self.child.is_over  # before what may be the last look
             for event in self.child.events():
-                if isinstance(event, Line):
+                if isinstance(event, WrittenLine):
                     self._log([event.text])
                 else:
                     self._happened(event)
@@ -580,7 +592,7 @@ _NODE = KeyOnBus(EndKind.QUERIER, "", "", "")  # stands for the token of the nod
 class ProgramConfig(RunConfig):
     """What is run."""
 
-    command: Command
+    command: CommandWords
     """Its words: an executable, found in `folder` if it begins with `./`, else by PATH, and its arguments. No shell
     reads them."""
     folder: LocalPath = Field(".", validate_default=True)
@@ -588,7 +600,7 @@ class ProgramConfig(RunConfig):
 
 
 @component("program")
-class Program(Runner[ProgramConfig]):
+class ProgramRunner(Runner[ProgramConfig]):
     """Runs a program of others that speaks Zenoh, with the ports that the manifest declares for it.
 
     Example:
@@ -602,14 +614,14 @@ class Program(Runner[ProgramConfig]):
         found = RunsProgram(Setting(config.command, "command"), Setting(config.folder, "folder"), environment)
         return (*config.declared_capabilities(), found)
 
-    def order(self, environment: Mapping[str, str]) -> Order:
+    def order(self, environment: Mapping[str, str]) -> StartOrder:
         """Return the command."""
         return order_of(self.config, self.config.command, self.config.folder, environment)
 
 
-def order_of(config: RunConfig, command: Iterable[str], folder: str, environment: Mapping[str, str]) -> Order:
+def order_of(config: RunConfig, command: Iterable[str], folder: str, environment: Mapping[str, str]) -> StartOrder:
     """Return what to start, with the limits of a configuration."""
-    return Order(
+    return StartOrder(
         tuple(command),
         str(Path(folder)),
         environment,

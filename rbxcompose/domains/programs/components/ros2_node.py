@@ -14,8 +14,8 @@ from rbxcompose.base.requests import OutsideError
 from rbxcompose.domains.programs.bridge import ros_bridge
 from rbxcompose.domains.programs.bridge.ends import BridgedEnd, ends_of, parameters_of
 from rbxcompose.domains.programs.bridge.installation import RosInstallation, RosModel, installation_of
-from rbxcompose.domains.programs.child import Order
-from rbxcompose.domains.programs.components.program import Command, RunConfig, Runner, StopModel, order_of
+from rbxcompose.domains.programs.child import StartOrder
+from rbxcompose.domains.programs.components.program import CommandWords, RunConfig, Runner, StopModel, order_of
 from rbxcompose.domains.programs.sections.ros2 import ros2
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.sdk import Capability, component
@@ -43,7 +43,7 @@ class Ros2NodeConfig(RunConfig):
     """The package of its executable."""
     executable: str = ""
     """Its executable."""
-    command: Command | None = None
+    command: CommandWords | None = None
     """Its words, in place of `package` and `executable`. Without all three it is started by something else, and only
     its topics, services and actions are bridged."""
     arguments: tuple[str, ...] = ()
@@ -112,7 +112,7 @@ class Ros2Node(Runner[Ros2NodeConfig]):
         """Return its whole name in ROS."""
         return f"{self.config.namespace}/{self.config.name or self.name}"
 
-    def order(self, environment: Mapping[str, str]) -> Order | None:
+    def order(self, environment: Mapping[str, str]) -> StartOrder | None:
         """Return its command, with the arguments of ROS."""
         config = self.config
         self.ros = installation_of(config.ros2, environment)
