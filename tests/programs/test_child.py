@@ -23,10 +23,11 @@ from rbxcompose.domains.programs.child import (
     LeftBehind,
     NotStarted,
     ProgramEnd,
-    ProgramOrder,
     ProgramStarted,
+    StartOrder,
     WrittenLine,
 )
+from rbxcompose.runtime.processes import Process
 
 MOST = 20.0  # [s] that any of these may take on a busy machine
 KILLED, TERMINATED = ProgramEnd(int(signal.SIGKILL)), ProgramEnd(int(signal.SIGTERM))
@@ -67,7 +68,7 @@ def run(mark: Mark, tmp_path: Path) -> Iterator[Run]:
 
     def start(*command: str, patience: float = MOST, folder: str = "", **limits: int | tuple[int, ...]) -> Child:
         environment = {"PATH": os.environ["PATH"], "MARK": mark.value}
-        order = ProgramOrder(command, folder or str(tmp_path), environment, signal.SIGTERM, patience, **limits)  # type: ignore[arg-type]
+        order = StartOrder(command, folder or str(tmp_path), environment, signal.SIGTERM, patience, **limits)  # type: ignore[arg-type]
         made.append(Child(order))
         return made[-1]
 
@@ -92,6 +93,13 @@ def until(child: Child, holds: Callable[[list[Event]], bool]) -> list[Event]:
         child.wait(0.05)
         events += child.events()
     return events
+
+
+def eventually(holds: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + MOST
+    while not holds():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
 
 
 def to_its_end(child: Child) -> list[Event]:
@@ -166,9 +174,9 @@ def test_who_is_suspended_is_killed_after_its_time(run: Run) -> None:
     child = run(*shell("echo ready; exec sleep 100"), patience=0.2)
     until(child, lambda events: child.pid is not None and has_said("ready")(events))
     assert child.pid is not None
-    os.kill(child.pid, signal.SIGSTOP)
-    while Path(f"/proc/{child.pid}/stat").read_text().rpartition(") ")[2][0] != "T":  # else SIGTERM may come first
-        child.wait(0.01)
+    stopped = Process.of(child.pid)
+    stopped.send_signal(signal.SIGSTOP)
+    eventually(lambda: stopped.is_stopped)
     child.ask_to_end()
     assert without_start(to_its_end(child)) == [Deaf(), KILLED]
 
@@ -258,7 +266,7 @@ def test_memory_is_that_of_all_its_processes(run: Run) -> None:
 def test_nothing_is_left_when_its_keeper_is(run: Run, mark: Mark, where: str) -> None:
     child = run(*shell("trap '' TERM; sleep 100 & setsid sh -c 'setsid sleep 100 &'; echo ready; wait; sleep 100"))
     until(child, has_said("ready"))
-    assert len(mark.processes()) >= 3
+    eventually(lambda: len(mark.processes()) >= 3)
     if where == "killed":
         child._keeper.kill()
         assert not [event for event in to_its_end(child) if isinstance(event, ProgramEnd)]
@@ -268,9 +276,9 @@ def test_nothing_is_left_when_its_keeper_is(run: Run, mark: Mark, where: str) ->
 
 HOST = """
 import os, signal, sys, time
-from rbxcompose.domains.programs.child import Child, ProgramOrder
+from rbxcompose.domains.programs.child import Child, StartOrder
 script = "setsid sh -c 'setsid sleep 100 &'; trap '' TERM; echo ready; sleep 100 & wait; sleep 100"
-child = Child(ProgramOrder(("sh", "-c", script), ".", dict(os.environ), signal.SIGTERM, 20.0))
+child = Child(StartOrder(("sh", "-c", script), ".", dict(os.environ), signal.SIGTERM, 20.0))
 while True:
     child.wait(1.0)
     print(list(child.events()), flush=True)
@@ -283,10 +291,7 @@ def test_nothing_is_left_when_the_process_of_its_component_is_killed(mark: Mark)
         assert host.stdout is not None
         assert any("ready" in line for line in host.stdout)
         host.kill()
-    deadline = time.monotonic() + MOST
-    while mark.processes():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    eventually(lambda: mark.processes() == [])
 
 
 def test_others_cannot_see_its_environment(run: Run, mark: Mark) -> None:

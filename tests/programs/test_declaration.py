@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from rbxcompose.domains.programs.components.program import ForeignProgram, ProgramConfig, ReadyModel
+from rbxcompose.domains.programs.components.program import ProgramConfig, ProgramRunner, ReadyModel
 from rbxcompose.domains.programs.declaration import DeclaredPorts, port_name
 from rbxcompose.sdk.capabilities import Drives, RunsProgram
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Qos, Serves, ServesAction
@@ -45,7 +45,7 @@ def test_ports_are_those_of_the_topics_with_their_types_and_classes() -> None:
         serves_actions={"wave": {"type": "rbxcompose_msgs/MoveArm", "claims": "arm"}},
         calls_actions={"go": "nav2_msgs/NavigateToPose"},
     )
-    ports = ForeignProgram.ports(config)
+    ports = ProgramRunner.ports(config)
     assert {name: (type(port), port.topic) for name, port in ports.items()} == {
         "a_image": (Out, "a/image"),
         "odom": (Out, "odom"),
@@ -92,7 +92,7 @@ def test_capabilities_are_those_of_any_other_base() -> None:
     config = ProgramConfig(
         command=("./x",), **{key: base()[key] for key in ("subscribes", "publishes", "capabilities")}
     )
-    found = {type(one): one for one in ForeignProgram.capabilities(config)}
+    found = {type(one): one for one in ProgramRunner.capabilities(config)}
     drives, runs = found[Drives], found[RunsProgram]
     assert isinstance(drives, Drives)
     assert isinstance(runs, RunsProgram)

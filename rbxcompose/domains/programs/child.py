@@ -21,12 +21,13 @@ MOST_READ = 256 * 1024  # [bytes] at once; a program that writes more waits
 LONGEST_LINE = 2_000  # [bytes]
 _KILLED = 3.5  # [s] for the keeper to end all
 _CLEANS_UP = 5.0  # [s] for what ends something elsewhere
+_LOOKS = 3  # in a row that find nothing: a process that is just starting another program has no environment
 _PAUSE = 0.005  # [s] between two looks for what is left
 _MARK = "RBXCOMPOSE_RUN"  # in the environment of all that belongs to one run of a program
 
 
 @dataclass(frozen=True, slots=True)
-class ProgramOrder:
+class StartOrder:
     """What to start, and how to end it."""
 
     command: Sequence[str]
@@ -90,7 +91,7 @@ Event = WrittenLine | ProgramStarted | NotStarted | Deaf | ProgramEnd | LeftBehi
 class Child:
     """A program and its keeper; nothing here waits but `close`."""
 
-    def __init__(self, order: ProgramOrder) -> None:
+    def __init__(self, order: StartOrder) -> None:
         """Start it.
 
         Raises:
@@ -219,7 +220,10 @@ class Child:
 
 def _kill_marked(mark: bytes) -> None:
     """Kill all processes whose environment has this; they may start others meanwhile."""
-    while found := [pid for pid in map(int, filter(str.isdecimal, os.listdir("/proc"))) if _has(pid, mark)]:
+    looks = 0
+    while looks < _LOOKS:
+        found = [pid for pid in map(int, filter(str.isdecimal, os.listdir("/proc"))) if _has(pid, mark)]
+        looks = 0 if found else looks + 1
         for pid in found:
             with suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)

@@ -74,9 +74,9 @@ class ServedAction(Config):
     """The part of the robot that a goal needs for itself; such goals are cancelled when the robot is stopped."""
 
 
-PublishedPort = Annotated[PublishedTopic, BeforeValidator(_as_type, json_schema_input_type=PublishedTopic | str)]
-Subscribed = Annotated[SubscribedTopic, BeforeValidator(_as_type, json_schema_input_type=SubscribedTopic | str)]
-ActionServed = Annotated[ServedAction, BeforeValidator(_as_type, json_schema_input_type=ServedAction | str)]
+PublishedEntry = Annotated[PublishedTopic, BeforeValidator(_as_type, json_schema_input_type=PublishedTopic | str)]
+SubscribedEntry = Annotated[SubscribedTopic, BeforeValidator(_as_type, json_schema_input_type=SubscribedTopic | str)]
+ActionEntry = Annotated[ServedAction, BeforeValidator(_as_type, json_schema_input_type=ServedAction | str)]
 
 
 class DrivesModel(Config):
@@ -151,15 +151,15 @@ class CapabilitiesModel(Config):
 class DeclaredPorts(Config):
     """The ports and capabilities that a manifest declares for a program."""
 
-    publishes: dict[TopicName, PublishedPort] = {}
+    publishes: dict[TopicName, PublishedEntry] = {}
     """Topics that it publishes: a type, or a map with `type`, `rate`, `qos` and `unit`."""
-    subscribes: dict[TopicName, Subscribed] = {}
+    subscribes: dict[TopicName, SubscribedEntry] = {}
     """Topics that it subscribes to: a type, or a map with `type`, `qos` and `optional`."""
     serves: dict[TopicName, ServiceName] = {}
     """Services that it serves, each with its type."""
     calls: dict[TopicName, ServiceName] = {}
     """Services that it calls, each with its type."""
-    serves_actions: dict[TopicName, ActionServed] = {}
+    serves_actions: dict[TopicName, ActionEntry] = {}
     """Actions that it serves: a type, or a map with `type` and `claims`."""
     calls_actions: dict[TopicName, ActionName] = {}
     """Actions that it calls, each with its type."""

@@ -132,4 +132,5 @@ class ProgramWatch:
 
 
 def _ros(dds: str) -> str:
-    return dds.replace("::dds_::", "/").replace("::", "/").removesuffix("_")
+    package, kind, *_, name = dds.split("::")
+    return f"{package}/{kind}/{name.removesuffix('_')}"

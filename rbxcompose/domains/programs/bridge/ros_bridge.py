@@ -25,7 +25,7 @@ from rbxcompose.commands.lookup import BusPlace
 from rbxcompose.domains.programs.bridge import link
 from rbxcompose.domains.programs.bridge.ends import BridgedEnd
 from rbxcompose.domains.programs.bridge.installation import RosInstallation
-from rbxcompose.domains.programs.child import Child, ProgramEnd, ProgramOrder, WrittenLine
+from rbxcompose.domains.programs.child import Child, ProgramEnd, StartOrder, WrittenLine
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.runtime.processes import describe_exit
 from rbxcompose.sdk.component import BusAddress
@@ -81,7 +81,7 @@ class RosBridge:
         with theirs:
             command = (installation.python, str(ROS_SIDE), str(theirs.fileno()), f"_rbxcompose_{address.robot}")
             self._child = Child(
-                ProgramOrder(command, os.getcwd(), installation.environment, 15, 1.0, descriptors=(theirs.fileno(),))
+                StartOrder(command, os.getcwd(), installation.environment, 15, 1.0, descriptors=(theirs.fileno(),))
             )
         self._guest = Guest(BusPlace(address.router, address.domain), stays=True)
         self._link = link.Link(ours)

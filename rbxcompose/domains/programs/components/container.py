@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field
 
 from rbxcompose.base.config import Config, LocalPath
 from rbxcompose.base.requests import OutsideError
-from rbxcompose.domains.programs.child import ProgramOrder
+from rbxcompose.domains.programs.child import StartOrder
 from rbxcompose.domains.programs.components.program import ProgramLimits, RunConfig, Runner
 from rbxcompose.domains.programs.runnable import NoEngineError, ask_for_real, engine_of
 from rbxcompose.runtime.processes import describe_exit
@@ -57,7 +57,7 @@ class MountModel(Config):
     """Whether the container may write there."""
 
 
-ImageName = Annotated[str, AfterValidator(_is_word)]
+EngineWord = Annotated[str, AfterValidator(_is_word)]
 Mount = Annotated[MountModel, BeforeValidator(_as_folder, json_schema_input_type=MountModel | str)]
 
 
@@ -73,7 +73,7 @@ class ContainerLimits(ProgramLimits):
 class ContainerConfig(RunConfig):
     """What is run."""
 
-    image: ImageName
+    image: EngineWord
     """The image; it must be on this machine when the robot starts."""
     arguments: tuple[str, ...] = ()
     """What its entry point gets, or the command in it."""
@@ -84,7 +84,7 @@ class ContainerConfig(RunConfig):
     `writable`."""
     devices: Annotated[tuple[str, ...], AfterValidator(_are_whole)] = ()
     """Devices of this machine that it may open: `/dev/video0`."""
-    network: ImageName = "host"
+    network: EngineWord = "host"
     """Its network; only that of the host reaches the robot's bus."""
     limits: ContainerLimits = ContainerLimits()
     """What it may use."""
@@ -114,7 +114,7 @@ class Container(Runner[ContainerConfig]):
         code = os.waitstatus_to_exitcode(status)
         return f"{describe_exit(status)}: {_ENDS[code]}" if code in _ENDS else describe_exit(status)
 
-    def order(self, environment: Mapping[str, str]) -> ProgramOrder:
+    def order(self, environment: Mapping[str, str]) -> StartOrder:
         """Return the call of the engine; a container that a dead predecessor has left is removed first."""
         try:
             engine = engine_of(self.config.engine, environment.get("PATH", os.defpath), ask_for_real)
@@ -132,7 +132,7 @@ def removal(engine: str, name: str) -> tuple[str, ...]:
 
 def order_of(
     config: ContainerConfig, engine: str, name: str, environment: Mapping[str, str], joining: Mapping[str, str]
-) -> ProgramOrder:
+) -> StartOrder:
     """Return the call of an engine.
 
     The client gets the whole `environment`, the container what is `joining` of it. Values are passed by their names, so
@@ -140,7 +140,7 @@ def order_of(
     """
     command = [engine, *_options(config, engine, name, joining), config.image, *config.arguments]
     number = int(signal.Signals[config.stop.signal])
-    return ProgramOrder(command, "/", environment, number, config.stop.within, cleanup=removal(engine, name))
+    return StartOrder(command, "/", environment, number, config.stop.within, cleanup=removal(engine, name))
 
 
 def _options(config: ContainerConfig, engine: str, name: str, joining: Mapping[str, str]) -> Iterator[str]:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from string import ascii_letters, digits
 from typing import Annotated, Any, Literal, TypeVar, cast
 from uuid import uuid4
 
@@ -37,8 +38,8 @@ from rbxcompose.domains.programs.child import (
     LeftBehind,
     NotStarted,
     ProgramEnd,
-    ProgramOrder,
     ProgramStarted,
+    StartOrder,
     WrittenLine,
 )
 from rbxcompose.domains.programs.declaration import DeclaredPorts, port_name, published
@@ -66,7 +67,7 @@ _MEGABYTE = 1_000_000
 def _words(value: Any) -> Any:
     if isinstance(value, str):
         help_text = f"no shell reads it; write its words: [{', '.join(map(_quoted, _split(value)))}]"
-        if _SHELL.search(value):
+        if _SHELL & set(value):
             help_text = f"only a shell reads that: [sh, -c, {json.dumps(value)}]"
         raise PydanticCustomError("command", "a command is a list of words", {"help": help_text})
     if isinstance(value, Sequence) and value and value[0] == "":
@@ -74,7 +75,7 @@ def _words(value: Any) -> Any:
     return value
 
 
-_SHELL, _PLAIN = re.compile(r"[|&;<>$`]"), re.compile(r"(?![^A-Za-z/]*$)[\w./=+-]+", re.ASCII)
+_SHELL, _PLAIN = set("|&;<>$`"), set(f"{ascii_letters}{digits}_./=+-")
 
 
 def _split(text: str) -> list[str]:
@@ -85,7 +86,7 @@ def _split(text: str) -> list[str]:
 
 
 def _quoted(word: str) -> str:
-    return word if _PLAIN.fullmatch(word) else json.dumps(word)
+    return word if set(word) <= _PLAIN and not word.replace(".", "").isdigit() and word else json.dumps(word)
 
 
 def _is_pattern(text: str) -> str:
@@ -207,7 +208,7 @@ class Runner(Component[R]):
         coasting = (drives.stops_after or 0.0) if drives is not None else 0.0
         return coasting + config.stop.within + 1.0
 
-    def order(self, environment: Mapping[str, str]) -> ProgramOrder | None:
+    def order(self, environment: Mapping[str, str]) -> StartOrder | None:
         """Return what to start, with these variables beside its own; None if something else starts it."""
         raise NotImplementedError
 
@@ -248,9 +249,9 @@ class Runner(Component[R]):
         self.heard: dict[str, Closable] = {}
         self.session = ""
         self.joining: dict[str, str] = {}
-        ready = self.config.ready
-        self.awaited = re.compile(ready.output) if ready is not None and ready.output is not None else None
         self.output = OutputLog({level: text for level, text in self._levels() if text})
+        ready = self.config.ready
+        self.marks_ready = re.compile(ready.output) if ready is not None and ready.output is not None else None
         self.is_inert = type(self.context.clock) is SteppedClock
         self.real_time = MonotonicClock()  # that of processes, also where robot time is that of a simulator
         self.ends = {} if self.is_inert else {end.port: end for end in self._declared()}
@@ -447,7 +448,7 @@ class Runner(Component[R]):
             match event:
                 case WrittenLine(text):
                     lines.append(text)
-                    if self.awaited is not None and self.awaited.search(text):
+                    if self.marks_ready is not None and self.marks_ready.search(text):
                         self.is_ready = True
                 case ProgramStarted():
                     self.is_ready = self.is_ready or ready is None
@@ -599,7 +600,7 @@ class ProgramConfig(RunConfig):
 
 
 @component("program")
-class ForeignProgram(Runner[ProgramConfig]):
+class ProgramRunner(Runner[ProgramConfig]):
     """Runs a program of others that speaks Zenoh, with the ports that the manifest declares for it.
 
     Example:
@@ -613,14 +614,14 @@ class ForeignProgram(Runner[ProgramConfig]):
         found = RunsProgram(Setting(config.command, "command"), Setting(config.folder, "folder"), environment)
         return (*config.declared_capabilities(), found)
 
-    def order(self, environment: Mapping[str, str]) -> ProgramOrder:
+    def order(self, environment: Mapping[str, str]) -> StartOrder:
         """Return the command."""
         return order_of(self.config, self.config.command, self.config.folder, environment)
 
 
-def order_of(config: RunConfig, command: Iterable[str], folder: str, environment: Mapping[str, str]) -> ProgramOrder:
+def order_of(config: RunConfig, command: Iterable[str], folder: str, environment: Mapping[str, str]) -> StartOrder:
     """Return what to start, with the limits of a configuration."""
-    return ProgramOrder(
+    return StartOrder(
         tuple(command),
         str(Path(folder)),
         environment,

@@ -14,7 +14,7 @@ from rbxcompose.base.requests import OutsideError
 from rbxcompose.domains.programs.bridge import ros_bridge
 from rbxcompose.domains.programs.bridge.ends import BridgedEnd, ends_of, parameters_of
 from rbxcompose.domains.programs.bridge.installation import RosInstallation, RosModel, installation_of
-from rbxcompose.domains.programs.child import ProgramOrder
+from rbxcompose.domains.programs.child import StartOrder
 from rbxcompose.domains.programs.components.program import CommandWords, RunConfig, Runner, StopModel, order_of
 from rbxcompose.domains.programs.sections.ros2 import ros2
 from rbxcompose.runtime.folder import RobotFolder
@@ -112,7 +112,7 @@ class Ros2Node(Runner[Ros2NodeConfig]):
         """Return its whole name in ROS."""
         return f"{self.config.namespace}/{self.config.name or self.name}"
 
-    def order(self, environment: Mapping[str, str]) -> ProgramOrder | None:
+    def order(self, environment: Mapping[str, str]) -> StartOrder | None:
         """Return its command, with the arguments of ROS."""
         config = self.config
         self.ros = installation_of(config.ros2, environment)
