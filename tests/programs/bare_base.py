@@ -63,6 +63,8 @@ def main() -> None:
     with zenoh.open(zenoh.Config.from_env()) as session:
         odometry = session.declare_publisher(os.environ["RBXCOMPOSE_KEY_ODOM"])
         frames = session.declare_publisher(os.environ["RBXCOMPOSE_KEY_TF"])
+        own = os.environ.get("RBXCOMPOSE_KEY_UPTIME")  # a message of the user's, where the manifest declares it
+        uptime = session.declare_publisher(own) if own else None
         session.declare_subscriber(os.environ["RBXCOMPOSE_KEY_CMD_VEL"], base.take)
         sys.stderr.write("the base is there\n")
         while True:
@@ -82,6 +84,10 @@ def main() -> None:
             moved.text("base_footprint")
             base.pose(moved)
             frames.put(bytes(moved.data), attachment=origin)
+            if uptime is not None:
+                up = Writer()
+                up.put("i", 7, 0, stamp // 10**9, stamp % 10**9)
+                uptime.put(bytes(up.data), attachment=origin)
 
 
 if __name__ == "__main__":

@@ -40,10 +40,11 @@ class OtherNode(Node):  # type: ignore[misc]  # rclpy is not here
         self.plan.publish(String(data="the only one"))
         self.create_subscription(Odometry, "odom", self.on_odometry, 10)
         self.create_subscription(Builtins, "asked", self.answers.publish, 10)
+        self.create_subscription(Builtins, "uptime", self.create_publisher(Builtins, "uptime_seen", 10).publish, 10)
         self.create_service(Trigger, "beep", self.beep)
         self.create_service(Trigger, "retune", self.retune, callback_group=self.group)
         self.create_service(Trigger, "chase", self.chase, callback_group=self.group)
-        self.base = self.create_client(SetParameters, "/base/set_parameters", callback_group=self.group)
+        self.speeds = self.create_client(SetParameters, "/go_to/set_parameters", callback_group=self.group)
         self.ours = ActionClient(self, Fibonacci, "ours", callback_group=self.group)
         ActionServer(
             self,
@@ -69,10 +70,8 @@ class OtherNode(Node):  # type: ignore[misc]  # rclpy is not here
         return response
 
     async def retune(self, request: Any, response: Any) -> Any:
-        value = ParameterValue(type=3, double_value=0.4)
-        answer = await self.base.call_async(
-            SetParameters.Request(parameters=[Parameter(name="max_speed", value=value)])
-        )
+        value = ParameterValue(type=3, double_value=0.25)
+        answer = await self.speeds.call_async(SetParameters.Request(parameters=[Parameter(name="speed", value=value)]))
         response.success, response.message = answer.results[0].successful, answer.results[0].reason
         return response
 

@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -28,7 +29,19 @@ bus: {{port: {bus}}}
 ros2: {{python: {python}, domain: {domain}}}
 msgs: {{own: {own}}}
 components:
-  base: {{type: diff_drive_sim, max_speed: 0.5 m/s, max_turn_rate: 90 deg/s, command_timeout: 0.5 s}}
+  base:
+    type: program
+    command: [{ours}, {base}]
+    subscribes: {{cmd_vel: geometry_msgs/Twist}}
+    publishes:
+      odom: {{type: nav_msgs/Odometry, rate: 40 Hz}}
+      /tf: tf2_msgs/TFMessage
+      uptime: test_msgs/Builtins
+    ready: {{topic: odom}}
+    capabilities:
+      frames: {{base_footprint: odom}}
+      drives: {{odometry: odom, max_speed: 0.5 m/s, max_turn_rate: 90 deg/s, stops_after: 0.5 s}}
+  go_to: {{type: go_to, speed: 0.3 m/s}}
   somebody:
     type: ros2_node
     command: [python3, {node}]
@@ -37,18 +50,21 @@ components:
       cmd_vel_ros: {{type: geometry_msgs/Twist, rate: 15 Hz}}
       answered: test_msgs/Builtins
       plan: {{type: std_msgs/String, qos: latched}}
+      uptime_seen: test_msgs/Builtins
     subscribes:
       odom: nav_msgs/Odometry
+      uptime: test_msgs/Builtins
       asked: test_msgs/Builtins
     serves: {{beep: std_srvs/Trigger, retune: std_srvs/Trigger, chase: std_srvs/Trigger}}
     serves_actions: {{count: test_msgs/Fibonacci}}
     calls_actions: {{ours: test_msgs/Fibonacci}}
-    configures: [base]
+    configures: [go_to]
     capabilities: {{commands_motion: {{commands: cmd_vel_ros, max_speed: 0.3 m/s}}}}
 muxes:
   cmd_vel:
     inputs:
       ros: {{topic: cmd_vel_ros, priority: 10, timeout: 0.5 s}}
+      navigation: {{from: go_to, priority: 20, timeout: 0.5 s}}
 values:
   answer: {{topic: answered, field: duration_value.sec}}
 missions: {{ask: ask.yaml}}
@@ -77,7 +93,13 @@ def own_types() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def robot(ros2_python: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
     text = MANIFEST.format(
-        bus=free_port(), python=ros2_python, domain=DOMAIN, own=HERE / "own/test_msgs", node=HERE / "node.py"
+        bus=free_port(),
+        python=ros2_python,
+        domain=DOMAIN,
+        own=HERE / "own/test_msgs",
+        node=HERE / "node.py",
+        ours=sys.executable,
+        base=HERE.parent / "programs/bare_base.py",
     )
     made = Robot(tmp_path_factory.mktemp("ros"), text)
     (made.file.parent / "ask.yaml").write_text(MISSION)
@@ -124,6 +146,10 @@ def test_a_message_of_the_user_passes_both_ways(robot: Robot) -> None:
     assert json.loads(out)["duration_value"]["sec"] == 7
 
 
+def test_a_message_of_the_user_passes_between_two_programs_of_others(robot: Robot) -> None:
+    assert robot.told("topic", "echo", "uptime_seen", "--once")["duration_value"]["sec"] == 7
+
+
 def test_a_mission_sends_and_understands_messages_of_the_user_and_uses_skills_there(robot: Robot) -> None:
     assert robot.do("mission", "run", "ask").returncode == 0
     until(robot, lambda: "ask: success" in robot.do("logs").stdout)
@@ -138,7 +164,7 @@ def test_parameters_are_set_in_both_directions(robot: Robot) -> None:
     assert robot.do("param", "set", "somebody", "gain", "0.75").returncode == 0
     assert robot.told("service", "call", "beep")["message"] == "True 0.75"
     assert robot.told("service", "call", "retune") == {"success": True, "message": ""}
-    assert "0.4 m/s" in robot.do("param", "get", "base", "max_speed").stdout
+    assert "0.25 m/s" in robot.do("param", "get", "go_to", "speed").stdout
 
 
 def test_a_goal_of_ours_is_carried_out_there(robot: Robot) -> None:
@@ -190,7 +216,7 @@ def test_what_ros_has_is_listed_and_pinned(robot: Robot, tmp_path: Path) -> None
     assert node["serves_actions"] == {"/count": "test_msgs/Fibonacci"}
     assert node["latched"] == ["/plan"]
     file = tmp_path / "robot.yaml"
-    head = robot.file.read_text().partition("    publishes:")[0]
+    head = robot.file.read_text().partition("    publishes:\n      cmd_vel_ros")[0]
     file.write_text(f"{head}  # the end\n")
     pinned = robot.do("ros2", "pin", "somebody", "somebody", str(file))
     assert pinned.returncode == 0, pinned.stderr
