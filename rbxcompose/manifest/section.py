@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import ChainMap
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, field, replace
 from enum import Enum
@@ -14,7 +15,7 @@ from typing import Annotated, Any, Generic, Literal, Protocol, TypeVar, cast
 
 from pydantic import BeforeValidator
 
-from rbxcompose.base.config import COMPONENT, DEFAULT, FOLDER, Config, Name, Refers, Restart, When
+from rbxcompose.base.config import COMPONENT, CONTENTS, DEFAULT, FOLDER, Config, Name, Refers, Restart, When
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Report, Span, nearest, surely_meant
 from rbxcompose.base.printable import plain
@@ -536,6 +537,11 @@ class Contents:
         """Return the names of each kind, including entries with mistakes: references to them are not wrong."""
         return _Kinds(self._known_from(self._sections), lambda: self._others_known)
 
+    def known_in(self, span: Span) -> Mapping[str, object]:
+        """Return what validators may look up for what is written at a place; it is found only when they do."""
+        own: dict[str, object] = {FOLDER: str(Path(span.file).absolute().parent), CONTENTS: self}
+        return ChainMap(own, cast(dict[str, object], self.known))
+
     @cached_property
     def _others_known(self) -> Mapping[str, Mapping[str, object]]:
         return self._known_from(self._others())
@@ -700,13 +706,8 @@ class Reading(Generic[M]):
         """Return a section with fixed keys; None if it is missing or has mistakes."""
         if self.node is None:
             return None
-        known = {**self.contents.known, FOLDER: folder_of(self.node.span)}
+        known = self.contents.known_in(self.node.span)
         return validate(self.section.model, self.node, (self.section.name,), self.report, known)
-
-
-def folder_of(span: Span) -> str:
-    """Return the folder of the file in which something is written."""
-    return str(Path(span.file).absolute().parent)
 
 
 def named_entries(root: MappingNode, path: tuple[str, ...], report: Report) -> Iterator[tuple[str, Entry]]:

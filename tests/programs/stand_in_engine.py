@@ -76,7 +76,7 @@ class Daemon:
 
 
 def ask(files: list[int], **content: Any) -> int:
-    """Ask the daemon; return the exit code that it answers."""
+    """AskEngine the daemon; return the exit code that it answers."""
     with socket.socket(socket.AF_UNIX) as daemon:
         daemon.connect(str(FOLDER / "socket"))
         socket.send_fds(daemon, [json.dumps(content).encode()], files)

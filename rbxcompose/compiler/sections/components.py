@@ -5,7 +5,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any
 
-from rbxcompose.base.config import COMPONENT, CONTENTS, FOLDER, Config, Name
+from rbxcompose.base.config import COMPONENT, Config, Name
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import (
     DID_YOU_MEAN,
@@ -33,7 +33,6 @@ from rbxcompose.manifest.section import (
     SetScope,
     WantedComponent,
     Wiring,
-    folder_of,
 )
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at
 from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY, WRONG_TYPE, is_broken, is_valid, label_of, validate
@@ -159,8 +158,7 @@ def component_class(node: TreeNode) -> type[Component[Any]] | None:
 
 def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> ComponentEntry | None:
     """Return one component, as far as it could be read; None if its type is missing or unknown."""
-    report = reading.report
-    known = {**reading.contents.known, FOLDER: folder_of(entry.key.span), CONTENTS: reading.contents}
+    report, known = reading.report, reading.contents.known_in(entry.key.span)
     node, path = entry.value, ("components", name)
     if is_broken(node):
         return None

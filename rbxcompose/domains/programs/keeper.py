@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    Order = dict[str, Any]
+    ProgramOrder = dict[str, Any]
     Report = Callable[..., None]
 
 _PDEATHSIG, _SUBREAPER = 1, 36  # options of prctl(2)
@@ -60,7 +60,7 @@ def main() -> None:
         clean_up(wanted)
 
 
-def start(wanted: Order, report: Report) -> int | None:
+def start(wanted: ProgramOrder, report: Report) -> int | None:
     """Start the command; return its process, or None after a report of what prevents it."""
     failed, fails = os.pipe2(os.O_CLOEXEC)
     keeper = os.getpid()
@@ -87,7 +87,7 @@ class CannotRunError(Exception):
     """Why the program cannot be run, in plain words."""
 
 
-def _become(wanted: Order, keeper: int) -> None:
+def _become(wanted: ProgramOrder, keeper: int) -> None:
     os.setsid()
     _LIBC.prctl(_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != keeper:
@@ -158,7 +158,7 @@ def _interpreter(file: str) -> str:
     return os.fsdecode(words[0]) if words else file
 
 
-def keep(wanted: Order, child: int, ended: int, report: Report) -> None:
+def keep(wanted: ProgramOrder, child: int, ended: int, report: Report) -> None:
     """Wait for the end of the program, ask for it when told to, and end what it leaves behind.
 
     All that it has started is asked with it, and has the same time.
@@ -233,7 +233,7 @@ def _end_all() -> int:
     return len(killed)
 
 
-def clean_up(wanted: Order) -> None:
+def clean_up(wanted: ProgramOrder) -> None:
     """Run the command that ends what runs elsewhere on behalf of the program, such as its container."""
     command = wanted["cleanup"]
     if not command:

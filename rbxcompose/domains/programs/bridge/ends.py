@@ -11,7 +11,7 @@ from rbxcompose.msgs import rcl_interfaces
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalStatusArray
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Qos, Serves, ServesAction
 
-Way = Literal["from_ros", "to_ros"]
+BridgeWay = Literal["from_ros", "to_ros"]
 PARAMETERS: Mapping[str, Any] = {
     "get_parameters": rcl_interfaces.GetParameters,
     "set_parameters": rcl_interfaces.SetParameters,
@@ -29,7 +29,7 @@ class BridgedEnd:
 
     name: str
     kind: Literal["topic", "service"]
-    way: Way
+    way: BridgeWay
     interface: Any
     qos: Qos = Qos.EVENT
     port: str = ""
@@ -68,8 +68,8 @@ def ends_of(port: Port[Any], name: str) -> Iterator[BridgedEnd]:
 
 
 def _action(interface: Any, names: ActionNames, *, serves: bool, port: str) -> Iterator[BridgedEnd]:
-    asks: Way = "to_ros" if serves else "from_ros"
-    tells: Way = "from_ros" if serves else "to_ros"
+    asks: BridgeWay = "to_ros" if serves else "from_ros"
+    tells: BridgeWay = "from_ros" if serves else "to_ros"
     yield BridgedEnd(names.send_goal, "service", asks, interface.SendGoal, port=port)
     yield BridgedEnd(names.get_result, "service", asks, interface.GetResult, port=port)
     yield BridgedEnd(names.cancel_goal, "service", asks, CancelGoal, port=port)
@@ -77,7 +77,7 @@ def _action(interface: Any, names: ActionNames, *, serves: bool, port: str) -> I
     yield BridgedEnd(names.status, "topic", tells, GoalStatusArray, Qos.LATCHED, port)
 
 
-def parameters_of(node: str, way: Way) -> Iterator[BridgedEnd]:
+def parameters_of(node: str, way: BridgeWay) -> Iterator[BridgedEnd]:
     """Yield the services of the parameters of a node with this absolute name."""
     for bare, service in PARAMETERS.items():
         yield BridgedEnd(f"{node}/{bare}", "service", way, service)
