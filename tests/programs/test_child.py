@@ -197,11 +197,11 @@ def test_one_that_cannot_be_run_says_why_in_one_sentence(run: Run, tmp_path: Pat
     (tmp_path / "inner").mkdir()
     wrong = {
         ("no_such_program",): "there is no executable 'no_such_program' in PATH",
-        ("./missing",): f"there is no file {tmp_path}/./missing",
-        ("./inner",): f"{tmp_path}/./inner is a folder",
-        ("./plain",): f"{tmp_path}/./plain is not executable",
-        ("./orphan",): f"{tmp_path}/./orphan is to be run by /no/such/shell, which is not there",
-        ("./text",): f"{tmp_path}/./text: the first line of a script names what runs it: '#!/bin/sh'",
+        ("./missing",): f"there is no file {tmp_path}/missing",
+        ("./inner",): f"{tmp_path}/inner is a folder",
+        ("./plain",): f"{tmp_path}/plain is not executable",
+        ("./orphan",): f"{tmp_path}/orphan is to be run by /no/such/shell, which is not there",
+        ("./text",): f"{tmp_path}/text: the first line of a script names what runs it: '#!/bin/sh'",
         ("sh", "-c\0"): "embedded null byte",
     }
     for command, why in wrong.items():

@@ -220,8 +220,8 @@ class Child:
 
 def _kill_marked(mark: bytes) -> None:
     """Kill all processes whose environment has this; they may start others meanwhile."""
-    looks = 0
-    while looks < _LOOKS:
+    looks, deadline = 0, time.monotonic() + _KILLED
+    while looks < _LOOKS and time.monotonic() < deadline:  # some may have become somebody else's
         found = [pid for pid in map(int, filter(str.isdecimal, os.listdir("/proc"))) if _has(pid, mark)]
         looks = 0 if found else looks + 1
         for pid in found:

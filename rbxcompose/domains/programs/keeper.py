@@ -125,7 +125,7 @@ def _limit(name: str, apply: Callable[[], object]) -> None:
 def found(word: str, folder: str, path: str) -> str:
     """Return the file that the first word of a command means: relative to `folder`, else by PATH; "" if none."""
     if "/" in word:
-        return os.path.join(folder, word)
+        return os.path.join(folder, word.removeprefix("./"))
     files = (os.path.join(folder, place, word) for place in path.split(os.pathsep))
     return next((file for file in files if os.path.isfile(file) and os.access(file, os.X_OK)), "")
 
