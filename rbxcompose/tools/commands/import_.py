@@ -41,6 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
     name = _name(arguments)
     files = read_files(map(Path, arguments.files), report, sources)
     made = imported(arguments.program, files, name, report)
+    if out is not None and out != Path(arguments.out):  # a folder
+        out = out.with_name(made.file)
     findings = Report(
         [replace(one, fix=None) for one in report]
     )  # fixes are for manifests, which `check --fix` corrects
