@@ -14,7 +14,7 @@ from rbxcompose.commands.importing.foreign_files import ForeignFile
 from rbxcompose.commands.importing.importer import ImportedFiles
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode
 from rbxcompose.missions.language.reader import read_program
-from rbxcompose.missions.program.program import Program
+from rbxcompose.missions.program.program import MissionNode, Program
 from rbxcompose.tools.behaviour_trees.scripts import unplaced
 from rbxcompose.tools.exporting.behaviour_tree import xml_of
 from rbxcompose.tools.importers.bt import bt
@@ -56,7 +56,7 @@ def meaning(thing: Any) -> Any:
         case tuple() | list():
             return [meaning(each) for each in thing]
     if hasattr(type(thing), "__dataclass_fields__"):
-        left_out = ("asked", "end", "file", "root", "text", "wanted", "scalar")
+        left_out = ("end", "file", "root", "wanted", "scalar", *(["asked"] if isinstance(thing, MissionNode) else []))
         fields = (name for name in type(thing).__dataclass_fields__ if name not in left_out)
         return (type(thing).__name__, {name: meaning(getattr(thing, name)) for name in fields})
     return thing

@@ -45,15 +45,17 @@ class FreeNames:
 
     def __init__(self) -> None:
         self._taken: set[str] = set()
+        self._counts: dict[str, int] = {}  # how often each was wanted that was taken
 
     def take(self, wanted: str, otherwise: str) -> str:
         """Return the name that is most like a wanted one and not taken; `otherwise` if none is like it."""
         name = first = name_like(wanted) or otherwise
-        count = 1
+        count = self._counts.get(first, 1)
         while name in self._taken:
             count += 1
             end = f"_{count}"
             name = f"{first[: LONGEST_NAME - len(end)]}{end}"
+        self._counts[first] = count
         self._taken.add(name)
         return name
 

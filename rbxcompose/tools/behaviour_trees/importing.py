@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import field
 from functools import cache
+from itertools import count
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
@@ -33,6 +34,7 @@ _PLAIN = re.compile(r"[$A-Za-z0-9_(][^:#\n\r\"\\&]*+")
 _YAML_WORDS = frozenset({"true", "false", "null", "yes", "no", "on", "off"})
 _BEFORE = ("_failureIf", "_successIf", "_skipIf", "_while", "if")
 _AFTER = ("_onSuccess", "_onFailure", "_onHalted", "_post")
+MOST_PASSED = 20_000  # entries by `_autoremap`
 _HOOKS = {"on_success": ("_onSuccess", "_post"), "on_failure": ("_onFailure", "_post"), "on_halt": ("_onHalted",)}
 _TYPES = {"bool": "flag", "double": "number", "float": "number", "string": "text", "std::string": "text"}
 _FIRST: Mapping[str, Any] = {"number": 0, "flag": False, "list": [], "text": "''"}
@@ -124,6 +126,7 @@ class _TreePorts:
     uses: list[_Use]
     passed: set[str] = field(default_factory=set)
     types: dict[str, str] = field(default_factory=dict)  # of what callers pass
+    known: dict[str, str] = field(default_factory=dict)  # types of what the tree itself sets
     inputs: dict[str, str] = field(default_factory=dict)  # the name of the input by entry
     outputs: set[str] = field(default_factory=set)
     guessed: set[str] = field(default_factory=set)
@@ -142,7 +145,8 @@ class ForestImporter:
 
     def __init__(self, forest: Forest, name: str, report: Report) -> None:
         self.forest, self.report = forest, report
-        self.circles: set[int] = set()  # elements that would lead back into their own tree, by identity
+        self.refused: set[int] = set()  # sub-trees that are refused, such as those that lead back, by identity
+        self.left = MOST_PASSED
         self.order = self._ordered()
         self.main = self._main()
         free = FreeNames()
@@ -177,7 +181,7 @@ class ForestImporter:
                     continue
                 used = element.attributes.get("ID", "")
                 if used in path:
-                    self.circles.add(id(element))
+                    self.refused.add(id(element))
                     words = f"the tree '{plain(used, 60)}' uses itself, here or through others"
                     self.report.add(MISTAKE.at(element.span, words, help="repeat with '<Repeat>'"))
                 elif used in self.forest.trees and used not in done:
@@ -187,7 +191,7 @@ class ForestImporter:
     def _main(self) -> str:
         trees, named = self.forest.trees, self.forest.named_main
         used = {each.attributes.get("ID", "") for tree in trees for each in self._subtrees(tree)}
-        unused = [tree for tree in trees if tree not in used] or list(trees)
+        unused = [tree for tree in trees if tree not in used] or [next(iter(trees))]
         if named in trees:
             return named
         if named:
@@ -205,13 +209,13 @@ class ForestImporter:
             found = _TreePorts([])
             for word in kinds():
                 found.free.take(word, word)
-            for element in below(self.forest.trees[tree]):
-                if type_of(element) not in NODES and not element.children:
-                    found.free.take(nodes.skill_name(type_of(element)), "skill")
+            leaves = (type_of(each) for each in below(self.forest.trees[tree]) if not each.children)
+            for skill in {nodes.skill_name(name): None for name in leaves if name not in NODES}:
+                found.free.take(skill, "skill")
             self.ports[tree] = found
         for tree in reversed(self.order):
             for element in self._subtrees(tree):
-                if (used := self.ports.get(element.attributes.get("ID", ""))) and id(element) not in self.circles:
+                if (used := self.ports.get(element.attributes.get("ID", ""))) and id(element) not in self.refused:
                     used.passed |= _ports(element).keys()
                     if _is_auto(element):
                         used.passed.add("*")
@@ -223,19 +227,22 @@ class ForestImporter:
         declared = {} if model is None else {port: one.direction for port, one in model.ports.items()}
         uses = [use for element in below(self.forest.trees[tree]) for use in self._uses(element)]
         names = [use.entry for use in uses]
+        begins, ends = (
+            {name: index for index, name in reversed([*enumerate(names)])},
+            dict(zip(names, count(), strict=False)),
+        )
         if "*" in found.passed:
             found.passed |= {name for name in names if name[0] not in "_@"}
         passed = found.passed | declared.keys()
-        written: set[str] = set()
         for index, use in enumerate(uses):
             if use.how == "?":
-                is_first = use.entry not in written and use.entry not in names[:index]
-                is_output = is_first and use.entry in names[index + 1 :] and use.entry not in passed
+                is_output = begins[use.entry] == index < ends[use.entry] and use.entry not in passed
                 uses[index] = use = _Use(use.entry, "w" if is_output else "r")
                 found.guessed |= {use.entry} if is_output else set()
-            if use.how == "w":
-                written.add(use.entry)
-        found.uses = uses
+        found.uses, written = uses, {use.entry for use in uses if use.how == "w"}
+        for use in uses:
+            if use.type:
+                found.known.setdefault(use.entry, use.type)
         first: dict[str, str] = {}
         for use in uses:
             first.setdefault(use.entry, use.how)
@@ -282,14 +289,21 @@ class ForestImporter:
 
     def _passed_uses(self, element: XmlElement) -> Iterator[_Use]:
         used = self.ports.get(element.attributes.get("ID", ""))
-        if used is None or id(element) in self.circles:
+        if used is None or id(element) in self.refused:
             return
+        if _is_auto(element):
+            self.left -= len(used.inputs) + len(used.outputs)
+            if self.left < 0:
+                words = f"'_autoremap' would pass more than {MOST_PASSED:,} entries in all trees together"
+                self.report.add(MISTAKE.at(element.span, words, help="name the ports that a tree needs"))
+                self.refused.add(id(element))
+                return
         for port, text in passed_ports(element, used, self.forest).items():
             if name := nodes.entry_of(text, port):
                 if port in used.inputs:
                     yield _Use(name, "r")
                 if port in used.outputs:
-                    yield _Use(name, "w", next((use.type for use in used.uses if use.entry == port and use.type), ""))
+                    yield _Use(name, "w", used.known.get(port, ""))
 
 
 def _is_auto(element: XmlElement) -> bool:
@@ -366,6 +380,7 @@ class _TreeImporter:
             self.node_names.take(word, word)
         self.is_asked = False  # whether this is evaluated again and again by the node around it
         self.told: set[str] = set()
+        self.kept: set[str] = set()  # names of results
 
     def our(self, entry: str) -> str:
         """Return the name of ours for an entry."""
@@ -673,7 +688,10 @@ class _TreeImporter:
         """Return a step whose result is kept, and what of it is set at its end."""
         if not outputs:
             return step
-        kept = self.ports.free.take(element.attributes.get(f"{nodes.TWIN}save", f"{name}_result"), "result")
+        kept = element.attributes.get(f"{nodes.TWIN}save", "")
+        if kept not in self.kept:
+            kept = self.ports.free.take(kept or f"{name}_result", "result")
+            self.kept.add(kept)
         step = around(step, {"save": kept})
         return around(step, {hook: {"set": {to: f"${kept}.{out}" for to, out in outputs.items()}} for hook in hooks})
 
@@ -685,8 +703,8 @@ class _TreeImporter:
             words = f"there is no tree '{plain(used, 60)}'"
             self.report.add(MISTAKE.misspelt(element.span, words, used, self.all.forest.trees, "trees"))
             return ImportedStep({"check": "false"}, element.span, "there is no such tree")
-        if id(element) in self.all.circles:
-            return ImportedStep({"check": "false"}, element.span, "this tree would use itself")
+        if id(element) in self.all.refused:
+            return ImportedStep({"check": "false"}, element.span, "this tree is left out")
         ports = self.all.ports[used]
         given: dict[str, Any] = {}
         outputs: dict[str, str] = {}
@@ -698,8 +716,8 @@ class _TreeImporter:
             if port in ports.inputs:
                 own = ports.inputs[port]
                 given[own] = f"${self.our(entry)}" if entry else text.replace("$", "$$")
-                types = [use.type for use in self.ports.uses if use.entry == entry and use.type]
-                found = (types[0] if types else self.ports.types.get(entry, "")) if entry else _type_of_literal(text)
+                known = self.ports.known.get(entry) or self.ports.types.get(entry, "")
+                found = known if entry else _type_of_literal(text)
                 ports.types.setdefault(port, found)
             if port in ports.outputs and entry:
                 outputs[self.our(entry)] = ports.our(port)
