@@ -431,7 +431,9 @@ def test_files_are_included_once_and_version_3_is_told(tmp_path: Path) -> None:
 
 
 def test_a_main_tree_that_is_not_there_is_told(tmp_path: Path) -> None:
-    made = of_text(tmp_path, f'<root BTCPP_format="4" main_tree_to_execute="Man"><{TREE} ID="Main"><A/></{TREE}></root>')
+    made = of_text(
+        tmp_path, f'<root BTCPP_format="4" main_tree_to_execute="Man"><{TREE} ID="Main"><A/></{TREE}></root>'
+    )
     assert [(found.code, found.help) for found in made.report] == [("RBX4191", "did you mean 'Main'?")]
     assert run(made) == "success: 0 a"
 
