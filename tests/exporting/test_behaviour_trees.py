@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
+import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
@@ -16,7 +18,7 @@ from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import MissionNode, Program
 from rbxcompose.tools.behaviour_trees.scripts import unplaced
-from rbxcompose.tools.exporting.behaviour_tree import xml_of
+from rbxcompose.tools.exporting.behaviour_tree import exported, xml_of
 from rbxcompose.tools.importers.bt import bt
 from tests.missions.simulated import tree
 
@@ -156,3 +158,103 @@ HEADS = st.sampled_from(
 @given(HEADS, NODES)
 def test_a_mission_that_can_be_exported_comes_back_as_it_was(head: dict[str, Any], body: Node) -> None:
     round_trip({**head, "do": body})
+
+
+USED = """
+rbx: 1
+kind: Mission
+name: back
+inputs:
+  tries: {type: count, default: 2}
+  where: {type: place}
+data: {done: 0}
+outputs: {done: $done}
+do:
+  - {go_to: $where, attempts: $tries}
+  - set: {done: $done + 1}
+"""
+USING = """
+rbx: 1
+kind: Mission
+name: tried
+data: {n: 0, spot: dock}
+do:
+  - use: back
+    with: {where: $spot, tries: 3}
+    save: trip
+    on_success: {set: {n: $trip.done}}
+    on_failure: {set: {n: $trip.done}}
+  - {use: back, with: {where: kitchen}, timeout: 1 min}
+"""
+
+
+def test_missions_that_are_used_become_sub_trees_and_come_back(tmp_path: Path) -> None:
+    for name, text in {"tried": USING, "back": USED}.items():
+        (tmp_path / f"{name}.yaml").write_text(text, encoding="utf-8")
+    report = Report()
+    found = exported(tmp_path / "tried.yaml", report, {})
+    assert not report.has_errors, list(report)
+    made, told = imported(found["tried.xml"])
+    assert not list(told)
+    same(USING, made.text)
+    same(USED, made.beside["back.yaml"])
+
+
+def test_a_mission_that_is_not_beside_it_is_told(tmp_path: Path) -> None:
+    (tmp_path / "tried.yaml").write_text(USING, encoding="utf-8")
+    report = Report()
+    assert exported(tmp_path / "tried.yaml", report, {}) == {}
+    assert {(finding.code, finding.span.line if finding.span else 0) for finding in report} == {
+        ("RBX4194", 7), ("RBX4194", 12)
+    }  # fmt: skip
+
+
+def test_a_script_that_was_edited_counts_and_not_what_the_mission_had_written() -> None:
+    mission = {"data": {"n": 0}, "do": {"check": "$battery > 20 %"}}
+    xml = round_trip(mission)
+    assert 'code="battery &gt; 0.2"' in xml
+    assert "check: $battery > 0.5" in imported(xml.replace("0.2", "0.5"))[0].text
+
+
+CANNOT = {
+    "interrupts: {low: {when: $door}}\ndo: a": 1,
+    "machine: {start: one, states: {one: {do: a, next: {success: finished, failure: failed}}}}": 1,
+    "do: {publish: greetings, message: hi}": 1,
+    "do: [a, {call: reset}]": 1,
+    "do: {end: success}": 1,
+    "do:\n  say: hi $n": 2,
+    "do:\n  say: $n + 1": 2,
+    "do:\n  go_to: {pose: [1, 2]}": 2,
+    "do:\n  check: distance($pose, dock) < 1 m": 2,
+    "do:\n  check: 3 in $list": 2,
+    "do:\n  sequence: [a]\n  history: deep": 2,
+    "do:\n  sequence: [a]\n  order: random": 3,
+    "do:\n  fallback: [a]\n  history: last": 2,
+    "do:\n  a:\n  cooldown: 1 s": 3,
+    "do:\n  a:\n  on_start: {log: hi}": 3,
+    "do:\n  a:\n  on_success: {log: hi}": 3,
+    "do:\n  a:\n  attempts: 2\n  attempt_pause: 1 s": 4,
+    "do:\n  look:\n  save: seen": 3,
+    "do:\n  look:\n  save: seen\n  on_success: {set: {n: $seen.people + 1}}": 3,
+    "do:\n  repeat: 3\n  until: $door\n  do: a": 3,
+    "do:\n  for: x\n  in: [1]\n  if_one_fails: next\n  do: a": 4,
+    "do:\n  for: x\n  in: [1, true]\n  do: a": 2,
+    "do:\n  parallel: {one: a, two: b}\n  ends_with: one": 3,
+    "do:\n  parallel: [a, b, c]\n  succeed_when: 2\n  wait_for_all: true": 2,
+    "do:\n  parallel: [a, b]\n  succeed_when: 3": 2,
+    "do:\n  choose: $n\n  cases: {1: a}": 2,
+    "do:\n  choose: $n + 1\n  cases: {1: a, 2: b}": 2,
+    "do:\n  wait: 0.1 ms": 2,
+    "do:\n  wait: $n * 1 s": 2,
+    "do:\n  repeat: $n + 1\n  do: a": 2,
+    "do:\n  set: {n: $k, k: $n}": 2,
+    "outputs:\n  m: $n + 1\ndo: a": 2,
+}
+
+
+@pytest.mark.parametrize("text", CANNOT)
+def test_what_no_tree_can_say_is_told_at_its_place(text: str) -> None:
+    report = Report()
+    xml_of({"tried": tree(text)}, "tried", report)
+    found = [(finding.code, finding.span.line if finding.span else 0) for finding in report]
+    assert found == [("RBX4194", CANNOT[text])], list(report)

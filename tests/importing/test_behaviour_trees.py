@@ -14,9 +14,10 @@ from rbxcompose.base.findings import Report
 from rbxcompose.missions.engine.events import SkillEnded, SkillStarted
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import Program, RobotNames
+from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.behaviour_trees import importing, nodes
 from rbxcompose.tools.behaviour_trees.forest import TREE
-from tests.importing.imports import Imported, import_files
+from tests.importing.imports import EXAMPLES, Imported, import_files
 from tests.missions.simulated import ROBOT, Simulated, tree
 
 ROOT = '<root BTCPP_format="4">{}</root>'
@@ -96,7 +97,9 @@ RUNS: Mapping[str, tuple[str, dict[str, object], str]] = {
         "failure: 0 a, 0.5 a halted",
     ),
     "ReactiveSequence goes through": (
-        "<ReactiveSequence><IsReady/><A/></ReactiveSequence>", {"ready": [(0.0, True)]}, "success: 0 a",
+        "<ReactiveSequence><IsReady/><A/></ReactiveSequence>",
+        {"ready": [(0.0, True)]},
+        "success: 0 a",
     ),
     "Fallback": (f"<Fallback>{AB}</Fallback>", {"fails": {"a": [1]}}, "success: 0 a, 1 a failure, 1 b"),
     "Fallback ends at a success": (f"<Fallback>{AB}</Fallback>", {}, "success: 0 a"),
@@ -108,7 +111,9 @@ RUNS: Mapping[str, tuple[str, dict[str, object], str]] = {
     ),
     "Parallel waits for all": (f"<Parallel>{AB}</Parallel>", {"takes": {"b": 2.0}}, "success: 0 a, 0 b"),
     "Parallel fails at the first failure": (
-        f"<Parallel>{AB}</Parallel>", {"takes": {"b": 2.0}, "fails": {"a": [1]}}, "failure: 0 a, 0 b, 1 a failure, 1 b halted",
+        f"<Parallel>{AB}</Parallel>",
+        {"takes": {"b": 2.0}, "fails": {"a": [1]}},
+        "failure: 0 a, 0 b, 1 a failure, 1 b halted",
     ),
     "Parallel with thresholds": (
         f'<Parallel success_count="1" failure_count="2">{AB}</Parallel>',
@@ -121,40 +126,49 @@ RUNS: Mapping[str, tuple[str, dict[str, object], str]] = {
         "success: 0 a, 0 b, 1 b halted",
     ),
     "ParallelAll lets all end": (
-        f"<ParallelAll>{AB}</ParallelAll>", {"takes": {"b": 2.0}, "fails": {"a": [1]}}, "failure: 0 a, 0 b, 1 a failure",
+        f"<ParallelAll>{AB}</ParallelAll>",
+        {"takes": {"b": 2.0}, "fails": {"a": [1]}},
+        "failure: 0 a, 0 b, 1 a failure",
     ),
     "ParallelAll allows failures": (
-        f'<ParallelAll max_failures="2">{AB}</ParallelAll>', {"fails": {"a": [1]}}, "success: 0 a, 0 b, 1 a failure",
+        f'<ParallelAll max_failures="2">{AB}</ParallelAll>',
+        {"fails": {"a": [1]}},
+        "success: 0 a, 0 b, 1 a failure",
     ),
-    "IfThenElse": (
-        "<IfThenElse><A/><B/><C/></IfThenElse>", {"fails": {"a": [1]}}, "success: 0 a, 1 a failure, 1 c",
-    ),
+    "IfThenElse": ("<IfThenElse><A/><B/><C/></IfThenElse>", {"fails": {"a": [1]}}, "success: 0 a, 1 a failure, 1 c"),
     "IfThenElse does not try the other one": (
-        "<IfThenElse><A/><B/><C/></IfThenElse>", {"fails": {"b": [1]}}, "failure: 0 a, 1 b, 2 b failure",
+        "<IfThenElse><A/><B/><C/></IfThenElse>",
+        {"fails": {"b": [1]}},
+        "failure: 0 a, 1 b, 2 b failure",
     ),
-    "IfThenElse without else": ("<IfThenElse><A/><B/></IfThenElse>", {"fails": {"a": [1]}}, "failure: 0 a, 1 a failure"),
+    "IfThenElse without else": (
+        "<IfThenElse><A/><B/></IfThenElse>",
+        {"fails": {"a": [1]}},
+        "failure: 0 a, 1 a failure",
+    ),
     "WhileDoElse changes over": (
         "<WhileDoElse><IsReady/><A/><B/></WhileDoElse>",
         {"ready": [(0.0, True), (0.25, False), (0.5, True)]},
         "success: 0 a, 0.25 a halted, 0.25 b, 0.5 b halted, 0.5 a",
     ),
     "WhileDoElse of two": (
-        "<WhileDoElse><IsReady/><A/></WhileDoElse>", {"ready": NOT_READY}, "failure: 0 a, 0.5 a halted",
+        "<WhileDoElse><IsReady/><A/></WhileDoElse>",
+        {"ready": NOT_READY},
+        "failure: 0 a, 0.5 a halted",
     ),
     "Switch2": (
-        '<Sequence><Script code="x := 2"/><Switch2 variable="{x}" case_1="1" case_2="2"><A/><B/><C/></Switch2></Sequence>',
+        '<Sequence><Script code="x := 2"/>'
+        '<Switch2 variable="{x}" case_1="1" case_2="2"><A/><B/><C/></Switch2></Sequence>',
         {},
         "success: 0 b",
     ),
     "Switch3 has a default": (
-        '<Sequence><Script code="x := \'c\'"/>'
+        "<Sequence><Script code=\"x := 'c'\"/>"
         '<Switch3 variable="{x}" case_1="a" case_2="b" case_3="d"><A/><B/><C/><D/></Switch3></Sequence>',
         {},
         "success: 0 d",
     ),
-    "TryCatch": (
-        "<TryCatch><A/><B/><C/></TryCatch>", {"fails": {"a": [1]}}, "failure: 0 a, 1 a failure, 1 c",
-    ),
+    "TryCatch": ("<TryCatch><A/><B/><C/></TryCatch>", {"fails": {"a": [1]}}, "failure: 0 a, 1 a failure, 1 c"),
     "TryCatch without a failure": ("<TryCatch><A/><B/><C/></TryCatch>", {}, "success: 0 a, 1 b"),
     "Inverter": ("<Inverter><A/></Inverter>", {}, "failure: 0 a"),
     "ForceSuccess": ("<ForceSuccess><A/></ForceSuccess>", {"fails": {"a": [1]}}, "success: 0 a, 1 a failure"),
@@ -171,41 +185,54 @@ RUNS: Mapping[str, tuple[str, dict[str, object], str]] = {
     ),
     "Repeat": ('<Repeat num_cycles="2"><A/></Repeat>', {}, "success: 0 a, 1 a"),
     "Repeat ends at a failure": (
-        '<Repeat num_cycles="-1"><A/></Repeat>', {"fails": {"a": [2]}}, "failure: 0 a, 1 a, 2 a failure",
+        '<Repeat num_cycles="-1"><A/></Repeat>',
+        {"fails": {"a": [2]}},
+        "failure: 0 a, 1 a, 2 a failure",
     ),
     "KeepRunningUntilFailure": (
-        "<KeepRunningUntilFailure><A/></KeepRunningUntilFailure>", {"fails": {"a": [2]}}, "failure: 0 a, 1 a, 2 a failure",
+        "<KeepRunningUntilFailure><A/></KeepRunningUntilFailure>",
+        {"fails": {"a": [2]}},
+        "failure: 0 a, 1 a, 2 a failure",
     ),
     "Timeout halts": ('<Timeout msec="500"><A/></Timeout>', {}, "failure: 0 a, 0.5 a halted"),
     "Timeout of nothing": ('<Timeout msec="0"><A/></Timeout>', {}, "success: 0 a"),
     "Timeout from an entry": (
-        '<Sequence><Script code="t := 500"/><Timeout msec="{t}"><A/></Timeout></Sequence>', {}, "failure: 0 a, 0.5 a halted",
+        '<Sequence><Script code="t := 500"/><Timeout msec="{t}"><A/></Timeout></Sequence>',
+        {},
+        "failure: 0 a, 0.5 a halted",
     ),
     "Delay": ('<Delay delay_msec="500"><A/></Delay>', {}, "success: 0.5 a"),
     "Sleep": (f'<Sequence><Sleep msec="1500"/>{AB}</Sequence>', {}, "success: 1.5 a, 2.5 b"),
-    "RunOnce": ('<Repeat num_cycles="2"><Sequence><RunOnce><A/></RunOnce><B/></Sequence></Repeat>', {},
-                "success: 0 a, 1 b, 2 b"),
+    "RunOnce": (
+        '<Repeat num_cycles="2"><Sequence><RunOnce><A/></RunOnce><B/></Sequence></Repeat>',
+        {},
+        "success: 0 a, 1 b, 2 b",
+    ),
     "Precondition": ('<Precondition if="1 > 2"><A/></Precondition>', {}, "failure: "),
     "Precondition succeeds": ('<Precondition if="1 > 2" else="SUCCESS"><A/></Precondition>', {}, "success: "),
     "Precondition skips": (
-        '<Fallback><Precondition if="1 > 2" else="SKIPPED"><A/></Precondition><B/></Fallback>', {}, "success: 0 b",
+        '<Fallback><Precondition if="1 > 2" else="SKIPPED"><A/></Precondition><B/></Fallback>',
+        {},
+        "success: 0 b",
     ),
     "Precondition waits": (
-        '<Precondition if="is_ready" else="RUNNING"><A/></Precondition>', {"ready": [(0.0, False), (2.0, True)]},
+        '<Precondition if="is_ready" else="RUNNING"><A/></Precondition>',
+        {"ready": [(0.0, False), (2.0, True)]},
         "success: 2 a",
     ),
     "LoopInt": ('<LoopInt queue="1;2" value="{n}"><A/></LoopInt>', {}, "success: 0 a, 1 a"),
     "LoopBool": ('<LoopBool queue="true;false" value="{n}"><A/></LoopBool>', {}, "success: 0 a, 1 a"),
-    "LoopDouble": (
-        '<LoopDouble queue="1;2;3" value="{n}"><A _skipIf="n &gt; 1.5"/></LoopDouble>', {}, "success: 0 a",
-    ),
+    "LoopDouble": ('<LoopDouble queue="1;2;3" value="{n}"><A _skipIf="n &gt; 1.5"/></LoopDouble>', {}, "success: 0 a"),
     "LoopString ends at a failure": (
-        '<LoopString queue="x;y;z" value="{n}"><A/></LoopString>', {"fails": {"a": [2]}}, "failure: 0 a, 1 a, 2 a failure",
+        '<LoopString queue="x;y;z" value="{n}"><A/></LoopString>',
+        {"fails": {"a": [2]}},
+        "failure: 0 a, 1 a, 2 a failure",
     ),
     "AlwaysSuccess": ("<Sequence><AlwaysSuccess/><A/></Sequence>", {}, "success: 0 a"),
     "AlwaysFailure": ("<Sequence><AlwaysFailure/><A/></Sequence>", {}, "failure: "),
     "Script": (
-        '<Sequence><Script code="x := 1; y := x + 1; x += y"/><ScriptCondition code="x == 3 &amp;&amp; y == 2"/><A/></Sequence>',
+        '<Sequence><Script code="x := 1; y := x + 1; x += y"/>'
+        '<ScriptCondition code="x == 3 &amp;&amp; y == 2"/><A/></Sequence>',
         {},
         "success: 0 a",
     ),
@@ -225,9 +252,15 @@ RUNS: Mapping[str, tuple[str, dict[str, object], str]] = {
     "_successIf": ('<Sequence><A _successIf="1 &lt; 2"/><B/></Sequence>', {}, "success: 0 b"),
     "_failureIf": ('<Fallback><A _failureIf="1 &lt; 2" _successIf="true"/><B/></Fallback>', {}, "success: 0 b"),
     "_while": (
-        '<Sequence><A _while="is_ready"/><B/></Sequence>', {"ready": NOT_READY}, "success: 0 a, 0.5 a halted, 0.5 b",
+        '<Sequence><A _while="is_ready"/><B/></Sequence>',
+        {"ready": NOT_READY},
+        "success: 0 a, 0.5 a halted, 0.5 b",
     ),
-    "_while at the start": ('<Sequence><A _while="is_ready"/><B/></Sequence>', {"ready": [(0.0, False)]}, "success: 0 b"),
+    "_while at the start": (
+        '<Sequence><A _while="is_ready"/><B/></Sequence>',
+        {"ready": [(0.0, False)]},
+        "success: 0 b",
+    ),
     "_onSuccess": (
         '<Sequence><Script code="x := 0"/><A _onSuccess="x := 5" _onFailure="x := 6"/>'
         '<ScriptCondition code="x == 5"/><B/></Sequence>',
@@ -241,7 +274,8 @@ RUNS: Mapping[str, tuple[str, dict[str, object], str]] = {
         "success: 0 a, 1 a failure, 1 b",
     ),
     "_onHalted": (
-        '<Sequence><Script code="x := 0"/><ForceSuccess><Timeout msec="500"><A _onHalted="x := 6"/></Timeout></ForceSuccess>'
+        '<Sequence><Script code="x := 0"/>'
+        '<ForceSuccess><Timeout msec="500"><A _onHalted="x := 6"/></Timeout></ForceSuccess>'
         '<ScriptCondition code="x == 6"/><B/></Sequence>',
         {},
         "success: 0 a, 0.5 a halted, 0.5 b",
@@ -252,15 +286,18 @@ RUNS: Mapping[str, tuple[str, dict[str, object], str]] = {
         "success: 0 a, 1 b",
     ),
     "all skipped": (
-        '<Fallback><Sequence><A _skipIf="true"/><B _skipIf="true"/></Sequence><C/></Fallback>', {}, "success: 0 c",
+        '<Fallback><Sequence><A _skipIf="true"/><B _skipIf="true"/></Sequence><C/></Fallback>',
+        {},
+        "success: 0 c",
     ),
     "decorators in any order": (
-        '<Timeout msec="5000"><Inverter><ForceFailure><RetryUntilSuccessful num_attempts="2"><A/></RetryUntilSuccessful>'
+        '<Timeout msec="5000"><Inverter><ForceFailure>'
+        '<RetryUntilSuccessful num_attempts="2"><A/></RetryUntilSuccessful>'
         "</ForceFailure></Inverter></Timeout>",
         {"fails": {"a": [1]}},
         "success: 0 a, 1 a failure, 1 a",
     ),
-}  # fmt: skip
+}
 SUBTREES: Mapping[str, tuple[str, str, str]] = {
     "SubTree": ('<SubTree ID="Sub"/>', "<A/>", "success: 0 a"),
     "an input and an output": (
@@ -270,7 +307,8 @@ SUBTREES: Mapping[str, tuple[str, str, str]] = {
         "success: 0 a, 1 b",
     ),
     "an output although it fails": (
-        '<Fallback><SubTree ID="Sub" to="{found}"/><Sequence><ScriptCondition code="found == 5"/><B/></Sequence></Fallback>',
+        '<Fallback><SubTree ID="Sub" to="{found}"/>'
+        '<Sequence><ScriptCondition code="found == 5"/><B/></Sequence></Fallback>',
         '<Sequence><Script code="to := 5"/><AlwaysFailure/></Sequence>',
         "success: 0 b",
     ),
@@ -280,7 +318,8 @@ SUBTREES: Mapping[str, tuple[str, str, str]] = {
         "success: 0 b",
     ),
     "autoremap": (
-        '<Sequence><Script code="x := 4"/><SubTree ID="Sub" _autoremap="true"/><ScriptCondition code="y == 8"/><B/></Sequence>',
+        '<Sequence><Script code="x := 4"/><SubTree ID="Sub" _autoremap="true"/>'
+        '<ScriptCondition code="y == 8"/><B/></Sequence>',
         '<Script code="y := x * 2"/>',
         "success: 0 b",
     ),
@@ -351,7 +390,9 @@ WRONG: Mapping[str, tuple[str, str, list[tuple[str, int]]]] = {
         [("RBX4191", 8)],
     ),
     "a port of no model": (
-        '<A y="1"/>', '<TreeNodesModel><Action ID="A"><input_port name="x"/></Action></TreeNodesModel>', [("RBX4191", 3)],
+        '<A y="1"/>',
+        '<TreeNodesModel><Action ID="A"><input_port name="x"/></Action></TreeNodesModel>',
+        [("RBX4191", 3)],
     ),
     "a port without a value": (
         '<SubTree ID="Sub"/>',
@@ -360,7 +401,7 @@ WRONG: Mapping[str, tuple[str, str, list[tuple[str, int]]]] = {
     ),
     "a package of ROS": ("<A/>", '<include ros_pkg="a" path="b.xml"/>', [("RBX4191", 5)]),
     "a file that is not there": ("<A/>", '<include path="b.xml"/>', [("RBX4191", 5)]),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", WRONG)
@@ -436,6 +477,14 @@ def test_a_main_tree_that_is_not_there_is_told(tmp_path: Path) -> None:
     )
     assert [(found.code, found.help) for found in made.report] == [("RBX4191", "did you mean 'Main'?")]
     assert run(made) == "success: 0 a"
+
+
+def test_what_is_written_and_what_is_told(golden: Golden) -> None:
+    made = import_files([EXAMPLES / "bt/watch.xml"], "watch", "bt")
+    golden.check("bt_watch.yaml", "---\n".join([made.text, *made.beside.values()]))
+    golden.check("bt_watch.txt", made.words)
+    for text in (made.text, *made.beside.values()):
+        program(text)
 
 
 def test_names_follow_one_rule() -> None:

@@ -36,7 +36,7 @@ _BEFORE = ("_failureIf", "_successIf", "_skipIf", "_while", "if")
 _AFTER = ("_onSuccess", "_onFailure", "_onHalted", "_post")
 MOST_PASSED = 20_000  # entries by `_autoremap`
 _HOOKS = {"on_success": ("_onSuccess", "_post"), "on_failure": ("_onFailure", "_post"), "on_halt": ("_onHalted",)}
-_TYPES = {"bool": "flag", "double": "number", "float": "number", "string": "text", "std::string": "text"}
+_TYPES = {"bool": "flag", "double": "number", "float": "number", "string": "text"}
 _FIRST: Mapping[str, Any] = {"number": 0, "flag": False, "list": [], "text": "''"}
 _LOOPS = {"LoopInt": "number", "LoopDouble": "number", "LoopBool": "flag", "LoopString": "text"}
 
@@ -240,7 +240,7 @@ class ForestImporter:
                 uses[index] = use = _Use(use.entry, "w" if is_output else "r")
                 found.guessed |= {use.entry} if is_output else set()
         found.uses, written = uses, {use.entry for use in uses if use.how == "w"}
-        for use in uses:
+        for use in sorted(uses, key=lambda use: use.how != "w"):  # what is set tells more than what is read
             if use.type:
                 found.known.setdefault(use.entry, use.type)
         first: dict[str, str] = {}
@@ -283,7 +283,8 @@ class ForestImporter:
                 if name := nodes.entry_of(text, port):
                     is_own = kind in NODES
                     declared = model.ports.get(port) if model is not None else None
-                    yield _Use(name, "r" if is_own else hows[declared.direction] if declared else "?")
+                    how = "r" if is_own else hows[declared.direction] if declared else "?"
+                    yield _Use(name, how, _type_of_port(declared.element.attributes) if declared else "")
         for key in _AFTER:
             yield from _script_uses(element.attributes.get(key, ""))
 
@@ -317,8 +318,9 @@ def passed_ports(element: XmlElement, used: _TreePorts, forest: Forest) -> dict[
     """Return what a sub-tree is given, by port, with what its model and `_autoremap` add."""
     found = _ports(element)
     model = forest.models.get(element.attributes.get("ID", ""))
-    for port, declared in model.ports.items() if model is not None else ():
-        if (default := declared.element.attributes.get("default")) is not None and not _is_auto(element):
+    for port, declared in model.ports.items() if model is not None and not _is_auto(element) else ():
+        default = declared.element.attributes.get("default", "")
+        if nodes.entry_of(default, port):  # a literal is the default of the input
             found.setdefault(port, default)
     if _is_auto(element):
         for port in (*used.inputs, *used.outputs):
@@ -335,6 +337,12 @@ def _script_uses(text: str) -> Iterator[_Use]:
         yield from (_Use(node.name, "r") for node, _ in syntax.walk(each.value) if isinstance(node, syntax.Variable))
         if each.to:
             yield _Use(each.to, "w", _type_of_tree(each.value))
+
+
+def _type_of_port(attributes: Mapping[str, str]) -> str:
+    """Return the type of ours for one of C++."""
+    cpp = attributes.get("type", "").rpartition("::")[2]
+    return _TYPES.get(cpp, "number" if re.search(r"\bu?int(\d+_t)?\b", cpp) else "")
 
 
 def _type_of_tree(tree: syntax.ExpressionNode) -> str:
@@ -401,23 +409,18 @@ class _TreeImporter:
         """Return the text of the mission."""
         body = self.root.children[0]
         ports = self.ports
-        types: dict[str, str] = {}
-        for use in ports.uses:
-            if use.how == "w":
-                types.setdefault(use.entry, "")
-                types[use.entry] = types[use.entry] or use.type
-        start = [entry for entry in ports.inputs if entry in types]
+        written = dict.fromkeys(use.entry for use in ports.uses if use.how == "w")
+        start = [entry for entry in ports.inputs if entry in written]
         declared: dict[str, Any] = {}
-        if "_rbx_data" in body.attributes and body.children and type_of(body.children[0]) == "Script":
-            declared = self.declared(body.children[0])
-            body = body.children[1] if len(body.children) == 2 else body
-        self.data = {ports.our(entry): _FIRST.get(type_ or ports.types.get(entry, ""), "''")
-                     for entry, type_ in types.items()}  # fmt: skip
-        self.data = {**declared, **{name: value for name, value in self.data.items() if name not in declared}}
+        if nodes.DATA in body.attributes and len(body.children) == 2 and type_of(body.children[0]) == "Script":
+            declared, body = self.declared(body.children[0]), body.children[1]
+        types = {entry: ports.known.get(entry) or ports.types.get(entry, "") for entry in written}
+        first = {ports.our(entry): _FIRST.get(type_, "''") for entry, type_ in types.items()}
+        self.data = {**declared, **{name: value for name, value in first.items() if name not in declared}}
         step = self.step(body)
         if start:
-            first = {ports.our(entry): f"${ports.inputs[entry]}" for entry in start}
-            step = ImportedStep({"sequence": [ImportedStep({"set": first}, self.root.span), step]}, self.root.span)
+            taken = {ports.our(entry): f"${ports.inputs[entry]}" for entry in start}
+            step = ImportedStep({"sequence": [ImportedStep({"set": taken}, self.root.span), step]}, self.root.span)
         self.outside(types, declared)
         if _depth(step) > LEVELS:
             words = f"this tree has more than {LEVELS} levels of steps as a mission"
@@ -450,9 +453,8 @@ class _TreeImporter:
         attributes = port.element.attributes if port is not None else {}
         if written := flow_text(attributes.get(f"{nodes.TWIN}input"), MappingNode):
             return written
-        cpp = attributes.get("type", "")
-        type_ = _TYPES.get(cpp.rpartition("::")[2] if "::" in cpp else cpp, "number" if "int" in cpp else "")
-        type_ = type_ or self.ports.types.get(entry, "") or "text"
+        known = self.ports.types.get(entry) or self.ports.known.get(entry, "")
+        type_ = _type_of_port(attributes) or known or "text"
         default = attributes.get("default", "")
         shown: dict[str, Any] = {"type": type_}
         if default and not nodes.entry_of(default, entry):
@@ -721,7 +723,11 @@ class _TreeImporter:
                 ports.types.setdefault(port, found)
             if port in ports.outputs and entry:
                 outputs[self.our(entry)] = ports.our(port)
-        for port in ports.inputs.keys() - passed_ports(element, ports, self.all.forest).keys():
+        model = self.all.forest.models.get(used)
+        optional = (
+            {port for port, one in model.ports.items() if "default" in one.element.attributes} if model else set()
+        )
+        for port in ports.inputs.keys() - passed_ports(element, ports, self.all.forest).keys() - optional:
             words = f"the tree '{plain(used, 60)}' needs a value for its port '{plain(port, 60)}'"
             self.report.add(MISTAKE.at(element.span, words, help=f'write {plain(port, 60)}="..." here'))
         mission = self.all.missions[used]

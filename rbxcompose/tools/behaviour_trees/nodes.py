@@ -290,7 +290,10 @@ CONDITIONS: Mapping[str, tuple[str, str]] = {
 
 def table() -> str:
     """Return the table of nodes as the docs have it."""
-    rows = [(f"`{row.name}`", row.ours, row.note) for row in NODES.values()]
+    names: dict[tuple[str, str], list[str]] = {}
+    for row in NODES.values():
+        names.setdefault((row.ours, row.note), []).append(f"`{row.name}`")
+    rows = [(", ".join(alike), *said) for said, alike in names.items()]
     rows += [(f"`{name}=`", ours, note) for name, (ours, note) in CONDITIONS.items()]
     lines = ["| BehaviorTree.CPP | here | what differs |", "| --- | --- | --- |"]
     return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])
