@@ -15,7 +15,7 @@ from rbxcompose.missions.engine.events import SkillEnded, SkillStarted
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.testing.golden import Golden
-from rbxcompose.tools.behaviour_trees import importing, nodes
+from rbxcompose.tools.behaviour_trees import forest_importer, nodes
 from rbxcompose.tools.behaviour_trees.forest import TREE
 from tests.importing.imports import EXAMPLES, Imported, import_files
 from tests.missions.simulated import ROBOT, Simulated, tree
@@ -354,7 +354,7 @@ def test_each_node_of_the_table_is_tried_or_told() -> None:
     switches = {f"Switch{count}" for count in (4, 5, 6)}  # as Switch2 and Switch3
     missing = [name for name in (*nodes.NODES, *nodes.CONDITIONS) if name not in tried]
     assert set(missing) <= left_out | switches
-    readers = importing._READERS
+    readers = forest_importer._READERS
     assert {name for name, row in nodes.NODES.items() if not row.word} <= readers.keys() <= nodes.NODES.keys()
 
 

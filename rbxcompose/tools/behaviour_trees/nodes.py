@@ -65,20 +65,20 @@ def entry_of(text: str, port: str) -> str:
     return match[1] if match else ""
 
 
-Names = Callable[[str], str]
+EntryNames = Callable[[str], str]
 """From the name of an entry to that of ours, or back."""
 
 
 @dataclass(frozen=True, slots=True)
-class Port:
+class PortCodec:
     """A port of a node: how its value becomes a text of ours, and back; both raise `ScriptError`."""
 
-    read: Callable[[str, Names], Any]
+    read: Callable[[str, EntryNames], Any]
     write: Callable[[str], str]
     default: str | None = None
 
 
-def _read_count(text: str, names: Names) -> str:
+def _read_count(text: str, names: EntryNames) -> str:
     if entry := entry_of(text, ""):
         return f"${names(entry)}"
     if not re.fullmatch(r"-?\d{1,9}", text.strip()):
@@ -102,7 +102,7 @@ def _write_count(text: str) -> str:
     return str(int(tree.value))
 
 
-def _read_msec(text: str, names: Names) -> str:
+def _read_msec(text: str, names: EntryNames) -> str:
     if entry := entry_of(text, ""):
         return f"${names(entry)} * 1 ms"
     if not re.fullmatch(r"\d{1,10}", text.strip()) or int(text) > MOST_MSEC:
@@ -122,7 +122,7 @@ def _write_msec(text: str) -> str:
     raise ScriptError(f"a time must be a whole number of milliseconds, not '{text}'" if tree else "")
 
 
-def _read_script(text: str, names: Names) -> str:
+def _read_script(text: str, names: EntryNames) -> str:
     return text_of(named(condition(text), names))
 
 
@@ -142,7 +142,7 @@ def tree_of(text: str) -> syntax.ExpressionNode:
         raise ScriptError(error.message) from None
 
 
-def named(tree: syntax.ExpressionNode, names: Names) -> syntax.ExpressionNode:
+def named(tree: syntax.ExpressionNode, names: EntryNames) -> syntax.ExpressionNode:
     """Return a tree with other names for its variables."""
 
     def renamed(value: Any) -> Any:
@@ -159,12 +159,16 @@ def named(tree: syntax.ExpressionNode, names: Names) -> syntax.ExpressionNode:
     return found
 
 
-COUNT, MSEC, SCRIPT = Port(_read_count, _write_count), Port(_read_msec, _write_msec), Port(_read_script, _write_script)
-TEXT = Port(lambda text, names: text, str)
+COUNT, MSEC, SCRIPT = (
+    PortCodec(_read_count, _write_count),
+    PortCodec(_read_msec, _write_msec),
+    PortCodec(_read_script, _write_script),
+)
+TEXT = PortCodec(lambda text, names: text, str)
 
 
-def _or(port: Port, default: str) -> Port:
-    return Port(port.read, port.write, default)
+def _or(port: PortCodec, default: str) -> PortCodec:
+    return PortCodec(port.read, port.write, default)
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +183,7 @@ class BtNode:
     children: tuple[int, int]
     ours: str
     note: str = ""
-    ports: Mapping[str, Port] = field(default_factory=dict)
+    ports: Mapping[str, PortCodec] = field(default_factory=dict)
     word: str = ""
     options: Mapping[str, Any] = field(default_factory=dict)
     is_exported: bool = False
@@ -213,7 +217,7 @@ def _lists() -> list[BtNode]:
 
 
 def _modifiers() -> list[BtNode]:
-    def row(name: str, word: str, shown: str, note: str = "", **ports: Port) -> BtNode:
+    def row(name: str, word: str, shown: str, note: str = "", **ports: PortCodec) -> BtNode:
         return BtNode(name, DECORATOR, f"`{word}: {shown}`", note, ports, word, {}, is_exported=True)
 
     return [

@@ -22,7 +22,7 @@ from rbxcompose.missions.language.keys import anywhere
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.tools.behaviour_trees import nodes
-from rbxcompose.tools.behaviour_trees.importing import assignments_script, queue_of
+from rbxcompose.tools.behaviour_trees.forest_importer import assignments_script, queue_of
 from rbxcompose.tools.behaviour_trees.nodes import CANNOT_EXPORT, NODES, TWIN
 from rbxcompose.tools.behaviour_trees.scripts import ScriptError, condition, script_of, statements, text_of, unplaced
 

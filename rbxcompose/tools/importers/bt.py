@@ -6,7 +6,7 @@ from rbxcompose.base.findings import Report
 from rbxcompose.commands.importing.foreign_files import ForeignFile
 from rbxcompose.commands.importing.importer import ImportedFiles, importer
 from rbxcompose.tools.behaviour_trees.forest import read_forest
-from rbxcompose.tools.behaviour_trees.importing import ForestImporter
+from rbxcompose.tools.behaviour_trees.forest_importer import ForestImporter
 
 
 @importer("bt", "trees of BehaviorTree.CPP as missions")
