@@ -31,13 +31,13 @@ from rbxcompose.tools.behaviour_trees.nodes import CONDITIONS, DIFFERS, EXPLICIT
 from rbxcompose.tools.behaviour_trees.scripts import ScriptError, number, script_of, statements, text_of
 
 _PLAIN = re.compile(r"[$A-Za-z0-9_(][^:#\n\r\"\\&]*+")
+_LARGE = re.compile(r"[\d.]*+[eE][-+]?\d++|\d{15,}+")  # what YAML takes for a number that is none of ours
 _YAML_WORDS = frozenset({"true", "false", "null", "yes", "no", "on", "off"})
 _BEFORE = ("_failureIf", "_successIf", "_skipIf", "_while", "if")
 _AFTER = ("_onSuccess", "_onFailure", "_onHalted", "_post")
 MOST_PASSED = 20_000  # entries by `_autoremap`
 _HOOKS = {"on_success": ("_onSuccess", "_post"), "on_failure": ("_onFailure", "_post"), "on_halt": ("_onHalted",)}
 _TYPES = {"bool": "flag", "double": "number", "float": "number", "string": "text"}
-_FIRST: Mapping[str, Any] = {"number": 0, "flag": False, "list": [], "text": "''"}
 _LOOPS = {"LoopInt": "number", "LoopDouble": "number", "LoopBool": "flag", "LoopString": "text"}
 
 
@@ -45,6 +45,9 @@ class FlowText(str):
     """A value as YAML already, which an exported mission had written."""
 
     __slots__ = ()
+
+
+_FIRST: Mapping[str, Any] = {"number": 0, "flag": False, "list": [], "text": FlowText('""')}
 
 
 def flow_text(text: object, wanted: type = object) -> FlowText | None:
@@ -415,7 +418,7 @@ class _TreeImporter:
         if nodes.DATA in body.attributes and len(body.children) == 2 and type_of(body.children[0]) == "Script":
             declared, body = self.declared(body.children[0]), body.children[1]
         types = {entry: ports.known.get(entry) or ports.types.get(entry, "") for entry in written}
-        first = {ports.our(entry): _FIRST.get(type_, "''") for entry, type_ in types.items()}
+        first = {ports.our(entry): _FIRST.get(type_, FlowText('""')) for entry, type_ in types.items()}
         self.data = {**declared, **{name: value for name, value in first.items() if name not in declared}}
         step = self.step(body)
         if start:
@@ -458,7 +461,11 @@ class _TreeImporter:
         default = attributes.get("default", "")
         shown: dict[str, Any] = {"type": type_}
         if default and not nodes.entry_of(default, entry):
-            shown["default"] = default
+            try:
+                shown["default"] = default if type_ == "text" else text_of(_literal(default, type_))
+            except ScriptError as error:
+                span = port.element.span if port is not None else self.root.span
+                self.report.add(MISTAKE.at(span, f"the default of '{plain(entry, 60)}' is left out: {error}"))
         if port is not None and port.element.text.strip():
             shown["about"] = " ".join(port.element.text.split())[:200]
         return shown
@@ -848,7 +855,7 @@ class _TreeImporter:
         return around(step, {"attempts": attempts})
 
     def repeat(self, element: XmlElement) -> ImportedStep:
-        rounds = self.port(element, "num_cycles") if "num_cycles" in element.attributes else "forever"
+        rounds = self.port(element, "num_cycles") if type_of(element) == "Repeat" else "forever"
         return ImportedStep({"repeat": rounds, "do": self.step(element.children[0])}, element.span)
 
     def delay(self, element: XmlElement) -> ImportedStep:
@@ -957,10 +964,13 @@ def _scalar(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, int | float):
         return text_of(number(float(value)))
-    if value == "''":
-        return '""'
     text = str(value)
-    is_plain = _PLAIN.fullmatch(text) and text == text.strip() and text.lower() not in _YAML_WORDS - {"true", "false"}
+    is_plain = (
+        not _LARGE.fullmatch(text)
+        and _PLAIN.fullmatch(text)
+        and text == text.strip()
+        and text.lower() not in _YAML_WORDS - {"true", "false"}
+    )
     return text if is_plain else escaped(json.dumps(text, ensure_ascii=False))
 
 

@@ -14,6 +14,7 @@ from rbxcompose.base.expressions.parser import parse
 from rbxcompose.base.expressions.tree import ExpressionError
 from rbxcompose.base.findings import Severity, kind
 from rbxcompose.base.units import NUMBER, TIME
+from rbxcompose.missions.language.keys import anywhere
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.tools.behaviour_trees.scripts import ScriptError, condition, script_of, text_of, unplaced
 
@@ -48,7 +49,7 @@ def snake(name: str) -> str:
 def skill_name(node: str) -> str:
     """Return the skill that stands for a node of a program; a word of the language gets an ending."""
     found = snake(node)
-    return f"{found}_skill" if found in kinds() else found
+    return f"{found}_skill" if found in kinds() or found in anywhere() else found
 
 
 def node_name(skill: str) -> str:
