@@ -6,11 +6,15 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rbxcompose.base.expressions.types import FLAG
 from rbxcompose.base.findings import Report
+from rbxcompose.domains.body.xml_reader import quoted
 from rbxcompose.missions.engine.events import SkillEnded, SkillStarted
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import Program, RobotNames
@@ -509,3 +513,49 @@ def test_outputs_of_nodes_are_set_and_guessed_without_a_model(tmp_path: Path) ->
             "look": None, "save": "look_result", "on_success": {"set": {"n": "$look_result.people"}}
         }  # fmt: skip
         assert steps[1] == {"say": {"words": "$n"}}
+
+
+TAGS = st.sampled_from([*nodes.NODES, *nodes.EXPLICIT, "Walk", "name", "optional"])
+PORTS = st.sampled_from(
+    sorted({*nodes.CONDITIONS, "ID", "name", "goal", *(port for row in nodes.NODES.values() for port in row.ports)})
+)
+VALUES = st.sampled_from(
+    [
+        "",
+        "{x}",
+        "{=}",
+        "-1",
+        "1;2",
+        "{@g}",
+        "true",
+        "a b",
+        "x := 1",
+        "x < 1",
+        "$x",
+        "1e400",
+        "0x1F",
+        "Sub",
+        "SKIPPED",
+        "'",
+    ]
+)
+GIVEN = st.dictionaries(PORTS, VALUES, max_size=4)
+LEAF = st.builds(lambda tag, given: (tag, given, []), TAGS, GIVEN)
+ELEMENTS = st.recursive(
+    LEAF, lambda inner: st.tuples(TAGS, GIVEN, st.lists(inner, min_size=1, max_size=4)), max_leaves=8
+)
+
+
+def _written(element: tuple[str, dict[str, str], list[Any]]) -> str:
+    tag, given, children = element
+    head = " ".join([tag, *(f"{key}={quoted(text)}" for key, text in given.items())])
+    return f"<{head}>{''.join(map(_written, children))}</{tag}>"
+
+
+@given(ELEMENTS, ELEMENTS)
+def test_whatever_a_file_says_what_is_written_can_be_read(
+    tmp_path_factory: pytest.TempPathFactory, main: Any, sub: Any
+) -> None:
+    made = of_body(tmp_path_factory.mktemp("any"), _written(main), f'<{TREE} ID="Sub">{_written(sub)}</{TREE}>')
+    for text in (made.text, *made.beside.values()):
+        program(text)
