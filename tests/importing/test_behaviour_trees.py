@@ -540,7 +540,7 @@ VALUES = st.sampled_from(
     ]
 )
 GIVEN = st.dictionaries(PORTS, VALUES, max_size=4)
-LEAF = st.builds(lambda tag, given: (tag, given, []), TAGS, GIVEN)
+LEAF: st.SearchStrategy[Any] = st.builds(lambda tag, given: (tag, given, []), TAGS, GIVEN)
 ELEMENTS = st.recursive(
     LEAF, lambda inner: st.tuples(TAGS, GIVEN, st.lists(inner, min_size=1, max_size=4)), max_leaves=8
 )
