@@ -16,8 +16,9 @@ from rbxcompose.manifest.registry import sections as registered
 from rbxcompose.manifest.section import Section
 from rbxcompose.missions.program.registry import StepType, kinds
 from rbxcompose.sdk.registry import PLUGINS, component_type
+from rbxcompose.tools.behaviour_trees.nodes import table as behaviour_trees
 
-PAGES = ("architecture.md", "language.md", "missions.md")
+PAGES = ("architecture.md", "how_to.md", "language.md", "missions.md")
 BLOCK = re.compile(r"(<!-- made by `make docs`: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 """Words between such comments are written by a program."""
 
@@ -86,6 +87,7 @@ def few_words(kind: StepType) -> str:
 
 
 TABLES: Mapping[str, Callable[[], str]] = {
+    "behaviour_trees": behaviour_trees,
     "components": components,
     "families": families,
     "nodes": nodes,

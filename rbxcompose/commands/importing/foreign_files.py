@@ -21,7 +21,11 @@ from rbxcompose.manifest.tree import KEY, Entry, MappingNode, ScalarNode, Sequen
 from rbxcompose.manifest.walk import TAG
 
 PYTHON_OBJECT = kind("RBX2292", Severity.WARNING)
+<<<<<<< HEAD
 _AS_TEXT = (".srdf", ".urdf", ".xml", ".launch", ".py")  # others are YAML
+=======
+_XML = (".srdf", ".urdf", ".xml")
+>>>>>>> bt
 _PYTHON = "!!python/"
 _OF_YAML = ("str", "int", "float", "bool", "null", "seq", "map")
 _OF_PYTHON = ("unicode", "str", "bytes", "int", "long", "float", "bool", "none", "tuple", "list", "dict")
@@ -45,15 +49,17 @@ class FreeNames:
 
     def __init__(self) -> None:
         self._taken: set[str] = set()
+        self._counts: dict[str, int] = {}  # how often each was wanted that was taken
 
     def take(self, wanted: str, otherwise: str) -> str:
         """Return the name that is most like a wanted one and not taken; `otherwise` if none is like it."""
         name = first = name_like(wanted) or otherwise
-        count = 1
+        count = self._counts.get(first, 1)
         while name in self._taken:
             count += 1
             end = f"_{count}"
             name = f"{first[: LONGEST_NAME - len(end)]}{end}"
+        self._counts[first] = count
         self._taken.add(name)
         return name
 

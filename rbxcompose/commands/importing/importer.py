@@ -9,6 +9,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Report, Severity, kind
 from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
 from rbxcompose.commands.importing.foreign_files import ForeignFile
+from rbxcompose.manifest.files import ROBOT_FILE
 
 NOT_CARRIED_OVER = kind("RBX2230", Severity.WARNING)
 OTHER_PROGRAM = kind("RBX2231")
@@ -25,6 +26,7 @@ _IMPORTERS: dict[str, Importer] = {}  # those that have been imported, by name
 
 @dataclass(frozen=True, slots=True)
 class ImportedFiles:
+<<<<<<< HEAD
     """The text of a manifest, empty if nothing could be read, and the files beside it by name.
 
     `included` are the texts of further files that were read, by their names in findings.
@@ -33,6 +35,13 @@ class ImportedFiles:
     text: str
     beside: Mapping[str, str] = field(default_factory=dict)
     included: Mapping[str, str] = field(default_factory=dict)
+=======
+    """The text of a manifest, empty if nothing could be read, the files beside it by name, and its own name."""
+
+    text: str
+    beside: Mapping[str, str] = field(default_factory=dict)
+    file: str = ROBOT_FILE
+>>>>>>> bt
 
 
 Import = Callable[[Sequence[ForeignFile], str, Report], str | ImportedFiles]

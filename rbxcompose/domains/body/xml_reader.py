@@ -1,4 +1,4 @@
-"""The text of a URDF file, read strictly into located elements: whether it is XML and the root is a robot."""
+"""Texts of XML files, read strictly into located elements: whether they are XML, and of a URDF its root."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Related, Span, kind, once
+from rbxcompose.base.findings import Finding, FindingKind, Related, Span, kind, once
 from rbxcompose.base.printable import plain
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.tree import DEPTH, URDF_ELEMENTS
@@ -83,6 +83,7 @@ def read_urdf(text: str, file: str) -> XmlElement | Finding:
 
     `file` is its name in findings. Elements that carry a `PLACE` have that instead of their own.
     """
+<<<<<<< HEAD
     return _read(text, file, is_urdf=True)
 
 
@@ -94,6 +95,27 @@ def read_xml(text: str, file: str) -> XmlElement | Finding:
 def _read(text: str, file: str, *, is_urdf: bool) -> XmlElement | Finding:
     try:
         return _Reader(file, is_urdf=is_urdf).read(text)
+=======
+    return read_xml(text, file, URDF)
+
+
+@dataclass(frozen=True, slots=True)
+class XmlFormat:
+    """A kind of XML files: the name of its root, what findings call a file, and the kind of those about its root."""
+
+    root: str
+    what: str
+    wrong: FindingKind
+
+
+URDF = XmlFormat(ROOT, "a URDF file", NOT_URDF)
+
+
+def read_xml(text: str, file: str, format_: XmlFormat) -> XmlElement | Finding:
+    """Return the root of a text of this format, or the first mistake that keeps it from being one."""
+    try:
+        return _Reader(file, format_).read(text)
+>>>>>>> bt
     except _RefusedError as refused:
         return refused.finding
 
@@ -109,8 +131,14 @@ class _RefusedError(Exception):
 class _Reader:
     """Builds the tree, within limits."""
 
+<<<<<<< HEAD
     def __init__(self, file: str, *, is_urdf: bool) -> None:
         self.file, self.is_urdf = file, is_urdf
+=======
+    def __init__(self, file: str, format_: XmlFormat) -> None:
+        self.file = file
+        self.format = format_
+>>>>>>> bt
         self.open: list[XmlElement] = []
         self.root: XmlElement | None = None
         self.elements = 0
@@ -143,6 +171,7 @@ class _Reader:
             raise _RefusedError(NOT_XML.at(self._here("<?xml"), message, help='write encoding="utf-8"'))
 
     def _doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
+<<<<<<< HEAD
         what = "a URDF" if self.is_urdf else "this"
         raise _RefusedError(NOT_XML.at(self._here(" "), f"{what} file may not have a DOCTYPE", help="remove it"))
 
@@ -152,6 +181,18 @@ class _Reader:
             message = f"the root of a URDF file is '<{ROOT}>', and here it is '<{plain(name, _SHOWN)}>'"
             raise _RefusedError(NOT_URDF.at(self._tag(name), message))
         if self.is_urdf and name.startswith(XACRO):
+=======
+        raise _RefusedError(NOT_XML.at(self._here(" "), f"{self.format.what} may not have a DOCTYPE", help="remove it"))
+
+    def _begun(self, name: str, attributes: dict[str, str]) -> None:
+        self.elements += 1
+        if not self.open and name != self.format.root:
+            message = (
+                f"the root of {self.format.what} is '<{self.format.root}>', and here it is '<{plain(name, _SHOWN)}>'"
+            )
+            raise _RefusedError(self.format.wrong.at(self._tag(name), message))
+        if name.startswith(XACRO):
+>>>>>>> bt
             help_text = "expand it first: 'xacro FILE.xacro -o FILE.urdf'"
             raise _RefusedError(NOT_URDF.at(self._tag(name), "xacro must expand this file first", help=help_text))
         if len(self.open) >= DEPTH:

@@ -1,7 +1,8 @@
-"""Write a system for what keeps it alive, or a robot for ROS 2 or MoveIt.
+"""Write a system for what keeps it alive, a robot for ROS 2 or MoveIt, or a mission as a tree.
 
 `systemd`, `compose` and `k8s` write units, a Compose file and manifests of Kubernetes; `srdf` is for MoveIt.
 `ros2` writes packages for a workspace: messages, and for each robot a launch file for RViz or Foxglove.
+`bt` writes a mission, with those that it uses, as trees of BehaviorTree.CPP 4.
 
 The files go to a new or empty folder; `srdf` writes a URDF and an SRDF.
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
@@ -15,7 +16,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from rbxcompose import __version__
-from rbxcompose.base.findings import Finding, kind
+from rbxcompose.base.findings import Finding, Report, kind
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.options import is_system, out_option
 from rbxcompose.compiler.compile import Compilation, compile_robot
@@ -27,14 +28,14 @@ from rbxcompose.tools.exporting.exported_share import shares
 
 GROUP = "system"
 NOT_EXPORTED = kind("RBX6115")
-SRDF, ROS2 = "srdf", "ros2"
-PROGRAMS = ("systemd", "compose", "k8s", ROS2, SRDF)
+SRDF, ROS2, BT = "srdf", "ros2", "bt"
+PROGRAMS = ("systemd", "compose", "k8s", ROS2, SRDF, BT)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("program", choices=PROGRAMS, help="for which program")
-    parser.add_argument("path", metavar="SYSTEM", help="the file of the system; for srdf a robot, for ros2 either")
+    parser.add_argument("path", metavar="SYSTEM", help="the file: a system; srdf: a robot; ros2: either; bt: a mission")
     out_option("a new or empty folder", metavar="FOLDER", required=True)(parser)
     parser.add_argument("--host", metavar="NAME", help="only what this host runs")
     parser.add_argument("--profile", action="append", default=[], metavar="P", help="apply this profile of the system")
@@ -51,6 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
         return _export_robot(arguments)
     if arguments.program == ROS2:
         return _ros2(arguments)
+    if arguments.program == BT:
+        return _export_mission(arguments)
     if not is_system(arguments.path):
         return refuse(NOT_EXPORTED.at(None, f"'{arguments.path}' is not the file of a system"))
     system = compile_system(arguments.path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
@@ -102,6 +105,15 @@ def _export_robot(arguments: argparse.Namespace) -> int:
     if not made:
         return refuse(NOT_EXPORTED.at(None, f"'{manifest.name}' has no body"))
     return _finish(arguments, _encoded(made))
+
+
+def _export_mission(arguments: argparse.Namespace) -> int:
+    from rbxcompose.tools.exporting.behaviour_tree import exported  # imports the importer of trees
+
+    report, sources = Report(), dict[str, str]()
+    made = exported(Path(arguments.path), report, sources)
+    write_report(report, sources)
+    return _finish(arguments, _encoded(made)) if made else FINDINGS
 
 
 def _made(system: System, arguments: argparse.Namespace) -> dict[str, bytes]:
