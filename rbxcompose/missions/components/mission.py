@@ -145,7 +145,7 @@ class Mission(Component[MissionConfig]):
         from rbxcompose.missions.execution.missions import Broadcast, RunningMissions
         from rbxcompose.missions.execution.ordered import OrderedMission
         from rbxcompose.missions.execution.topic_skills import Desks
-        from rbxcompose.missions.execution.triggering import Triggering
+        from rbxcompose.missions.execution.triggers import Triggering
         from rbxcompose.missions.execution.world import Arrivals, RobotWorld
 
         self.arrivals, self.desks = Arrivals(self.config.values), Desks(self)
