@@ -21,7 +21,7 @@ A = TypeVar("A")
 
 ON_SYSTEM = requests.MISSION
 _PERIOD = 0.2  # [s] between two requests to a robot that is followed
-_FORMATS = "text", "mermaid", "dot", "html"
+_FORMATS = "text", "tree", "mermaid", "dot", "html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -75,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             deferred(files, "replay_log"),
             again,
         ),
-        ("show", "draw a mission; a running one with the states of its nodes", deferred(files, "show"), drawn),
+        ("show", "say or draw a mission; a running one with the states of its nodes", deferred(files, "show"), drawn),
         ("skills", "list the skills that missions may use on a robot", deferred(files, "skills"), (robot, json_)),
         ("explore", "look for dead ends by trying everything that may happen", deferred(files, "explore"), explored),
     )
