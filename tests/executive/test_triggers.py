@@ -84,6 +84,7 @@ class Triggered:
         self.bench.advance(2.0)
 
 
+@pytest.mark.timeout(100)
 def test_a_time_of_day_starts_a_mission_each_week(tmp_path: Path) -> None:
     nightly = 'nightly: {at: "22:00", on: [mon, fri], mission: greet, with: {times: 2}}'
     robot = Triggered(tmp_path, nightly, is_alone=True)

@@ -134,6 +134,7 @@ def test_every_node_is_said_once_below_the_one_that_contains_it(case: Case) -> N
     assert sorted(one.number for one in drawn if one.number is not None) == [node.number for node in linked.nodes]
     assert all(one.sentence and one.place for one in drawn)
     assert len(places(picture)) == len(drawn)
+    assert picture_of(linked, RANDOM) == picture  # as a running mission has it
     assert all(child.place == f"{one.place}.{at}" for one in drawn for at, child in enumerate(one.children, 1))
     assert len(mission_sentences(picture).splitlines()) == len(drawn) + 1
 

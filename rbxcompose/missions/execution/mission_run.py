@@ -93,7 +93,7 @@ class MissionRun:
         self._inputs, self._settings = inputs, settings
 
     def _placed(self, record: LogRecord) -> LogRecord:
-        """Return a record with time and mission; of a node, with its sentence, so that people find it: `1.2 Go to dock`."""
+        """Return a record with time and mission; one of a node has its sentence, too: `1.2 Go to dock`."""
         number = record.get("leaf", record.get("node"))
         step = {} if number is None else {"step": self._sentences[number]}
         return {"time": self._now, "mission": self.name, **record, **step}

@@ -64,6 +64,7 @@ class Triggers:
         self.started: dict[str, float] = {}  # wall-clock time of the last start [s], by trigger
         self._looked: tuple[float, float] | None = None  # robot time and wall-clock time of the last look
         self._done: dict[str, deque[float]] = {name: deque(maxlen=_REMEMBERED) for name in triggers}
+        self._next_due: dict[str, tuple[float, float | None]] = {}  # by trigger: a time, and what is due next after it
         self._held: dict[str, bool] = {}  # whether the condition of a trigger held
         self._fired_at: dict[str, float] = {}  # robot time
         self._hasty: set[str] = set()  # those of which it was told that they fired too soon again
@@ -96,12 +97,11 @@ class Triggers:
 
     def _is_due(self, trigger: Trigger, since: float, wall: float) -> bool:
         found, done = False, self._done[trigger.name]
-        due = trigger.schedule.next(since, self._local) if trigger.schedule else None
-        while trigger.schedule and due is not None and due <= wall + _ROUNDING:
+        while (due := self.next_time(trigger.name, since)) is not None and due <= wall + _ROUNDING:
             if due not in done:
                 done.append(due)
                 found = True
-            due = trigger.schedule.next(due, self._local)
+            since = due
         return found
 
     def condition(self, name: str, holds: bool, now: float, effects: Effects, *, after: bool | None = None) -> None:
@@ -194,9 +194,14 @@ class Triggers:
     # When to look again
 
     def next_time(self, name: str, wall: float) -> float | None:
-        """Return the wall-clock time at which a trigger is due next [s]; None if no time of day causes it."""
-        schedule = self._triggers[name].schedule
-        return schedule.next(wall, self._local) if schedule else None
+        """Return the wall-clock time at which a trigger is due next after `wall` [s]; None if it never is."""
+        if (schedule := self._triggers[name].schedule) is None:
+            return None
+        after, due = self._next_due.get(name, (wall, wall))
+        if due is not None and not after <= wall < due:  # nothing is due between the two
+            due = schedule.next(wall, self._local)
+            self._next_due[name] = (wall, due)
+        return due
 
     def next_look(self, now: float, wall: float) -> float | None:
         """Return the robot time of the next look at the wall clock [s]; None if nothing depends on it."""
