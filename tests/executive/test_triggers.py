@@ -88,9 +88,9 @@ class Triggered:
 def test_a_time_of_day_starts_a_mission_each_week(tmp_path: Path) -> None:
     nightly = 'nightly: {at: "22:00", on: [mon, fri], mission: greet, with: {times: 2}}'
     robot = Triggered(tmp_path, nightly, is_alone=True)
-    robot.bench.advance(14 * DAY)  # the first day of virtual time is a Thursday
+    robot.bench.advance(9 * DAY)  # the first day of virtual time is a Thursday
     begun = [float(line.split()[0]) for line in robot.told if "starts" in line]
-    assert begun == [day * DAY + 22 * 3600 for day in (1, 4, 8, 11)]
+    assert begun == [day * DAY + 22 * 3600 for day in (1, 4, 8)]
     assert robot.told[:2] == ["165600 trigger nightly (at 22:00 on mon, fri) starts mission greet", "165600 Hello 2"]
 
 
