@@ -6,6 +6,7 @@ nothing else; wall-clock stamps are data for people and other programs, never a 
 
 import time
 from collections import deque
+from datetime import UTC, datetime
 from enum import Enum, auto
 from typing import Protocol
 
@@ -27,6 +28,16 @@ class Clock(Protocol):
     def stamp(self) -> int:
         """Return the time to write into messages [ns]: since the Unix epoch, or robot time if stepped."""
         ...
+
+
+def local_time(seconds: float) -> datetime:
+    """Return what a wall clock of this host shows, without its zone, at a time since the Unix epoch [s]."""
+    return datetime.fromtimestamp(seconds)
+
+
+def universal_time(seconds: float) -> datetime:
+    """Return the same in UTC, which is the time of day on a clock that is not real: on all hosts alike."""
+    return datetime.fromtimestamp(seconds, UTC).replace(tzinfo=None)
 
 
 class MonotonicClock:

@@ -1,9 +1,10 @@
 """Filling in `${...}` after composition: arguments, the robot's name, the environment, expressions."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import field, replace
 from operator import is_
+from types import MappingProxyType
 from typing import NamedTuple, TypeVar
 
 from rbxcompose.base.config import Secret
@@ -175,13 +176,30 @@ _ENVIRONMENT = re.compile(r"\s*env\.(?P<name>[A-Za-z_][A-Za-z0-9_]*)(:(?P<mode>[
 _parsed = once(parse_fill)  # many settings name the same argument
 
 
-def fill(root: tree.MappingNode, names: Names, report: Report, *, runs: bool = False) -> tree.MappingNode:
+def fill(
+    root: tree.MappingNode,
+    names: Names,
+    report: Report,
+    *,
+    runs: bool = False,
+    running: Mapping[str, Collection[str]] = MappingProxyType({}),
+) -> tree.MappingNode:
     """Return the tree with every `${...}` filled in; `runs` means that `$name` has a meaning in it (missions).
+
+    `running` are the keys in entries of sections in which it has a meaning as well.
 
     A scalar that is nothing but `${...}` holds the typed value in `filled`, or becomes the list or map that it names;
     one that could not be filled in holds `BROKEN`.
     """
-    return _Filler(names, report, runs).mapping(root)
+    filler = _Filler(names, report, runs)
+    filler.running = {id(node) for section, keys in running.items() for node in _values_at(root.get(section), keys)}
+    return filler.mapping(root)
+
+
+def _values_at(section: TreeNode | None, keys: Collection[str]) -> Iterator[TreeNode]:
+    entries = section.entries.values() if isinstance(section, tree.MappingNode) else ()
+    inner = (entry.value for entry in entries if isinstance(entry.value, tree.MappingNode))
+    yield from (node.entries[key].value for node in inner for key in keys if key in node)
 
 
 class _Filler:
@@ -191,6 +209,7 @@ class _Filler:
         self.names = names
         self.report = report
         self.runs = runs
+        self.running: set[int] = set()  # identities of scalars in which `$name` has a meaning
         self.scope = ""
         self.known = names.known("")
         self.left = ALL_BYTES  # how much the tree may still grow
@@ -271,10 +290,11 @@ class _Filler:
             cure = cure_of(piece["verb"], piece["of"], self.known, runs=self.runs)
             return self.foreign(scalar, piece, message, cure)
         body, name = piece["body"], piece["name"]
+        runs = self.runs or id(scalar) in self.running
         if body is None and name:
-            return None if self.runs else self.running_name(scalar, piece)
+            return None if runs else self.running_name(scalar, piece)
         if body is None:
-            return None if self.runs else "$"
+            return None if runs else "$"
         span = part_span(scalar, piece.start(), piece.end())
         if not piece["end"]:
             self.report.add(SYNTAX.at(span, "this '${' is never closed", help="write '}' at its end"))

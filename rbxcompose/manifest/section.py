@@ -309,6 +309,8 @@ class Declaration(Generic[M]):
     short: Short | None = None
     stand_in: Callable[[str], object] = lambda name: name
     """Returns what a name means that could not be read."""
+    running: frozenset[str] = frozenset()
+    """Keys of an entry whose text is an expression for the running robot: `$name` is looked up then."""
     needs: str = ""
     """The key that every new entry in an overlay has; an entry without it was meant to change an existing one."""
     scope: SetScope = SetScope.ANYTHING

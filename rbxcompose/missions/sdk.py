@@ -6,6 +6,7 @@ from rbxcompose.base.expressions.text import Template
 from rbxcompose.base.expressions.tree import Expression, Number
 from rbxcompose.base.expressions.types import UNKNOWN, Type, TypeKind
 from rbxcompose.base.expressions.values import NotArrivedError, Value
+from rbxcompose.base.expressions.words import condition_in_words
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.facts import is_simple, is_sure, takes_time
 from rbxcompose.missions.engine.events import Logged, Reported, SkillEnded, SkillStarted, Transition
@@ -87,3 +88,11 @@ from rbxcompose.missions.program.outcomes import (
 )
 from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames, Step, Target
 from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.sentences import (
+    argument_in_words,
+    logged_in_words,
+    says,
+    set_in_words,
+    spoken,
+    times_in_words,
+)

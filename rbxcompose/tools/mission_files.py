@@ -32,11 +32,17 @@ from rbxcompose.missions.view.picture import MissionPicture, picture_from_data, 
 from rbxcompose.missions.view.replica import joined, status_list
 from rbxcompose.sdk.skills import skill_names
 from rbxcompose.tools.inspection.mission_html import mission_html
-from rbxcompose.tools.inspection.mission_text import mission_dot, mission_mermaid, mission_text
+from rbxcompose.tools.inspection.mission_text import mission_dot, mission_mermaid, mission_sentences, mission_text
 from rbxcompose.tools.mission_tests.explorer import ExplorationLimits, text_of
 from rbxcompose.tools.mission_tests.explorer import explore as explore_program
 
-FORMATS = {"text": mission_text, "mermaid": mission_mermaid, "dot": mission_dot, "html": mission_html}
+FORMATS = {
+    "text": mission_sentences,
+    "tree": mission_text,
+    "mermaid": mission_mermaid,
+    "dot": mission_dot,
+    "html": mission_html,
+}
 USAGE = 2
 _SAMPLES: Mapping[str, str] = {"TEXT": "hello", "FLAG": "true", "COUNT": "2", "PLACE": "dock", "POSE": "dock"}
 NO_MISSION = kind("RBX9040")
@@ -44,7 +50,7 @@ _LARGEST = 16_000_000  # [B] largest log that is replayed
 _MOST_VALUES = 1_500_000  # in it, as far as they are easily counted
 _MOST_RUNS = 10_000
 _DEEPEST = 200  # levels of lists and maps in a record, which are twice those of the values in it
-_OWN = ("mission", "run")  # keys of a record that identify its run
+_OWN = ("mission", "run", "step")  # keys of a record that tell of which run and which node it is
 NO_LOG = kind("RBX9041")
 
 

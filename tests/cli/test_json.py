@@ -63,6 +63,7 @@ MISTAKES = {
     "mission run": "patrol",
     "mission skills": "nowhere.yaml",
     "mission status": "",
+    "mission triggers": "",
     "mission watch": "",
     "mux add": "teleop",
     "mux delete": "teleop",

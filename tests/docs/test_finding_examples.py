@@ -79,7 +79,7 @@ def examples(kind: FindingKind) -> dict[str, str]:
 def compiled(kind: FindingKind, text: str, folder: Path) -> Checked:
     above, depth = STANDS_BELOW.get(kind.code, ("", 0))
     fragment = above + textwrap.indent(text, " " * depth)
-    if kind.code.startswith(OF_MISSIONS) and not fragment.startswith(("missions:", "values:")):
+    if kind.code.startswith(OF_MISSIONS) and not fragment.startswith(("missions:", "values:", "triggers:")):
         return check_mission(HEADER + fragment, folder)
     robot = with_sections(ROBOT, fragment)
     return check_robot(robot, folder, profiles=profiles_of(fragment), real=kind.code.startswith("RBX80"))

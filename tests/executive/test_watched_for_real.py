@@ -112,7 +112,7 @@ def test_a_viewer_follows_a_mission_also_over_the_death_of_its_process(robot: Ro
         assert watching.missions.is_complete
         (tree,) = json.loads(robot.do("top", "--json"))["missions"]
         assert (tree["mission"], tree["state"], tree["running"][0]) == ("count", "running", "▶ repeat")
-        assert "▶ repeat" in robot.do("mission", "show", "count")
+        assert "▶ 1 Repeat for ever:" in robot.do("mission", "show", "count")
         guest.run(lambda: False, 0.0)
         counted = watching.round
         os.kill(

@@ -39,11 +39,12 @@ from rbxcompose.missions.sdk import (
     dataclass,
     duration,
     kind,
+    says,
     started,
 )
 from rbxcompose.missions.view.picture import picture_of
 from rbxcompose.tools.inspection.mission_html import mission_html
-from rbxcompose.tools.inspection.mission_text import mission_text
+from rbxcompose.tools.inspection.mission_text import mission_sentences, mission_text
 from rbxcompose.tools.mission_tests.coverage import Coverage, SeenWays
 from rbxcompose.tools.mission_tests.explorer import ExplorationLimits, explore
 from tests.missions.simulated import ROBOT, Simulated, program_of, tree
@@ -92,6 +93,7 @@ class Persist(Loop):
     waits = True
     flow = NodeFlow.ONE_OF
     look = NodeLook("∞")
+    sentence = says("Try {most} times, {gap} apart")
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         return endings.of(node.children[0]) if node.children else ANY
@@ -172,6 +174,10 @@ def test_coverage_counts_its_ways() -> None:
 
 def test_it_is_drawn() -> None:
     picture = picture_of(program_of(TEXT), ROBOT)
+    assert mission_sentences(picture).splitlines()[1:] == [
+        "1 Try 2 times, 1 s apart; for at most 1 min:",
+        "  1.1 Go to dock",
+    ]
     assert mission_text(picture).splitlines()[1:] == ["persist 2, 1 s  (timeout 1 min)", "  go_to dock"]
     assert '<i class="sign">∞</i>' in mission_html(picture)
 
@@ -211,7 +217,7 @@ class Silent(Deed):
 
 
 def test_a_kind_that_leaves_something_unanswered_is_refused_and_a_type_error() -> None:
-    with pytest.raises(TypeError, match="the kind 'silent' does not answer may_end"):
+    with pytest.raises(TypeError, match="the kind 'silent' does not answer may_end, sentence"):
         kind("silent", SilentTask)(Silent)  # type: ignore[type-abstract]
     with pytest.raises(TypeError, match="abstract"):
         Silent()  # type: ignore[abstract]

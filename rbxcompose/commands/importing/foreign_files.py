@@ -21,11 +21,7 @@ from rbxcompose.manifest.tree import KEY, Entry, MappingNode, ScalarNode, Sequen
 from rbxcompose.manifest.walk import TAG
 
 PYTHON_OBJECT = kind("RBX2292", Severity.WARNING)
-<<<<<<< HEAD
 _AS_TEXT = (".srdf", ".urdf", ".xml", ".launch", ".py")  # others are YAML
-=======
-_XML = (".srdf", ".urdf", ".xml")
->>>>>>> bt
 _PYTHON = "!!python/"
 _OF_YAML = ("str", "int", "float", "bool", "null", "seq", "map")
 _OF_PYTHON = ("unicode", "str", "bytes", "int", "long", "float", "bool", "none", "tuple", "list", "dict")

@@ -26,8 +26,7 @@ _IMPORTERS: dict[str, Importer] = {}  # those that have been imported, by name
 
 @dataclass(frozen=True, slots=True)
 class ImportedFiles:
-<<<<<<< HEAD
-    """The text of a manifest, empty if nothing could be read, and the files beside it by name.
+    """The text of a manifest, empty if nothing could be read, the files beside it by name, and its own name.
 
     `included` are the texts of further files that were read, by their names in findings.
     """
@@ -35,13 +34,7 @@ class ImportedFiles:
     text: str
     beside: Mapping[str, str] = field(default_factory=dict)
     included: Mapping[str, str] = field(default_factory=dict)
-=======
-    """The text of a manifest, empty if nothing could be read, the files beside it by name, and its own name."""
-
-    text: str
-    beside: Mapping[str, str] = field(default_factory=dict)
     file: str = ROBOT_FILE
->>>>>>> bt
 
 
 Import = Callable[[Sequence[ForeignFile], str, Report], str | ImportedFiles]

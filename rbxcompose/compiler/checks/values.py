@@ -13,7 +13,9 @@ from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import Wrong, is_written
 from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, resolve
+from rbxcompose.compiler.model.triggers import condition_of
 from rbxcompose.compiler.model.values import fitting_kinds
+from rbxcompose.compiler.sections.triggers import triggers
 from rbxcompose.compiler.sections.values import ValueModel
 from rbxcompose.missions.analysis.effects import called, published
 from rbxcompose.missions.analysis.facts import Constants, number_of
@@ -208,10 +210,12 @@ def _missing(robot: Robot, name: str, source: str) -> Wrong | None:
     return None
 
 
-@check("RBX3012", Severity.WARNING, closed=(MISSIONS,))
+@check("RBX3012", Severity.WARNING, closed=(MISSIONS, triggers.name))
 def unread_value(robot: Robot) -> Iterator[Finding]:
     """A value that no mission reads."""
-    read = frozenset[str]().union(*(mission.program.reads for mission in robot.missions.values()))
+    conditions = (condition_of(robot, name)[0] for name in triggers.names_in(robot.manifest.root))
+    read = frozenset(name.name for one in conditions if one for name in one.names)
+    read = read.union(*(mission.program.reads for mission in robot.missions.values()))
     given = frozenset[str]().union(*(part.values for part in robot.manifest.parts.values()))
     for name in robot.manifest.values if robot.missions else ():
         if name not in read | given:

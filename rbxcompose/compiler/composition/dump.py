@@ -14,7 +14,7 @@ from rbxcompose.base.units import UNITS, Dimension, Quantity, UnitError, format_
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.sections.args import args
 from rbxcompose.manifest.files import PREFIX, library_root, project_of, resolve
-from rbxcompose.manifest.registry import sections_in_use
+from rbxcompose.manifest.registry import section_named, sections_in_use
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.section import ROBOT
 from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
@@ -72,7 +72,7 @@ def _lines(node: TreeNode, path: KeyPath, begin: str, indent: str, note: Note) -
     behind = f"  # {comment}" if comment else ""
     match node:
         case ScalarNode():
-            yield f"{indent}{begin} {_scalar(node)}".rstrip() + behind
+            yield f"{indent}{begin} {_scalar(node, is_running=_is_running(path))}".rstrip() + behind
         case MappingNode() if not node.entries:
             yield f"{indent}{begin} {{}}{behind}"
         case SequenceNode() if not node.items:
@@ -92,8 +92,16 @@ def _mapping(node: MappingNode, path: KeyPath, indent: str, note: Note) -> Itera
         yield from _lines(entry.value, (*path, name), f"{key}:", indent, note)
 
 
-def _scalar(scalar: ScalarNode) -> str:
+def _is_running(path: KeyPath) -> bool:
+    """Return whether a text is for the running robot, so that `$name` has a meaning in it."""
+    section = section_named(str(path[0])) if len(path) == len(("section", "entry", "key")) else None
+    return section is not None and path[-1] in section.running
+
+
+def _scalar(scalar: ScalarNode, *, is_running: bool) -> str:
     match scalar.filled:
+        case None if is_running:
+            return _text(scalar.text, scalar.plain)
         case None:
             return _text(scalar.text.replace("$", "$$"), scalar.plain)
         case bool():

@@ -58,7 +58,8 @@ def fill_scopes(composed: Composed, names: Names) -> FilledScopes:
         may_have = (lambda name: True) if args.is_unreadable(instance.arguments) else None
         names = with_arguments(names, _given_values(instance, declared, names, report), instance.name, may_have)
     others = {name: entry for name, entry in root.entries.items() if name != args.name}
-    filled = {**arguments.entries, **fill(replace(root, entries=others), names, report).entries}
+    running = {section.name: section.running for section in sections_in_use(ROBOT) if section.running}
+    filled = {**arguments.entries, **fill(replace(root, entries=others), names, report, running=running).entries}
     return FilledScopes(replace(root, entries={name: filled[name] for name in root.entries}), include, bounds)
 
 

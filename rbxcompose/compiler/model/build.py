@@ -21,6 +21,7 @@ from rbxcompose.compiler.model.robot import (
     resolve,
 )
 from rbxcompose.compiler.model.skills import names_of_skills, services_of, skills_of, topics_of
+from rbxcompose.compiler.model.triggers import findings_about, triggers_of
 from rbxcompose.compiler.model.values import value_of
 from rbxcompose.compiler.sections.missions import missions
 from rbxcompose.manifest.registry import sections_in_use
@@ -123,6 +124,7 @@ def build_robot(
         **outside.services
     }
     robot = Robot(manifest, components, values, skills, missions.read, missions.unread, topics, services, outside)
+    report.extend(findings_about(robot))
     if manifest.missions:
         return replace(robot, components={**components, MISSION: mission_component(robot)})
     return robot
@@ -215,6 +217,7 @@ def mission_component(robot: Robot) -> RobotComponent:
         "topics": {name: topic for name, topic in robot.topics.items() if name in published},
         "services": {name: service for name, service in robot.services.items() if name in called},
         "settings": {name: types for name, types in robot.settings.items() if f"{name}/change_parameters" in called},
+        "triggers": triggers_of(robot),
         "for_others": any(end.type_name == RUN_MISSION for one in robot.components.values() for end in one.ends),
     }
     return _own(manifest, MISSION, config)

@@ -83,19 +83,6 @@ def read_urdf(text: str, file: str) -> XmlElement | Finding:
 
     `file` is its name in findings. Elements that carry a `PLACE` have that instead of their own.
     """
-<<<<<<< HEAD
-    return _read(text, file, is_urdf=True)
-
-
-def read_xml(text: str, file: str) -> XmlElement | Finding:
-    """Return the root of any other XML, or the first mistake that keeps a text from being that."""
-    return _read(text, file, is_urdf=False)
-
-
-def _read(text: str, file: str, *, is_urdf: bool) -> XmlElement | Finding:
-    try:
-        return _Reader(file, is_urdf=is_urdf).read(text)
-=======
     return read_xml(text, file, URDF)
 
 
@@ -109,13 +96,14 @@ class XmlFormat:
 
 
 URDF = XmlFormat(ROOT, "a URDF file", NOT_URDF)
+ANY = XmlFormat("", "this file", NOT_XML)
+"""XML with any root."""
 
 
-def read_xml(text: str, file: str, format_: XmlFormat) -> XmlElement | Finding:
+def read_xml(text: str, file: str, format_: XmlFormat = ANY) -> XmlElement | Finding:
     """Return the root of a text of this format, or the first mistake that keeps it from being one."""
     try:
         return _Reader(file, format_).read(text)
->>>>>>> bt
     except _RefusedError as refused:
         return refused.finding
 
@@ -131,14 +119,9 @@ class _RefusedError(Exception):
 class _Reader:
     """Builds the tree, within limits."""
 
-<<<<<<< HEAD
-    def __init__(self, file: str, *, is_urdf: bool) -> None:
-        self.file, self.is_urdf = file, is_urdf
-=======
     def __init__(self, file: str, format_: XmlFormat) -> None:
         self.file = file
         self.format = format_
->>>>>>> bt
         self.open: list[XmlElement] = []
         self.root: XmlElement | None = None
         self.elements = 0
@@ -171,28 +154,16 @@ class _Reader:
             raise _RefusedError(NOT_XML.at(self._here("<?xml"), message, help='write encoding="utf-8"'))
 
     def _doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
-<<<<<<< HEAD
-        what = "a URDF" if self.is_urdf else "this"
-        raise _RefusedError(NOT_XML.at(self._here(" "), f"{what} file may not have a DOCTYPE", help="remove it"))
-
-    def _begun(self, name: str, attributes: dict[str, str]) -> None:
-        self.elements += 1
-        if self.is_urdf and not self.open and name != ROOT:
-            message = f"the root of a URDF file is '<{ROOT}>', and here it is '<{plain(name, _SHOWN)}>'"
-            raise _RefusedError(NOT_URDF.at(self._tag(name), message))
-        if self.is_urdf and name.startswith(XACRO):
-=======
         raise _RefusedError(NOT_XML.at(self._here(" "), f"{self.format.what} may not have a DOCTYPE", help="remove it"))
 
     def _begun(self, name: str, attributes: dict[str, str]) -> None:
         self.elements += 1
-        if not self.open and name != self.format.root:
+        if self.format.root and not self.open and name != self.format.root:
             message = (
                 f"the root of {self.format.what} is '<{self.format.root}>', and here it is '<{plain(name, _SHOWN)}>'"
             )
             raise _RefusedError(self.format.wrong.at(self._tag(name), message))
-        if name.startswith(XACRO):
->>>>>>> bt
+        if self.format.root and name.startswith(XACRO):
             help_text = "expand it first: 'xacro FILE.xacro -o FILE.urdf'"
             raise _RefusedError(NOT_URDF.at(self._tag(name), "xacro must expand this file first", help=help_text))
         if len(self.open) >= DEPTH:

@@ -15,10 +15,11 @@ from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
 from rbxcompose.missions.engine.world import POSE, World
 from rbxcompose.missions.execution import requests
 from rbxcompose.missions.execution.errands import ENDS, PUBLISHES, VALUE, port_name
-from rbxcompose.missions.execution.ports import EVENTS, ports_for
+from rbxcompose.missions.execution.ports import EVENTS, TRIGGER, ports_for, ports_of_triggers
 from rbxcompose.missions.program.outcomes import IDLE, Result
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of
+from rbxcompose.missions.triggers.trigger import Trigger
 from rbxcompose.msgs.rbxcompose_msgs import RunMission
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.sdk import (
@@ -73,11 +74,14 @@ class MissionConfig(Config):
     """The types of settings that missions change."""
     for_others: bool = False
     """Whether components run missions, by the action `run_mission`."""
+    triggers: dict[str, Made[Trigger]] = {}
+    """What starts missions by itself, by name."""
 
     @property
     def reads(self) -> frozenset[str]:
-        """Return all names that missions read."""
-        return frozenset[str]().union(*(program.reads for program in self.programs.values()))
+        """Return all names that missions and triggers read."""
+        names = frozenset[str]().union(*(program.reads for program in self.programs.values()))
+        return names.union(*(trigger.reads for trigger in self.triggers.values()))
 
     @property
     def used(self) -> dict[str, SkillSource]:
@@ -103,9 +107,9 @@ class MissionConfig(Config):
 
 @component("mission")
 class Mission(Component[MissionConfig]):
-    """Runs missions; each action of the robot is a skill. One mission starts by itself; people start others beside it.
+    """Runs missions; each action of the robot is a skill. One starts by itself; people and triggers start others.
 
-    It is made of the sections `missions`, `start`, `values` and `places`.
+    It is made of the sections `missions`, `start`, `triggers`, `values` and `places`.
 
     Example:
         executive: {type: mission}
@@ -124,7 +128,7 @@ class Mission(Component[MissionConfig]):
     def ports(cls, config: MissionConfig) -> dict[str, Port[Any]]:
         """Return a port for each used value, skill, topic and service, and for the pose if missions read it."""
         runs = {RUN: ServesAction(RunMission, RUN, skill=None).named(RUN)} if config.for_others else {}
-        return ports_for(config) | runs
+        return ports_for(config) | ports_of_triggers(config.triggers.values()) | runs
 
     @classmethod
     def capabilities(cls, config: MissionConfig) -> tuple[Capability, ...]:
@@ -141,7 +145,8 @@ class Mission(Component[MissionConfig]):
         from rbxcompose.missions.execution.missions import Broadcast, RunningMissions
         from rbxcompose.missions.execution.ordered import OrderedMission
         from rbxcompose.missions.execution.topic_skills import Desks
-        from rbxcompose.missions.execution.world import Arrivals
+        from rbxcompose.missions.execution.triggers import Triggering
+        from rbxcompose.missions.execution.world import Arrivals, RobotWorld
 
         self.arrivals, self.desks = Arrivals(self.config.values), Desks(self)
         self.missions = RunningMissions(self.config, self.world, self.story, self.publish)
@@ -150,6 +155,8 @@ class Mission(Component[MissionConfig]):
         self.ordered = OrderedMission(
             lambda name: programs[name].inputs if name in programs else (), self.begin, self.end
         )
+        seen = RobotWorld(self, self.arrivals, self.desks, lambda leaf, result: None, lambda event: None)
+        self.triggering = Triggering(self.config.triggers, self.config.names, seen, self)
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
         self.kept: dict[str, requests.RunMission] = {}  # requests by people that began missions that still run
         self.shown = ""  # the last reported status
@@ -166,7 +173,12 @@ class Mission(Component[MissionConfig]):
         return robot, robot
 
     def start(self) -> None:
-        """Run the start mission, as soon as every value that it reads has arrived."""
+        """Run the start mission, as soon as every value that it reads has arrived; from now on, triggers count."""
+        self.begin_first()
+        self.triggering.start()
+
+    def begin_first(self) -> None:
+        """Begin the start mission, if there is one."""
         if (name := self.config.start) is None:
             self.show(Level.OK, "no mission to start")
             return
@@ -203,12 +215,15 @@ class Mission(Component[MissionConfig]):
         if port.startswith(ENDS):
             self.desks.ended(port, message)
             return
+        if port.startswith(TRIGGER):
+            self.triggering.message(port.removeprefix(TRIGGER))
+            return
         name = port.removeprefix(VALUE)
         wrong = self.arrivals.take(name, message, self.now)
         if wrong and name not in self.misfits:
             self.misfits.add(name)
             self.warn(f"value {name}: {wrong}")
-        if any(mission.reads(name) for mission in self.missions):
+        if self.triggering.reads(name) or any(mission.reads(name) for mission in self.missions):
             self.look_soon()
 
     def look_soon(self) -> None:
@@ -223,7 +238,7 @@ class Mission(Component[MissionConfig]):
         """Do what is due."""
         if self.planned is not None and self.planned <= self.now:
             self.planned = None
-        wakes: list[float] = []
+        wakes = self.triggering.turn()
         for mission in self.missions:
             wakes += self.turn(mission)
         if wakes:
@@ -283,12 +298,14 @@ class Mission(Component[MissionConfig]):
         level = Level.ERROR if end.result == "failure" else Level.WARN if end.doubt else Level.OK
         self.show(level, ": ".join(filter(None, (name, end.result, end.doubt))))
         self.keep()
+        self.triggering.ended(name, end)
         if name == self.config.start:
             self.context.notify(MissionOver(name, end.result, end.words))
 
     def stop(self) -> None:
         """Pause all missions; the resume requests their unfinished actions again."""
         self.is_held = not self.missions.runs
+        self.triggering.stop()
         for mission in self.missions:
             if not mission.is_paused:
                 self.hold_running(mission, "stopped")
@@ -347,6 +364,11 @@ class Mission(Component[MissionConfig]):
     def listed(self, request: requests.ListMissions) -> tuple[requests.ListedMission, ...]:
         """Return all missions."""
         return self.missions.listed()
+
+    @answers(requests.ListTriggers)
+    def listed_triggers(self, request: requests.ListTriggers) -> tuple[requests.ListedTrigger, ...]:
+        """Return all triggers."""
+        return self.triggering.listed()
 
     @answers(requests.ShowPicture)
     def picture(self, request: requests.ShowPicture) -> requests.PictureData:

@@ -4,6 +4,7 @@ import json
 import zlib
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
 from typing import Any
 
 from rbxcompose.base.expressions.values import NOT_ARRIVED, Value
@@ -17,6 +18,7 @@ from rbxcompose.missions.engine.world import PLAIN, POSE, Settings, World
 from rbxcompose.missions.execution.world import RobotWorld
 from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING, Result
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
+from rbxcompose.missions.view.picture import picture_of
 from rbxcompose.missions.view.replica import Mirror
 
 BLOCK = 200  # records that are packed together, into about a tenth of their memory
@@ -83,12 +85,24 @@ class MissionRun:
         self.transitions: deque[dict[str, Any]] = deque(maxlen=LAST)
         self._on_line, self._now = on_line, 0.0
         world, self.robot = make(self._ended, self._said)
-        self.log = LoggedWorld(world, lambda record: write({"time": self._now, "mission": name, **record}))
+        self.log = LoggedWorld(world, lambda record: write(self._placed(record)))
         self.engine = Engine(program, names, inputs, self.log, settings)
         self.claims = claims_of(self.engine.program, self.engine.robot.skills)  # parts of the robot, exclusively
         self.mirror = Mirror(self.engine)
         self._states = (names.values.keys() | {POSE}) - names.events
         self._inputs, self._settings = inputs, settings
+
+    def _placed(self, record: LogRecord) -> LogRecord:
+        """Return a record with time and mission; one of a node has its sentence, too: `1.2 Go to dock`."""
+        number = record.get("leaf", record.get("node"))
+        step = {} if number is None else {"step": self._sentences[number]}
+        return {"time": self._now, "mission": self.name, **record, **step}
+
+    @cached_property
+    def _sentences(self) -> Mapping[int, str]:
+        picture = picture_of(self.engine.program, self.engine.robot)
+        drawn = (one for root in picture.roots for one in root.all())
+        return {one.number: f"{one.place} {one.sentence}" for one in drawn if one.number is not None}
 
     @property
     def is_over(self) -> bool:

@@ -168,11 +168,22 @@ class RunningMissions:
 
     def _clash(self, linked: Program, lent: frozenset[str]) -> str:
         """Return why a mission cannot run beside the running ones; empty if it can."""
+        for other, common in self._clashes(linked, lent):
+            return f"{' and '.join(common)} {'is' if len(common) == 1 else 'are'} in use by {other.name}"
+        return ""
+
+    def _clashes(self, linked: Program, lent: frozenset[str]) -> Iterator[tuple[MissionRun, list[str]]]:
+        """Yield the running missions that need parts of the robot that a mission needs as well, each with these."""
         wanted = claims_of(linked, self._equipment.names.skills) - lent
         for other in self:
             if common := sorted(wanted & other.claims):
-                return f"{' and '.join(common)} {'is' if len(common) == 1 else 'are'} in use by {other.name}"
-        return ""
+                yield other, common
+
+    def in_the_way(self, name: str) -> list[str]:
+        """Return the running missions beside which a mission cannot start, itself included if it runs."""
+        linked = link(self._program(name), self._equipment.names.missions)
+        clashing = [other.name for other, _ in self._clashes(linked, frozenset())]
+        return list(dict.fromkeys([*([name] if name in self.names else []), *clashing]))
 
     def _write(self, record: LogRecord) -> None:
         self._log.append(record)

@@ -1,17 +1,19 @@
 """The ports of the component that runs missions, for all that they request of the robot."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from rbxcompose.missions.engine.world import POSE
 from rbxcompose.missions.execution import errands
 from rbxcompose.missions.sources import PAUSE, SkillSource, SkillWay
+from rbxcompose.missions.triggers.trigger import Trigger
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Qos, SendsOrders
 
 EVENTS = "mission/events"
+TRIGGER = "trigger_"
 
 Ports = Iterator[tuple[str, Port[Any]]]
 
@@ -19,6 +21,15 @@ Ports = Iterator[tuple[str, Port[Any]]]
 def ports_for(equipment: errands.Equipment) -> dict[str, Port[Any]]:
     """Return a port for each value, skill, topic and service that is used, and for the pose if it is read."""
     return {name: port.named(name) for name, port in _ports(equipment)}
+
+
+def ports_of_triggers(triggers: Iterable[Trigger]) -> dict[str, Port[Any]]:
+    """Return a port for each trigger that a message causes."""
+    named = {f"{TRIGGER}{one.name}": one for one in triggers if one.topic}
+    return {
+        name: In(registry.message(one.message), one.topic, qos=Qos.EVENT, may_be_silent=True).named(name)
+        for name, one in named.items()
+    }
 
 
 def _ports(equipment: errands.Equipment) -> Ports:

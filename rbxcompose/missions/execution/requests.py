@@ -94,6 +94,30 @@ class ListMissions(Query[tuple[ListedMission, ...]]):
 
 
 @dataclass(frozen=True, slots=True)
+class ListedTrigger:
+    """A trigger: its cause in words, when a wall clock shows its next time and showed its last start, if any.
+
+    It waits if it has fired and missions that run are in the way of its own.
+    """
+
+    name: str
+    mission: str
+    cause: str
+    priority: int
+    running: str
+    next: str = ""
+    last: str = ""
+    waits: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ListTriggers(Query[tuple[ListedTrigger, ...]]):
+    """Query the list of triggers."""
+
+    about = MISSION
+
+
+@dataclass(frozen=True, slots=True)
 class ShowPicture(Query[PictureData]):
     """Ask for the picture of a mission that has been running."""
 

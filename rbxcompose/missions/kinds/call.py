@@ -55,6 +55,10 @@ class CallStep(sdk.LeafStep):
 
     may_end = sdk.ends(sdk.ANY)
 
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say the service."""
+        return f"Call {self.message.target.text}"
+
     def text(self, node: sdk.MissionNode) -> str:
         """Return the service."""
         return self.message.target.text

@@ -39,3 +39,4 @@ class CheckStep(sdk.LeafStep):
     only_asks = True
 
     may_end = sdk.ends(sdk.ANY)
+    sentence = sdk.says("Check that {condition:if}")

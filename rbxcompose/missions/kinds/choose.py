@@ -62,6 +62,13 @@ class ChooseStep(sdk.Choosing):
     cases: tuple[Asked, ...] = sdk.cases("What is done for which value.")
     otherwise = sdk.child("What is done for all other values.", "else", optional=True)  # the last child
 
+    sentence = sdk.says("Depending on {value}")
+
+    def before(self, index: int) -> str:
+        """Say the value of a case."""
+        is_case = index < len(self.cases)
+        return f"If it is {sdk.spoken(self.cases[index].expression)}" if is_case else "Otherwise"
+
     @property
     def choice(self) -> BranchChoice:
         """Return the value and the cases."""

@@ -47,6 +47,10 @@ class EndStep(sdk.Deed):
 
     may_end = sdk.ends(sdk.NEVER)
 
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say the result, and the message."""
+        return f"End in {self.result}{f': {sdk.spoken(self.message)}' if self.message else ''}"
+
     @property
     def ends_mission(self) -> str:
         """Return how the mission ends."""

@@ -27,6 +27,7 @@ class FallbackStep(sdk.InTurn):
     decides = sdk.SUCCEEDS
     flow = sdk.NodeFlow.FIRST
     look = sdk.NodeLook("?")
+    sentence = sdk.says("Try {in_order}, until one succeeds")
 
     @property
     def goes_on_after(self) -> str:

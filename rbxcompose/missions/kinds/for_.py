@@ -168,6 +168,15 @@ class ForStep(sdk.Loop):
     flow = sdk.NodeFlow.PER_ITEM
     look = sdk.NodeLook("↻")
 
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say the items, their order, and what a failure means."""
+        items = ", ".join(map(sdk.spoken, self.items)) if isinstance(self.items, tuple) else sdk.spoken(self.items)
+        order = {NEAREST: ", the nearest first", RANDOM: ", in random order"}.get(self.order, "")
+        fails = ", also after a failure" if self.if_one_fails == NEXT else ""
+        ends = ", until one succeeds" if self.succeed_when == ANY else ""
+        removed = ", removing it when done" if self.remove_done else ""
+        return f"For each {sdk.spoken(self.item)} of {items}{order}{fails}{ends}{removed}"
+
     def shows(self, node: sdk.MissionNode, scope: StaticScope) -> Mapping[str, sdk.Type]:
         """Return the item's name, with the type that all items have."""
         if not node.item:

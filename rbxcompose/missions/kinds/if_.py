@@ -48,6 +48,11 @@ class IfStep(sdk.Choosing):
     otherwise = sdk.child("What is done if it does not.", "else", optional=True)
 
     ways = ("then", "else")
+    sentence = sdk.says("If {condition:if}")
+
+    def before(self, index: int) -> str:
+        """Say which branch is for the contrary."""
+        return "Otherwise" if index else ""
 
     def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return the outcomes of both branches; a condition that cannot be evaluated is a failure."""

@@ -34,6 +34,10 @@ class LogStep(sdk.Deed):
     template: sdk.Template = sdk.text()
     level: str = sdk.choice(*sdk.LEVELS, help="Its severity.")
 
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say the text."""
+        return sdk.logged_in_words(self.template, self.level)
+
     def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return that it fails only if it cannot read a value."""
         return sdk.ALWAYS_SUCCEEDS if sdk.is_sure(node, endings.program, endings.robot) else sdk.ANY

@@ -102,6 +102,10 @@ class MachineStep(sdk.Loop):
     flow = sdk.NodeFlow.OPEN
     look = sdk.NodeLook("◉", sdk.Form.MACHINE)
 
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say the first state."""
+        return f"Go through states, from {self.states.start}"
+
     @property
     def history(self) -> str:
         """Return the history."""
@@ -163,6 +167,12 @@ class StateStep(sdk.Straight):
     skipped = sdk.Skipped.WITH_ALL_INSIDE
     flow = sdk.NodeFlow.IN_TURN
     look = sdk.NodeLook(form=sdk.Form.STATE)
+
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say where it leads to."""
+        leads = self.leads_to.to.items() if self.leads_to else ()
+        to = "; ".join(f"after {outcome}, to {state}" if outcome else f"then to {state}" for outcome, state in leads)
+        return f"State {node.name}{f' ({to})' if to else ''}"
 
     @classmethod
     def read(cls, reader: sdk.NodeReader) -> Self:

@@ -174,6 +174,20 @@ class ParallelStep(sdk.Straight):
     flow = sdk.NodeFlow.OPEN
     look = sdk.NodeLook("⇉", sdk.Form.BESIDE, has_roles=True)
 
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say what ends it."""
+        if self.ends_with is not None:
+            return f"At the same time, until {self.ends_with.text} ends"
+        match self.succeed_when:
+            case str(word):
+                return "At the same time, until one succeeds" if word == ANY else "At the same time"
+            case needed:
+                return f"At the same time, until {sdk.spoken(needed)} of them succeed"
+
+    def before(self, index: int) -> str:
+        """Say the name of a branch."""
+        return self.names[index] if index < len(self.names) else ""
+
     @property
     def branches(self) -> Branches:
         """Return what decides how the branches end."""

@@ -39,6 +39,10 @@ class PublishStep(sdk.Deed):
 
     may_end = sdk.ends(sdk.ANY)
 
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say the topic."""
+        return f"Publish on {self.message.target.text}"
+
     def text(self, node: sdk.MissionNode) -> str:
         """Return the topic."""
         return self.message.target.text

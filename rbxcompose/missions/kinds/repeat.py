@@ -93,6 +93,13 @@ class RepeatStep(sdk.Loop):
     flow = sdk.NodeFlow.IN_TURN
     look = sdk.NodeLook("↻")
 
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say how often, how fast, and what ends it."""
+        often = "for ever" if self.rounds is None else sdk.times_in_words(self.rounds)
+        every = f", every {sdk.spoken(self.every)}" if self.every else ""
+        until = f", until {sdk.condition_in_words(self.until)}" if self.until else ""
+        return f"Repeat {often}{every}{until}"
+
     @property
     def lasts(self) -> sdk.Expression | None:
         """Return `every`."""

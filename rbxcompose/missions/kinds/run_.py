@@ -56,6 +56,7 @@ class RunStep(sdk.Straight):
     skipped = sdk.Skipped.PERHAPS
     flow = sdk.NodeFlow.OPEN
     look = sdk.PLAIN
+    sentence = sdk.says("Do {expression}")
 
     def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return the outcomes of all these nodes; it fails if the data have no node there."""

@@ -26,6 +26,7 @@ class SequenceStep(sdk.InTurn):
     decides = sdk.FAILS
     flow = sdk.NodeFlow.IN_TURN
     look = sdk.NodeLook("→")
+    sentence = sdk.says("Do {in_order}")
 
     @property
     def goes_on_after(self) -> str:

@@ -39,6 +39,10 @@ class SetStep(sdk.Deed):
 
     assignments: tuple[Assignment, ...] = sdk.assignments()
 
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say what is set to what."""
+        return sdk.set_in_words(self.assignments)
+
     def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return that it fails only if it cannot read a value."""
         return sdk.ALWAYS_SUCCEEDS if sdk.is_sure(node, endings.program, endings.robot) else sdk.ANY

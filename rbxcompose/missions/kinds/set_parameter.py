@@ -79,6 +79,10 @@ class SetParameterStep(sdk.LeafStep):
 
     may_end = sdk.ends(sdk.ANY)
 
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say the setting, and its new value."""
+        return f"Set {self.setting.path} to {sdk.argument_in_words(self.given[2])}"
+
     def text(self, node: sdk.MissionNode) -> str:
         """Return the setting and its value."""
         return f"{self.setting.path} {self.given[2].text}".strip()

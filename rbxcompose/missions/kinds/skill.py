@@ -139,6 +139,15 @@ class SkillStep(sdk.LeafStep):
             for outcome in (sdk.SUCCEEDS, sdk.FAILS, *robot.skills[self.skill].outcomes):
                 yield sdk.Possibility(node.span, f"{node.path}: {outcome}", sdk.ended(node.number, outcome))
 
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say its name and its arguments, the main one first."""
+        skill = robot.skills.get(self.skill)
+        types = skill.arguments if skill else {}
+        main = skill.main if skill else ""
+        given = ((one.name, one.value, types.get(one.name or main, sdk.UNKNOWN)) for one in self.arguments)
+        words = (f"{sdk.spoken(name)} {sdk.argument_in_words(value, wanted)}".strip() for name, value, wanted in given)
+        return f"{sdk.spoken(self.skill)} {', '.join(words)}".strip()
+
     def text(self, node: sdk.MissionNode) -> str:
         """Return its arguments."""
         return ", ".join(f"{argument.name} {_written(argument.value)}".strip() for argument in self.arguments)

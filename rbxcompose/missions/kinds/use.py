@@ -113,6 +113,11 @@ class UseStep(sdk.Straight):
     flow = sdk.NodeFlow.OPEN
     look = sdk.NodeLook("↗")
 
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say the mission, and its inputs."""
+        given = ", ".join(f"{sdk.spoken(one.name)} {sdk.argument_in_words(one.value)}" for one in self.arguments)
+        return f"Do the mission {self.uses.text}{f', with {given}' if given else ''}"
+
     def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return the outcomes of the mission."""
         return endings.of_mission(self.uses.text)

@@ -42,6 +42,7 @@ class WaitStep(sdk.LeafStep):
     waits = True
     has_result = False
     only_asks = False
+    sentence = sdk.says("Wait {lasts}")
 
     def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return that it always succeeds if the duration is a literal."""

@@ -49,6 +49,7 @@ class WaitForStep(sdk.LeafStep):
     has_result = False
     lasts = None
     only_asks = True
+    sentence = sdk.says("Wait until {condition:if}")
 
     def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return that it succeeds; only a condition that cannot be evaluated is a failure."""

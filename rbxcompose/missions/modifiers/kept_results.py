@@ -48,6 +48,7 @@ class Save(sdk.Plain):
     kept_as: sdk.ScalarNode = sdk.new_name("a name for the result")
 
     value = None
+    clause = sdk.says("keeping the result as {kept_as}")
 
     @property
     def saved(self) -> sdk.ScalarNode | None:

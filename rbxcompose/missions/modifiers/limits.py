@@ -60,6 +60,8 @@ class AsLongAs(Cutting):
 
     value: sdk.Expression = sdk.watched()
 
+    clause = sdk.says("as long as {value:if}")
+
 
 class TimeoutTask(sdk.Decorator):
     """Has a deadline."""
@@ -101,6 +103,8 @@ class Timeout(Cutting):
     """
 
     value: sdk.Expression = sdk.duration(least=SHORTEST, counted="a timeout")
+
+    clause = sdk.says("for at most {value}")
 
     @property
     def limit(self) -> sdk.Expression | None:
@@ -198,6 +202,13 @@ class Attempts(sdk.Modifier):
     def serves(self) -> sdk.ModifierScope:
         """Return the nodes that may fail; with a timeout for each attempt, any may."""
         return sdk.ModifierScope.ALL if self.timeout else sdk.ModifierScope.FAILING
+
+    def clause(self) -> str:
+        """Say how often, and how long."""
+        often = "again until it succeeds" if self.value is None else f"tried {sdk.times_in_words(self.value)} at most"
+        each = f", each for at most {sdk.spoken(self.timeout)}" if self.timeout else ""
+        pause = f", {sdk.spoken(self.pause)} apart" if self.pause else ""
+        return f"{often}{each}{pause}"
 
     @property
     def said(self) -> str:

@@ -38,6 +38,11 @@ class Turning(sdk.Modifier):
     may_skip = False
     value = None
     turns: ClassVar[dict[int, int]]  # replacements by result
+    words: ClassVar[str]
+
+    def clause(self) -> str:
+        """Say what it replaces, if it is on."""
+        return self.words if self.is_on else ""
 
 
 class OptionalTask(TurningTask):
@@ -76,6 +81,7 @@ class Optional(Turning):
 
     __slots__ = ()
     turns = {sdk.FAILURE: sdk.SUCCESS}
+    words = "a failure does not matter"
 
     def changed(self, inner: sdk.Outcomes) -> sdk.Outcomes:
         """Return the outcomes with failure as success."""
@@ -107,6 +113,7 @@ class Invert(Turning):
 
     __slots__ = ()
     turns = {sdk.FAILURE: sdk.SUCCESS, sdk.SUCCESS: sdk.FAILURE}
+    words = "success counts as failure, and failure as success"
     serves = sdk.ModifierScope.ALL
 
     def changed(self, inner: sdk.Outcomes) -> sdk.Outcomes:

@@ -56,6 +56,7 @@ class OnlyIf(Conditional):
     """
 
     __slots__ = ()
+    clause = sdk.says("only if {value:if}")
 
 
 @sdk.modifier("skip_if", SkipIfTask)
@@ -69,6 +70,7 @@ class SkipIf(Conditional):
     """
 
     __slots__ = ()
+    clause = sdk.says("not if {value:if}")
 
 
 class CountingTask(sdk.Decorator):
@@ -128,6 +130,10 @@ class Once(sdk.Skipping):
 
     value = None
 
+    def clause(self) -> str:
+        """Say it, if it is on."""
+        return "only once" if self.is_on else ""
+
     @property
     def serves(self) -> sdk.ModifierScope:
         """Return the nodes that are repeated."""
@@ -169,3 +175,4 @@ class Cooldown(sdk.Skipping):
     value: sdk.Expression = sdk.duration()
 
     serves = sdk.ModifierScope.REPEATED
+    clause = sdk.says("not again within {value}")

@@ -56,6 +56,16 @@ class InTurn(Straight):
     skipped = Skipped.WITH_ALL_INSIDE
     decides: ClassVar[str]
 
+    @property
+    def in_order(self) -> str:
+        """Return in which order, and what is special about it, in words."""
+        order = "in random order" if self.order == RANDOM else "in order"
+        more = [
+            *(["looking at earlier conditions again and again"] if self.reactive else []),
+            *(["beginning where it was cut short"] if self.history != NO_HISTORY else []),
+        ]
+        return ", ".join([order, *more])
+
     def may_end(self, node: MissionNode, endings: Endings) -> outcomes.Outcomes:
         """Return the deciding outcomes of every child, and all outcomes of the last one that is reached."""
         found, goes_on_never = (

@@ -10,12 +10,12 @@ DEEPEST = 16  # missions within missions
 
 
 def link(program: Program, missions: Mapping[str, Program]) -> Program:
-    """Return the program with the nodes of the used mission below each `use`.
+    """Return the program with the nodes of the used mission below each `use`; a linked one stays as it is.
 
     Raises:
         KeyError: if a used mission does not exist; checks report that earlier, and circles as well.
     """
-    if not any(node.step.uses for node in program.nodes):
+    if all(node.inner or not node.step.uses for node in program.nodes):
         return program
     linker = _Linker(missions)
     linked = linker.mission(program, None, "")

@@ -11,6 +11,7 @@ from rbxcompose.missions.language.fields import Declared
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.answers import Advice, ModifierScope, Moments
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, Outcomes
+from rbxcompose.missions.program.sentences import deeds_in_words, spoken
 
 
 class Modifier(Declared, ABC):
@@ -37,6 +38,10 @@ class Modifier(Declared, ABC):
     @abstractmethod
     def value(self) -> Expression | None:
         """Return the expression behind its key."""
+
+    @abstractmethod
+    def clause(self) -> str:
+        """Return what it adds to the sentence of its node, read aloud: 'for at most 30 s'; empty for nothing."""
 
     @property
     def said(self) -> str:
@@ -98,6 +103,10 @@ class Acting(Plain):
     moments: Moments = field()
 
     value = None
+
+    def clause(self) -> str:
+        """Say each hook: 'on failure, log 'Missed it''."""
+        return "; ".join(f"{spoken(key)}, {deeds_in_words(deeds)}" for key, deeds in self.moments.deeds.items())
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:

@@ -170,6 +170,14 @@ class Step(Declared, ABC):
     def look(self) -> NodeLook:
         """Return how it is drawn."""
 
+    @abstractmethod
+    def sentence(self, node: MissionNode, robot: RobotNames) -> str:
+        """Return what it does, read aloud: 'Wait 5 s'; its children say what is below it."""
+
+    def before(self, index: int) -> str:
+        """Return the words before the sentence of one of its children: 'Otherwise'; empty for none."""
+        return ""
+
     @property
     def word(self) -> str:
         """Return what people call it: the word of the language, or the name of a skill."""

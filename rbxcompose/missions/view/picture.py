@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, NamedTuple
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.words import condition_in_words
 from rbxcompose.missions.program.answers import Form
 from rbxcompose.missions.program.linker import link
-from rbxcompose.missions.program.program import Interrupt, MissionNode, Program, RobotNames
+from rbxcompose.missions.program.program import CONTINUE, END, RESTART, Interrupt, MissionNode, Program, RobotNames
 
 LONGEST = 60  # characters of the text in a node
 
@@ -27,7 +28,8 @@ class Drawn:
     """One node: its number in the linked program, what it is, the text in it, and what is around it.
 
     `role` is what it is to its parent (`then`, a branch); an interrupt is a node of its own, without a number.
-    `form` is a word of `Form`.
+    `form` is a word of `Form`. `sentence` says what it does, read aloud; `place` is where that stands among all
+    sentences: 1.2 is the second one within the first.
     """
 
     number: int | None
@@ -41,6 +43,8 @@ class Drawn:
     children: tuple[Drawn, ...] = ()
     sign: str = ""
     form: str = Form.AFTER
+    sentence: str = ""
+    place: str = ""
 
     @property
     def title(self) -> str:
@@ -93,35 +97,65 @@ def _drawn_from(data: Mapping[str, Any]) -> Drawn:
 def picture_of(program: Program, robot: RobotNames) -> MissionPicture:
     """Return the picture of a mission, including the missions it uses."""
     linked = link(program, robot.missions)
-    interrupts = tuple(_interrupt(linked, interrupt) for interrupt in linked.interrupts)
-    return MissionPicture(linked.name, linked.about, _drawn(linked, linked.main), interrupts, len(linked.nodes))
+    sketch = _Sketch(linked, robot)
+    interrupts = tuple(_interrupt(sketch, interrupt, f"{at}") for at, interrupt in enumerate(linked.interrupts, 2))
+    return MissionPicture(linked.name, linked.about, _drawn(sketch, linked.main, "1"), interrupts, len(linked.nodes))
 
 
-def _interrupt(linked: Program, interrupt: Interrupt) -> Drawn:
-    children = (_drawn(linked, interrupt.root),) if interrupt.root is not None else ()
+class _Sketch(NamedTuple):
+    """A linked mission that is drawn, and what the robot offers it."""
+
+    linked: Program
+    robot: RobotNames
+
+
+def _interrupt(sketch: _Sketch, interrupt: Interrupt, place: str) -> Drawn:
+    children = (_drawn(sketch, interrupt.root, f"{place}.1"),) if interrupt.root is not None else ()
     restarts = f" {interrupt.restarts.text}" if interrupt.restarts else ""
     notes = (f"afterwards {interrupt.afterwards}{restarts}",)
+    then = {CONTINUE: "go on", RESTART: f"restart{restarts or ' the mission'}", END: "end in success"}
+    react = f"{'do this, then ' if children else ''}{then[interrupt.afterwards]}"
+    words = f"Whenever {condition_in_words(interrupt.when.expression)}, {react}"
+    text = f"when {interrupt.when.expression.text}"
     return Drawn(
-        None, "interrupt", f"when {interrupt.when.expression.text}", interrupt.name, "", notes, children=children
+        *(None, "interrupt", text, interrupt.name, "", notes),
+        children=children,
+        sentence=f"{interrupt.name}: {words}",
+        place=place,
     )
 
 
-def _drawn(linked: Program, number: int, role: str = "", is_start: bool = False) -> Drawn:
+def _drawn(sketch: _Sketch, number: int, place: str, role: str = "", is_start: bool = False, before: str = "") -> Drawn:
+    linked = sketch.linked
     node = linked.nodes[number]
     step, look = node.step, node.step.look
     start = step.states.start if step.states else ""
+    places = [f"{place}.{at}" for at in range(1, len(node.children) + 1)]
     children = tuple(
-        _drawn(linked, child, one, bool(start) and linked.nodes[child].name == start)
-        for child, one in zip(node.children, _roles(linked, node), strict=True)
+        _drawn(sketch, child, places[at], one, bool(start) and linked.nodes[child].name == start, step.before(at))
+        for at, (child, one) in enumerate(zip(node.children, _roles(linked, node), strict=True))
     )
     if node.inner is not None:
         reactions = [interrupt for interrupt in node.inner.interrupts if interrupt.root is not None]
-        children = (children[0], *(_interrupt(linked, reaction) for reaction in reactions))
+        inner = (_interrupt(sketch, reaction, f"{place}.{at}") for at, reaction in enumerate(reactions, 2))
+        children = (children[0], *inner)
     leads = step.leads_to.to.items() if step.leads_to else ()
     arrows = tuple(Arrow(outcome, to) for outcome, to in leads)
     name = "" if role == node.name else node.name
     text, notes = _short(step.text(node)), tuple(_notes(node))
-    return Drawn(number, step.word, text, name, role, notes, arrows, is_start, children, look.sign, look.form)
+    sentence = _sentence(sketch, node, before, name)
+    return Drawn(
+        *(number, step.word, text, name, role, notes, arrows, is_start, children, look.sign, look.form),
+        *(sentence, place),
+    )
+
+
+def _sentence(sketch: _Sketch, node: MissionNode, before: str, name: str) -> str:
+    """Return what a node does, with its modifiers, read aloud."""
+    clauses = filter(None, (modifier.clause() for modifier in reversed([*node.modifiers.values()])))
+    said = f"{node.step.sentence(node, sketch.robot)}{''.join(f'; {one}' for one in clauses)}"
+    title = "" if node.step.look.form == Form.STATE else name
+    return ": ".join(f"{part[0].upper()}{part[1:]}" if part is said else part for part in (before, title, said) if part)
 
 
 def _roles(linked: Program, node: MissionNode) -> Sequence[str]:

@@ -165,7 +165,7 @@ class ForestImporter:
             name = self.missions[tree]
             texts[f"{name}.yaml"] = _TreeImporter(self, tree).text(name)
         main = f"{self.missions[self.main]}.yaml"
-        return ImportedFiles(texts.pop(main, ""), texts, main)
+        return ImportedFiles(texts.pop(main, ""), texts, file=main)
 
     def _subtrees(self, tree: str) -> Iterator[XmlElement]:
         return (each for each in below(self.forest.trees[tree]) if each.name in ("SubTree", "SubTreePlus"))

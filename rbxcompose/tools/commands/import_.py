@@ -48,12 +48,9 @@ def run(arguments: argparse.Namespace) -> int:
     name = _name(arguments.name, paths)
     files = [replace(file, arguments=dict(given)) for file in read_files(paths, report, sources)]
     made = imported(arguments.program, files, name, report)
-<<<<<<< HEAD
     sources.update(made.included)
-=======
     if out is not None and out != Path(arguments.out):  # a folder
         out = out.with_name(made.file)
->>>>>>> bt
     findings = Report(
         [replace(one, fix=None) for one in report]
     )  # fixes are for manifests, which `check --fix` corrects

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from rbxcompose.base.requests import Command, Query, Refused, to_data
-from rbxcompose.commands.console import NotDoneError, emit, refuse
+from rbxcompose.commands.console import NotDoneError, emit, refuse, table
 from rbxcompose.commands.lookup import REFUSED, WHICH, add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, deferred, out_option, run_action
 from rbxcompose.missions.execution import requests
@@ -21,7 +21,7 @@ A = TypeVar("A")
 
 ON_SYSTEM = requests.MISSION
 _PERIOD = 0.2  # [s] between two requests to a robot that is followed
-_FORMATS = "text", "mermaid", "dot", "html"
+_FORMATS = "text", "tree", "mermaid", "dot", "html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     files = "rbxcompose.tools.mission_files"
     table: tuple[tuple[str, str, Callable[[argparse.Namespace], int], tuple[Declare, ...]], ...] = (
         ("ls", "list the robot's missions with their states", _list, (add_asking_options,)),
+        ("triggers", "list what starts missions by itself, with the next times", _triggers, (add_asking_options,)),
         ("run", "start a mission beside those that run", _run, started),
         ("cancel", "end a mission for good", _to(requests.CancelMission), named),
         ("pause", "hold a mission; its timers stand still", _to(requests.PauseMission), named),
@@ -74,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             deferred(files, "replay_log"),
             again,
         ),
-        ("show", "draw a mission; a running one with the states of its nodes", deferred(files, "show"), drawn),
+        ("show", "say or draw a mission; a running one with the states of its nodes", deferred(files, "show"), drawn),
         ("skills", "list the skills that missions may use on a robot", deferred(files, "skills"), (robot, json_)),
         ("explore", "look for dead ends by trying everything that may happen", deferred(files, "explore"), explored),
     )
@@ -115,6 +116,21 @@ def _table(missions: Sequence[requests.ListedMission]) -> str:
     states = max((len(mission.state) for mission in missions), default=0)
     lines = [f"{mission.name:<{names}}  {mission.state:<{states}}  {mission.about}".rstrip() for mission in missions]
     return "\n".join(lines) or "this robot has no missions"
+
+
+def _triggers(arguments: argparse.Namespace) -> int:
+    found = ask(arguments.robot, requests.ListTriggers())
+    if arguments.json:
+        emit(json.dumps(to_data(found)))
+        return 0
+    head = ("trigger", "cause", "mission", "priority", "if one runs", "next", "last start")
+    rows = [(*(one.name, one.cause, one.mission, str(one.priority), one.running), *_times_of(one)) for one in found]
+    emit(table([head, *rows]) if rows else "this robot has no triggers")
+    return 0
+
+
+def _times_of(one: requests.ListedTrigger) -> tuple[str, str]:
+    return ("waits for its turn" if one.waits else one.next or "-"), one.last or "-"
 
 
 def _chosen(arguments: argparse.Namespace) -> str:

@@ -12,6 +12,7 @@ MARKS = {IDLE: "·", RUNNING: "▶", SUCCESS: "✓", FAILURE: "✗", SKIPPED: "-
 _RESET, _FAINT = "\x1b[0m", "\x1b[2m"
 _COLOURS = {IDLE: _FAINT, RUNNING: "\x1b[1;36m", SUCCESS: "\x1b[32m", FAILURE: "\x1b[31m", SKIPPED: _FAINT}
 _STEP = "  "
+_LONGEST = 2000  # characters of a sentence
 COLOURS = {"running": "#0969da", "success": "#1a7f37", "failure": "#cf222e", "skipped": "#818b98"}
 _SAFE = str.maketrans({'"': "'", "<": "&lt;", ">": "&gt;", "#": "&num;"})
 
@@ -40,6 +41,19 @@ def _lines(drawn: Drawn, indent: str, statuses: Sequence[int], width: int, colou
     for arrow in drawn.arrows:
         line = fitted(f"{indent}{_STEP}{arrow.outcome or 'then'} -> {arrow.to}", width)
         yield f"{_FAINT}{line}{_RESET}" if colour else line
+
+
+def mission_sentences(picture: MissionPicture, statuses: Sequence[int] = ()) -> str:
+    """Return a mission in plain sentences with numbers, with the status of each node if known."""
+    head = f"{picture.name}: {picture.about}" if picture.about else picture.name
+    lines = (_said(drawn, statuses) for root in picture.roots for drawn in root.all())
+    return "".join(f"{line}\n" for line in (plain(head), *lines))
+
+
+def _said(drawn: Drawn, statuses: Sequence[int]) -> str:
+    mark = f"{MARKS[status_of(drawn, statuses)]} " if statuses else ""
+    indent = _STEP * drawn.place.count(".")
+    return f"{indent}{mark}{drawn.place} {plain(drawn.sentence, _LONGEST)}{':' if drawn.children else ''}"
 
 
 def running_lines(picture: MissionPicture, statuses: Sequence[int], width: int) -> list[str]:

@@ -501,7 +501,8 @@ def _with_mission(plan: Plan, trial: Trial) -> Plan:
         if not isinstance(instance.config, MissionConfig):
             return instance
         inputs = {**instance.config.inputs, trial.mission: dict(trial.inputs)}
-        return replace(instance, config=instance.config.model_copy(update={"start": trial.mission, "inputs": inputs}))
+        update = {"start": trial.mission, "inputs": inputs, "triggers": {}}
+        return replace(instance, config=instance.config.model_copy(update=update))
 
     return replace(plan, instances=tuple(changed(instance) for instance in plan.instances), start=trial.mission)
 

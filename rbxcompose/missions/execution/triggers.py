@@ -1,0 +1,200 @@
+"""The triggers of a running executive: what they see of the robot, and what they do to its missions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+from rbxcompose.base.clock import NANOSECONDS, local_time, universal_time
+from rbxcompose.base.expressions.evaluate import holds
+from rbxcompose.base.expressions.tree import new_names
+from rbxcompose.base.expressions.types import FLAG
+from rbxcompose.base.expressions.values import NOT_ARRIVED, EvaluationError, NotArrived, Value
+from rbxcompose.base.requests import Refused
+from rbxcompose.missions.engine.events import MissionEnded
+from rbxcompose.missions.engine.scopes import RobotValues, RunScope, SinceScope
+from rbxcompose.missions.execution.mission_run import MissionRun
+from rbxcompose.missions.execution.missions import RunningMissions
+from rbxcompose.missions.execution.requests import ListedTrigger, RunMission
+from rbxcompose.missions.program.program import RobotNames
+from rbxcompose.missions.triggers.core import Triggers
+from rbxcompose.missions.triggers.trigger import Trigger
+from rbxcompose.sdk.component import Context
+
+POLL = 0.1  # [s] between two evaluations of a condition that may change without a message
+_SHOWN = "%a %Y-%m-%d %H:%M"
+
+
+class Executive(Protocol):
+    """What triggers need of the component that runs missions."""
+
+    context: Context
+    missions: RunningMissions
+
+    @property
+    def now(self) -> float:
+        """Return robot time [s]."""
+        ...
+
+    @property
+    def stamp(self) -> int:
+        """Return wall-clock time [ns]."""
+        ...
+
+    def run(self, request: RunMission) -> str:
+        """Begin a mission; raise Refused if it cannot run."""
+        ...
+
+    def end(self, run: MissionRun) -> None:
+        """End a mission that runs."""
+        ...
+
+    def info(self, text: str) -> None:
+        """Log an event."""
+        ...
+
+    def warn(self, text: str) -> None:
+        """Log a warning."""
+        ...
+
+    def look_soon(self) -> None:
+        """Request a wake at this instant."""
+        ...
+
+
+class Triggering:
+    """Tells the triggers what happens, and carries out what they decide."""
+
+    def __init__(
+        self, triggers: Mapping[str, Trigger], names: RobotNames, values: RobotValues, executive: Executive
+    ) -> None:
+        self._triggers, self._executive = triggers, executive
+        self._local = local_time if executive.context.clock.is_real else universal_time
+        self.core = Triggers(triggers, self._local)
+        self._scopes = {name: _scope(one, names, values) for name, one in triggers.items() if one.when}
+        self._reported: set[str] = set()  # triggers whose condition could not be evaluated
+        self._is_begun = False
+
+    @property
+    def _wall(self) -> float:
+        return self._executive.stamp / NANOSECONDS
+
+    def start(self) -> None:
+        """Begin: the whole robot is active."""
+        if not self._triggers:
+            return
+        self._is_begun = True
+        self._follow_stop()
+        self.core.at_start(self._executive.now, self)
+        self._executive.look_soon()
+
+    def reads(self, name: str) -> bool:
+        """Return whether a condition reads a value."""
+        return any(name in one.reads for one in self._triggers.values())
+
+    def message(self, name: str) -> None:
+        """Take the message of a trigger."""
+        if self._is_begun:
+            self._follow_stop()
+            self.core.message(name, self._executive.now, self)
+            self._executive.look_soon()
+
+    def ended(self, mission: str, end: MissionEnded) -> None:
+        """Take the end of a mission."""
+        if not self._triggers:
+            return
+        self._follow_stop()
+        self.core.ended(mission, frozenset({end.result, end.outcome or end.result}), self._executive.now, self)
+        self._executive.look_soon()
+
+    def stop(self) -> None:
+        """Forget what has fired."""
+        self.core.stop(self)
+
+    def turn(self) -> list[float]:
+        """Do what is due; return the next wake [s], if any."""
+        if not self._is_begun:
+            return []
+        now, wall = self._executive.now, self._wall
+        self._follow_stop()
+        self.core.look_at_clock(now, wall, self)
+        for name, scope in self._scopes.items():
+            self._evaluate(name, scope, now)
+        self.core.turn(wall, self)
+        look = self.core.next_look(now, wall)
+        is_polled = any(one.when and one.when.is_polled for one in self._triggers.values())
+        return [*([look] if look is not None else []), *([now + POLL] if is_polled else [])]
+
+    def _evaluate(self, name: str, scope: SinceScope, now: float) -> None:
+        """Evaluate a condition; a message that counts as new does so once."""
+        when = self._triggers[name].when
+        if when is None:
+            return
+        try:
+            is_held = after = holds(when.condition, scope)
+            if scope.is_needed:
+                scope.mark()
+                after = holds(when.condition, scope)
+        except EvaluationError as error:
+            if name not in self._reported:
+                self._reported.add(name)
+                self._executive.warn(f"trigger {name}: {error}")
+            return
+        self.core.condition(name, is_held, now, self, after=after)
+
+    def _follow_stop(self) -> None:
+        if self.core.is_stopped and not self._executive.context.is_stopped:
+            self.core.release()
+        elif self._executive.context.is_stopped and not self.core.is_stopped:
+            self.core.stop(self)
+
+    def listed(self) -> tuple[ListedTrigger, ...]:
+        """Return all triggers with their next time and their last start."""
+        return tuple(map(self._listed, self._triggers.values()))
+
+    def _listed(self, one: Trigger) -> ListedTrigger:
+        due, last = self.core.next_time(one.name, self._wall), self.core.started.get(one.name)
+        is_waiting = one.name in self.core.waiting
+        return ListedTrigger(
+            one.name, one.mission, one.cause, one.priority, one.running, self._shown(due), self._shown(last), is_waiting
+        )
+
+    def _shown(self, wall: float | None) -> str:
+        return "" if wall is None else f"{self._local(wall):{_SHOWN}}"
+
+    # The effects of triggers
+
+    def in_the_way(self, mission: str, /) -> Sequence[str]:
+        """Return the missions that keep one from starting."""
+        return self._executive.missions.in_the_way(mission)
+
+    def begin(self, trigger: Trigger, /) -> str:
+        """Start the mission of a trigger as people do."""
+        self._executive.info(f"trigger {trigger.name} ({trigger.cause}) starts mission {trigger.mission}")
+        try:
+            self._executive.run(RunMission(trigger.mission, trigger.inputs))
+        except Refused as refusal:
+            return str(refusal)
+        return ""
+
+    def cancel(self, mission: str, trigger: Trigger, /) -> None:
+        """End a mission in the way."""
+        self._executive.info(f"trigger {trigger.name} ends mission {mission}")
+        self._executive.end(self._executive.missions.running(mission))
+
+    def leave_out(self, trigger: Trigger, why: str, /) -> None:
+        """Log why a trigger starts nothing."""
+        self._executive.info(f"trigger {trigger.name} does not start mission {trigger.mission}: {why}")
+
+    def wait(self, trigger: Trigger, missions: Sequence[str], /) -> None:
+        """Log what a trigger waits for."""
+        self._executive.info(f"trigger {trigger.name} waits for the end of {' and '.join(missions)}")
+
+
+def _scope(trigger: Trigger, names: RobotNames, values: RobotValues) -> SinceScope:
+    """Return the scope of a trigger's condition: an event counts for the next evaluation only."""
+    fresh = new_names(trigger.when.condition) if trigger.when else frozenset[str]()
+    quiet: dict[str, Value | NotArrived] = {
+        name: False if names.values[name] == FLAG else NOT_ARRIVED for name in trigger.reads & names.events
+    }
+    return SinceScope(RunScope({}, {}, names.places, values), frozenset(fresh), quiet)
