@@ -205,7 +205,7 @@ def test_a_mission_that_is_not_beside_it_is_told(tmp_path: Path) -> None:
     report = Report()
     assert exported(tmp_path / "tried.yaml", report, {}) == {}
     assert {(finding.code, finding.span.line if finding.span else 0) for finding in report} == {
-        ("RBX4177", 7), ("RBX4177", 12)
+        ("RBX2267", 7), ("RBX2267", 12)
     }  # fmt: skip
 
 
@@ -257,4 +257,4 @@ def test_what_no_tree_can_say_is_told_at_its_place(text: str) -> None:
     report = Report()
     xml_of({"tried": tree(text)}, "tried", report)
     found = [(finding.code, finding.span.line if finding.span else 0) for finding in report]
-    assert found == [("RBX4177", CANNOT[text])], list(report)
+    assert found == [("RBX2267", CANNOT[text])], list(report)

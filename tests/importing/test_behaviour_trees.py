@@ -364,47 +364,47 @@ def test_each_node_of_the_table_is_tried_or_told() -> None:
 
 SUB = f'<{TREE} ID="Sub"><A/></{TREE}>'
 WRONG: Mapping[str, tuple[str, str, list[tuple[str, int]]]] = {
-    "a circle": ('<SubTree ID="Sub"/>', f'<{TREE} ID="Sub"><SubTree ID="Main"/></{TREE}>', [("RBX4174", 6)]),
-    "itself": ('<SubTree ID="Main"/>', "", [("RBX4174", 3)]),
-    "no such tree": ('<SubTree ID="Su"/>', SUB, [("RBX4176", 2), ("RBX4174", 3)]),
-    "two of one name": ("<A/>", f'<{TREE} ID="Main"><B/></{TREE}>', [("RBX4174", 5)]),
-    "a tree with two nodes": ("<A/>", f'<{TREE} ID="Sub"><A/><B/></{TREE}>', [("RBX4174", 5)]),
-    "no ID": ("<Action/>", "", [("RBX4174", 3)]),
-    "no such port": ('<Sleep msec="1" mesc="2"/>', "", [("RBX4174", 3)]),
-    "no value for a port": ("<Sleep/>", "", [("RBX4174", 3)]),
-    "too few children": ("<Inverter/>", "", [("RBX4174", 3)]),
-    "too many children": ("<Sequence><A/><IfThenElse><A/></IfThenElse></Sequence>", "", [("RBX4174", 5)]),
-    "no number": ('<RetryUntilSuccessful num_attempts="many"><A/></RetryUntilSuccessful>', "", [("RBX4175", 3)]),
-    "no number of times": ('<Repeat num_cycles="0"><A/></Repeat>', "", [("RBX4175", 3)]),
-    "no time": ('<Timeout msec="-5"><A/></Timeout>', "", [("RBX4175", 3)]),
-    "a threshold too high": ('<Parallel success_count="3"><A/><B/></Parallel>', "", [("RBX4175", 3)]),
-    "a threshold in words": ('<Parallel failure_count="any"><A/><B/></Parallel>', "", [("RBX4175", 3)]),
-    "an unknown attribute": ('<A _skipIF="true"/>', "", [("RBX4174", 3)]),
-    "bits": ('<ScriptCondition code="(a &amp; 4) == 4"/>', "", [("RBX4175", 3)]),
-    "a choice in a script": ('<Script code="a := b ? 1 : 2"/>', "", [("RBX4175", 3)]),
-    "no script": ('<Script code="a := := 3"/>', "", [("RBX4175", 3)]),
-    "a remap to nothing": ('<SubTree ID="Sub" x="{y}"/>', SUB, [("RBX4176", 3)]),
-    "nodes with children": ("<RateController><A/></RateController>", "", [("RBX4175", 3)]),
-    "nodes without a counterpart": ('<UnsetBlackboard key="x"/>', "", [("RBX4175", 3)]),
-    "an action that is done again there": ('<ReactiveSequence><A x="1"/><B/></ReactiveSequence>', "", [("RBX4176", 4)]),
-    "a shared entry": ('<A x="{@home}"/>', "", [("RBX4175", 2), ("RBX4176", 2)]),
+    "a circle": ('<SubTree ID="Sub"/>', f'<{TREE} ID="Sub"><SubTree ID="Main"/></{TREE}>', [("RBX2264", 6)]),
+    "itself": ('<SubTree ID="Main"/>', "", [("RBX2264", 3)]),
+    "no such tree": ('<SubTree ID="Su"/>', SUB, [("RBX2266", 2), ("RBX2264", 3)]),
+    "two of one name": ("<A/>", f'<{TREE} ID="Main"><B/></{TREE}>', [("RBX2264", 5)]),
+    "a tree with two nodes": ("<A/>", f'<{TREE} ID="Sub"><A/><B/></{TREE}>', [("RBX2264", 5)]),
+    "no ID": ("<Action/>", "", [("RBX2264", 3)]),
+    "no such port": ('<Sleep msec="1" mesc="2"/>', "", [("RBX2264", 3)]),
+    "no value for a port": ("<Sleep/>", "", [("RBX2264", 3)]),
+    "too few children": ("<Inverter/>", "", [("RBX2264", 3)]),
+    "too many children": ("<Sequence><A/><IfThenElse><A/></IfThenElse></Sequence>", "", [("RBX2264", 5)]),
+    "no number": ('<RetryUntilSuccessful num_attempts="many"><A/></RetryUntilSuccessful>', "", [("RBX2265", 3)]),
+    "no number of times": ('<Repeat num_cycles="0"><A/></Repeat>', "", [("RBX2265", 3)]),
+    "no time": ('<Timeout msec="-5"><A/></Timeout>', "", [("RBX2265", 3)]),
+    "a threshold too high": ('<Parallel success_count="3"><A/><B/></Parallel>', "", [("RBX2265", 3)]),
+    "a threshold in words": ('<Parallel failure_count="any"><A/><B/></Parallel>', "", [("RBX2265", 3)]),
+    "an unknown attribute": ('<A _skipIF="true"/>', "", [("RBX2264", 3)]),
+    "bits": ('<ScriptCondition code="(a &amp; 4) == 4"/>', "", [("RBX2265", 3)]),
+    "a choice in a script": ('<Script code="a := b ? 1 : 2"/>', "", [("RBX2265", 3)]),
+    "no script": ('<Script code="a := := 3"/>', "", [("RBX2265", 3)]),
+    "a remap to nothing": ('<SubTree ID="Sub" x="{y}"/>', SUB, [("RBX2266", 3)]),
+    "nodes with children": ("<RateController><A/></RateController>", "", [("RBX2265", 3)]),
+    "nodes without a counterpart": ('<UnsetBlackboard key="x"/>', "", [("RBX2265", 3)]),
+    "an action that is done again there": ('<ReactiveSequence><A x="1"/><B/></ReactiveSequence>', "", [("RBX2266", 4)]),
+    "a shared entry": ('<A x="{@home}"/>', "", [("RBX2265", 2), ("RBX2266", 2)]),
     "a port that is two": (
         "<A/>",
         '<TreeNodesModel><Action ID="A"><input_port name="x"/><output_port name="x"/></Action></TreeNodesModel>',
-        [("RBX4174", 8)],
+        [("RBX2264", 8)],
     ),
     "a port of no model": (
         '<A y="1"/>',
         '<TreeNodesModel><Action ID="A"><input_port name="x"/></Action></TreeNodesModel>',
-        [("RBX4174", 3)],
+        [("RBX2264", 3)],
     ),
     "a port without a value": (
         '<SubTree ID="Sub"/>',
         f'<TreeNodesModel><SubTree ID="Sub"><input_port name="x"/></SubTree></TreeNodesModel>{SUB}',
-        [("RBX4174", 3)],
+        [("RBX2264", 3)],
     ),
-    "a package of ROS": ("<A/>", '<include ros_pkg="a" path="b.xml"/>', [("RBX4174", 5)]),
-    "a file that is not there": ("<A/>", '<include path="b.xml"/>', [("RBX4174", 5)]),
+    "a package of ROS": ("<A/>", '<include ros_pkg="a" path="b.xml"/>', [("RBX2264", 5)]),
+    "a file that is not there": ("<A/>", '<include path="b.xml"/>', [("RBX2264", 5)]),
 }
 
 
@@ -454,14 +454,14 @@ def test_large_files_take_bounded_time(tmp_path: Path) -> None:
         f"<Sequence>{'<SubTree ID=%sS%s _autoremap=%s1%s/>' % ((chr(34),) * 4) * 5_000}</Sequence>",
         f'<{TREE} ID="S"><Sequence>{entries}</Sequence></{TREE}>',
     )
-    assert ("RBX4174", 8) in passing.told
+    assert ("RBX2264", 8) in passing.told
     assert time.process_time() - before < 15
     assert wide.text
     assert len(bushy.beside) == 200
     deep = of_body(tmp_path, "<Inverter><Sequence>" * 29 + "<A/>" + "</Sequence></Inverter>" * 29)
     assert not deep.report.has_errors
     too_deep = of_body(tmp_path, "<Sequence>" * 50 + "<A/>" + "</Sequence>" * 50)
-    assert too_deep.told == [("RBX4174", 2)]
+    assert too_deep.told == [("RBX2264", 2)]
 
 
 def test_files_are_included_once_and_version_3_is_told(tmp_path: Path) -> None:
@@ -471,7 +471,7 @@ def test_files_are_included_once_and_version_3_is_told(tmp_path: Path) -> None:
     )
     body = f'<include path="sub/other.xml"/><{TREE} ID="Main"><SubTreePlus ID="Sub" __autoremap="1"/></{TREE}>'
     made = of_text(tmp_path, f'<root main_tree_to_execute="Main">{body}</root>')
-    assert made.told == [("RBX4176", 1), ("RBX4176", 1)]
+    assert made.told == [("RBX2266", 1), ("RBX2266", 1)]
     assert run(made) == "success: 0 a"
 
 
@@ -479,7 +479,7 @@ def test_a_main_tree_that_is_not_there_is_told(tmp_path: Path) -> None:
     made = of_text(
         tmp_path, f'<root BTCPP_format="4" main_tree_to_execute="Man"><{TREE} ID="Main"><A/></{TREE}></root>'
     )
-    assert [(found.code, found.help) for found in made.report] == [("RBX4174", "did you mean 'Main'?")]
+    assert [(found.code, found.help) for found in made.report] == [("RBX2264", "did you mean 'Main'?")]
     assert run(made) == "success: 0 a"
 
 
@@ -503,7 +503,7 @@ def test_names_follow_one_rule() -> None:
 def test_outputs_of_nodes_are_set_and_guessed_without_a_model(tmp_path: Path) -> None:
     body = '<Sequence><Look people="{n}"/><Say words="{n}"/></Sequence>'
     guessed = of_body(tmp_path, body)
-    assert guessed.told == [("RBX4176", 2)]
+    assert guessed.told == [("RBX2266", 2)]
     model = '<TreeNodesModel><Action ID="Look"><output_port name="people"/></Action></TreeNodesModel>'
     made = of_body(tmp_path, body, model)
     assert not made.told

@@ -63,7 +63,7 @@ def without_in_xml(text: str) -> Iterator[tuple[Key, tuple[Span, ...], str]]:
 
 
 def variants(file: ForeignFile) -> Iterator[tuple[Key, tuple[Span, ...], ForeignFile]]:
-    if file.name.endswith((".srdf", ".xml")):
+    if file.name.endswith((".srdf", ".xml")) and ".launch" not in file.name:  # whose elements are reported as a whole
         for key, places, text in without_in_xml(file.text):
             yield key, places, replace(file, text=text)
     elif not file.name.endswith(".urdf"):  # which is not carried over but referred to

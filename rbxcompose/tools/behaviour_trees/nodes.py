@@ -18,10 +18,10 @@ from rbxcompose.missions.language.keys import anywhere
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.tools.behaviour_trees.scripts import ScriptError, condition, script_of, text_of, unplaced
 
-MISTAKE = kind("RBX4174")
-NOT_SAID = kind("RBX4175")
-DIFFERS = kind("RBX4176", Severity.WARNING)
-CANNOT_EXPORT = kind("RBX4177")
+MISTAKE = kind("RBX2264")
+NOT_SAID = kind("RBX2265")
+DIFFERS = kind("RBX2266", Severity.WARNING)
+CANNOT_EXPORT = kind("RBX2267")
 
 MANY = 1_000
 TWIN = "_rbx_"  # begins attributes that BehaviorTree.CPP ignores: how a mission writes the attribute that follows

@@ -11,7 +11,7 @@ from rbxcompose.base.expressions import tree as syntax
 from rbxcompose.base.expressions.parser import LEVELS, LONGEST
 from rbxcompose.base.units import NUMBER
 
-Tree = syntax.ExpressionNode
+ScriptTree = syntax.ExpressionNode
 TERNARY, OR, AND, NOT, COMPARED, SUM, PRODUCT, MINUS, ATOM = range(9)
 COMPARISONS = ("==", "!=", "<", ">", "<=", ">=")
 _BINDING: Mapping[str, int] = {
@@ -39,7 +39,7 @@ class Statement:
     """An expression, and the entry to which its value is given; empty for a condition."""
 
     to: str
-    value: Tree
+    value: ScriptTree
 
 
 def statements(text: str) -> list[Statement]:
@@ -53,7 +53,7 @@ def statements(text: str) -> list[Statement]:
     return list(_ScriptParser(text).statements())
 
 
-def condition(text: str) -> Tree:
+def condition(text: str) -> ScriptTree:
     """Return the expression that a script is, if it assigns nothing.
 
     Raises:
@@ -106,7 +106,7 @@ class _ScriptParser:
             if self.kind != "end" and not self.at(";"):
                 raise ScriptError(_FOREIGN.get(self.now, f"'{self.now[:20]}' does not belong here"))
 
-    def expression(self, binding: int) -> Tree:
+    def expression(self, binding: int) -> ScriptTree:
         self.level += 1
         if self.level > LEVELS:
             raise ScriptError(f"an expression may have {LEVELS} levels")
@@ -116,7 +116,7 @@ class _ScriptParser:
         self.level -= 1
         return left
 
-    def operation(self, left: Tree, strength: int) -> Tree:
+    def operation(self, left: ScriptTree, strength: int) -> ScriptTree:
         operator = self.take()[1]
         operands = [left, self.expression(strength)]
         if strength in (OR, AND):
@@ -133,7 +133,7 @@ class _ScriptParser:
             return pairs[0] if len(pairs) == 1 else syntax.Junction(0, 0, "and", tuple(pairs))
         return syntax.Arithmetic(0, 0, "+" if operator == ".." else operator, *operands)
 
-    def operand(self) -> Tree:
+    def operand(self) -> ScriptTree:
         kind, text = self.take()
         match kind, text:
             case "hex", _:
@@ -173,7 +173,7 @@ class _Spelling:
 OURS = _Spelling("${}".format)
 
 
-def text_of(tree: Tree, spelling: _Spelling = OURS) -> str:
+def text_of(tree: ScriptTree, spelling: _Spelling = OURS) -> str:
     """Return an expression as a text that reads back as the same tree.
 
     Raises:
@@ -182,7 +182,7 @@ def text_of(tree: Tree, spelling: _Spelling = OURS) -> str:
     return _spelt(tree, spelling)[0]
 
 
-def script_of(tree: Tree, variable: Callable[[str], str] = str) -> str:
+def script_of(tree: ScriptTree, variable: Callable[[str], str] = str) -> str:
     """Return an expression as a script.
 
     Raises:
@@ -191,8 +191,8 @@ def script_of(tree: Tree, variable: Callable[[str], str] = str) -> str:
     return text_of(tree, _Spelling(variable, {"and": "&&", "or": "||"}, "!", MINUS, is_script=True))
 
 
-def _spelt(tree: Tree, how: _Spelling) -> tuple[str, int]:
-    def inner(node: Tree, least: int) -> str:
+def _spelt(tree: ScriptTree, how: _Spelling) -> tuple[str, int]:
+    def inner(node: ScriptTree, least: int) -> str:
         text, strength = _spelt(node, how)
         return text if strength >= least else f"({text})"
 
