@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from pydantic import InstanceOf, WithJsonSchema
 
 from rbxcompose.base.expressions.types import Type
+from rbxcompose.base.requests import Command
 from rbxcompose.missions.analysis.uses import Using
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
 from rbxcompose.missions.engine.world import POSE, World
@@ -37,6 +38,7 @@ from rbxcompose.sdk import (
 from rbxcompose.sdk.robot_events import MissionOver, MissionWaits
 
 if TYPE_CHECKING:  # a check needs no engine: it is imported when the component is configured
+    from rbxcompose.missions.engine.interventions import Intervention
     from rbxcompose.missions.engine.logbook import LogRecord
     from rbxcompose.missions.execution.mission_run import MissionRun
     from rbxcompose.missions.execution.world import RobotWorld
@@ -152,6 +154,7 @@ class Mission(Component[MissionConfig]):
         )
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
         self.kept: dict[str, requests.RunMission] = {}  # requests by people that began missions that still run
+        self.repeated: tuple[Command, ...] = ()  # those, and the breakpoints
         self.shown = ""  # the last reported status
         self.planned: float | None = None  # the last requested wake [s]
         self.misfits: set[str] = set()  # values whose messages have another shape
@@ -243,6 +246,8 @@ class Mission(Component[MissionConfig]):
         run.tick(self.now)
         if run.end is not None:
             self.finish(run.name, run.end)
+        elif run.engine.stops:
+            self.show(Level.OK, f"mission {run.name} is stopped at {run.stopped_at[0]['place']}")
         due = run.next_wake()
         return [due] if due is not None else []
 
@@ -343,6 +348,89 @@ class Mission(Component[MissionConfig]):
         self.look_soon()
         return self.announce(f"mission {run.name} resumed")
 
+    # Debugging
+
+    @answers(requests.SetBreakpoint)
+    def set_breakpoint(self, request: requests.SetBreakpoint) -> str:
+        """Stop a mission at a node or a transition, now and whenever it runs again."""
+        self.arm(self.missions.breakpoints.add(request.where, request.mission, self.missions.names))
+        here = [one for one in self.missions.breakpoints.listed() if one.where == request.where]
+        return "; ".join(f"breakpoint in {one.mission}: {one.place}, {one.text}" for one in here)
+
+    @answers(requests.ClearBreakpoints)
+    def clear_breakpoints(self, request: requests.ClearBreakpoints) -> str:
+        """Clear one breakpoint or all."""
+        self.arm(self.missions.breakpoints.clear(request.where, request.mission))
+        return "breakpoint cleared" if request.where else "all breakpoints cleared"
+
+    @answers(requests.ListBreakpoints)
+    def list_breakpoints(self, request: requests.ListBreakpoints) -> tuple[requests.ListedBreakpoint, ...]:
+        """Return all breakpoints."""
+        return self.missions.breakpoints.listed()
+
+    def arm(self, missions: Iterable[str]) -> None:
+        """Let missions stop at their breakpoints, and keep these over a crash."""
+        for run in self.missions:
+            if run.name in missions:
+                run.stop_at(self.missions.breakpoints.of(run.name), self.now)
+        self.keep()
+
+    @answers(requests.StepMission)
+    def take_step(self, request: requests.StepMission) -> str:
+        """Let a mission go on to its next leaf or transition."""
+        from rbxcompose.missions.engine.interventions import TakeStep
+
+        run = self.begun(request.mission, lambda one: one.is_paused)
+        if self.context.is_stopped:
+            raise Refused("the robot is stopped: release it first")
+        run.intervene(TakeStep(), self.now)
+        if run.is_paused:
+            run.resume(self.now)
+        self.look_soon()
+        return f"mission {run.name} goes on to its next step"
+
+    @answers(requests.ForceNode)
+    def force(self, request: requests.ForceNode) -> str:
+        """Let a node that runs end."""
+        from rbxcompose.missions.execution.debugging import forced
+
+        return self.intervene(request.mission, lambda run: [forced(run, request.where, request.outcome)])
+
+    @answers(requests.SetMissionData)
+    def set_data(self, request: requests.SetMissionData) -> str:
+        """Set data of a mission."""
+        from rbxcompose.missions.execution.debugging import changed
+
+        return self.intervene(request.mission, lambda run: changed(run, request.values))
+
+    @answers(requests.JumpMission)
+    def jump(self, request: requests.JumpMission) -> str:
+        """Bring a machine into another state."""
+        from rbxcompose.missions.execution.debugging import jump
+
+        return self.intervene(request.mission, lambda run: [jump(run, request.state)])
+
+    def begun(self, name: str, what: Callable[[MissionRun], bool] = lambda one: True) -> MissionRun:
+        """Return a mission that runs and has begun; raise `Refused` if there is none."""
+        run = self.missions.running(name, what)
+        if run.engine.status == IDLE:
+            raise Refused(f"mission {run.name} has not begun")
+        return run
+
+    def intervene(self, name: str, wanted: Callable[[MissionRun], Iterable[Intervention]]) -> str:
+        """Do in a mission what a person wants, all of it or nothing; raise `Refused` if it cannot be done."""
+        from rbxcompose.missions.engine.interventions import NotPossible
+
+        run = self.begun(name)
+        try:
+            for intervention in wanted(run):
+                run.intervene(intervention, self.now)
+        except NotPossible as error:
+            raise Refused(str(error)) from error
+        self.look_soon()
+        self.broadcast.publish(self.missions)
+        return f"mission {run.name}: done; it goes on from there {'when it is resumed' if run.is_paused else 'now'}"
+
     @answers(requests.ListMissions)
     def listed(self, request: requests.ListMissions) -> tuple[requests.ListedMission, ...]:
         """Return all missions."""
@@ -375,12 +463,13 @@ class Mission(Component[MissionConfig]):
         return self.announce(f"mission {run.name} {why}")
 
     def keep(self, begun: requests.RunMission | None = None) -> None:
-        """Let the supervisor repeat, after a crash, the requests by which people began missions that still run."""
+        """Let the supervisor repeat, after a crash, what set breakpoints and began missions that still run."""
         kept = {**self.kept, **({begun.mission: begun} if begun else {})}
-        still = {name: entry for name, entry in kept.items() if name in self.missions.names}
-        if still != self.kept:
-            self.kept = still
-            self.context.repeat(tuple(still.values()))
+        self.kept = {name: entry for name, entry in kept.items() if name in self.missions.names}
+        repeated = (*self.missions.breakpoints.requests, *self.kept.values())
+        if repeated != self.repeated:
+            self.repeated = repeated
+            self.context.repeat(repeated)
 
     # Reports
 

@@ -10,6 +10,7 @@ from rbxcompose.base.expressions.types import Type
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.engine import value_text
 from rbxcompose.missions.engine.events import MissionEvent
+from rbxcompose.missions.engine.probes import Probe
 from rbxcompose.missions.engine.resume_points import ResumableTask, ResumePoints
 from rbxcompose.missions.engine.scopes import MissionScope, RunScope
 from rbxcompose.missions.engine.world import Settings, Watched, World
@@ -52,6 +53,8 @@ class EngineBase:
         self.arrived: list[tuple[int, Result]] = []
         self.wake: float | None = None
         self.reading: set[str] = set()
+        self.probes: dict[int, Probe] = {}  # breakpoints and what follows from them, by node number
+        self.stops: list[int] = []  # nodes at which probes stopped the mission; the shell then pauses it
         self.wants_again: TickSource | None = None  # what requested another tick at this instant
 
     @property

@@ -51,6 +51,10 @@ class MissionStory:
                 return LEVELS[level], text
             case events.Reported(place=place, message=message):
                 return Level.WARN, f"{place}: {message}"
+            case events.Stopped(place=place, text=text, after=after):
+                return Level.OK, f"stopped at {place}, {f'after {text}: {after}' if after else f'before {text}'}"
+            case events.Intervened(text=text):
+                return Level.WARN, f"by hand: {text}; the run cannot be reproduced without this"
             case events.MissionEnded(result=result):
                 text = f"mission {self._mission}: {result}"
                 otherwise = Level.WARN if event.doubt else Level.OK

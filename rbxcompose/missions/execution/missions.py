@@ -13,6 +13,7 @@ from rbxcompose.base.units import format_quantity
 from rbxcompose.missions.engine.inputs import NoSuchState, bind_texts, start_at
 from rbxcompose.missions.engine.logbook import LogRecord
 from rbxcompose.missions.engine.world import Observer, Settings
+from rbxcompose.missions.execution.debugging import Breakpoints
 from rbxcompose.missions.execution.errands import Equipment
 from rbxcompose.missions.execution.mission_run import LogStore, MakeWorld, MissionRun, claims_of
 from rbxcompose.missions.execution.requests import (
@@ -45,6 +46,7 @@ class RunningMissions:
         self.runs: dict[str, MissionRun] = {}
         self._log = LogStore()
         self._counts: dict[str, int] = {}
+        self.breakpoints = Breakpoints(equipment)
 
     def __iter__(self) -> Iterator[MissionRun]:
         """Return the missions that run or are paused."""
@@ -89,6 +91,7 @@ class RunningMissions:
             name=name,
             settings=settings,
         )
+        self.runs[name].breakpoints = self.breakpoints.of(name)
         return self.runs[name]
 
     def seen(self, name: str, since: int = 0) -> Seen:
@@ -141,7 +144,8 @@ class RunningMissions:
         inputs = tuple(map(_listed_input, program.inputs.values()))
         states = program.nodes[program.main].step.states
         starts = states.names if states else ()
-        return ListedMission(name, program.about, run.state if run else NAMES[IDLE], tuple(claims), inputs, starts)
+        at = ", ".join(stop["place"] for stop in run.stopped_at) if run else ""
+        return ListedMission(name, program.about, run.state if run else NAMES[IDLE], tuple(claims), inputs, starts, at)
 
     def since(self, number: int) -> LogPart:
         """Return the records of the log after the first `number`."""
@@ -180,6 +184,7 @@ class RunningMissions:
 
 
 PATH = "missions"
+_TOLD = "version", "state", "transitions", "began", "stopped_at"  # what is news
 _ALWAYS = frozenset({"mission", "version", "whole", "state"})  # what is in all updates
 
 Open = Callable[[str, Query[Any]], Window]  # takes a path and the query that is made there
@@ -215,7 +220,7 @@ class MissionFeed:
         seen = run.seen(self._published.get("version", 0))
         fresh = {key: value for key, value in seen.items() if key in _ALWAYS or self._published.get(key) != value}
         fresh |= {"statuses": seen["statuses"], "data": seen["data"]}
-        if all(self._published.get(key) == seen[key] for key in ("version", "state", "transitions", "began")):
+        if all(self._published.get(key) == seen[key] for key in _TOLD):
             return
         self._published = seen
         self._window.put(fresh)

@@ -1,4 +1,4 @@
-"""Run, hold, watch, draw and explore the missions of a robot.
+"""Run, hold, watch, debug, draw and explore the missions of a robot.
 
 Exit codes: 0 fine, 1 refused or errors found, 2 wrong usage.
 """
@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from rbxcompose.base.requests import Command, Query, Refused, to_data
-from rbxcompose.commands.console import NotDoneError, emit, refuse
+from rbxcompose.commands.console import NotDoneError, emit, refuse, table
 from rbxcompose.commands.lookup import REFUSED, WHICH, add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, deferred, out_option, run_action
 from rbxcompose.missions.execution import requests
@@ -44,6 +44,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         argument("--all", action="store_true", help="also its inputs, so that it can be run again"),
     )
     again = (argument("log", metavar="FILE", help="the output of 'mission log --all'"), robot)
+    where = "FILE:LINE, the name of a node, a state, STATE->STATE, or the node's number"
+    which = argument("--mission", dest="name", default="", metavar="MISSION", help="which one, if that is not clear")
+    broken = (
+        argument("where", nargs="?", default="", metavar="WHERE", help=where),
+        which,
+        argument("--clear", action="store_true", help="clear it; without WHERE, clear all"),
+        add_asking_options,
+    )
+    forced = (
+        argument("where", metavar="WHERE", help=where),
+        argument("outcome", metavar="OUTCOME", help="success, failure, or an outcome of its own"),
+        which,
+        add_asking_options,
+    )
+    changed = (argument("sets", nargs="+", metavar="NAME=VALUE", help="what to set"), which, add_asking_options)
+    jumped = (argument("state", metavar="STATE", help="the state to enter"), which, add_asking_options)
     drawn = (
         the_mission,
         robot,
@@ -65,6 +81,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("cancel", "end a mission for good", _to(requests.CancelMission), named),
         ("pause", "hold a mission; its timers stand still", _to(requests.PauseMission), named),
         ("resume", "resume a mission where it was held", _to(requests.ResumeMission), named),
+        ("step", "go on to the next leaf or transition", _to(requests.StepMission), named),
+        ("break", "stop at a node or a transition; without one, list the breakpoints", _break, broken),
+        ("force", "let a node that runs end with an outcome", _force, forced),
+        ("set", "set data of a mission that runs", _set, changed),
+        ("jump", "bring a machine that runs into another state", _jump, jumped),
         ("status", "show where a mission is, with its data", _status, named),
         ("watch", "show a mission live", _watch, named),
         ("log", "print what missions did, as JSON, one line each", _log, logged),
@@ -104,6 +125,38 @@ def _run(arguments: argparse.Namespace) -> int:
     return pass_on(arguments, requests.RunMission(arguments.name, inputs, arguments.start))
 
 
+def _break(arguments: argparse.Namespace) -> int:
+    where, name = arguments.where, arguments.name
+    if arguments.clear:
+        return pass_on(arguments, requests.ClearBreakpoints(where, name))
+    if where:
+        return pass_on(arguments, requests.SetBreakpoint(where, name))
+    found = [one for one in ask(arguments.robot, requests.ListBreakpoints()) if name in ("", one.mission)]
+    if arguments.json:
+        emit(json.dumps(to_data(found)))
+    else:
+        rows = [(one.mission, one.where, one.place, one.text) for one in found]
+        emit(table([("mission", "breakpoint", "place", "what"), *rows]) if rows else "no breakpoints")
+    return 0
+
+
+def _force(arguments: argparse.Namespace) -> int:
+    return pass_on(arguments, requests.ForceNode(arguments.where, arguments.outcome, arguments.name))
+
+
+def _set(arguments: argparse.Namespace) -> int:
+    folder = find_robot(arguments.robot)
+    try:
+        values = requests.settings(arguments.sets)
+    except Refused as refusal:
+        return refuse(REFUSED.at(None, f"'{folder.path.name}' refuses: {refusal}"))
+    return pass_on(arguments, requests.SetMissionData(values, arguments.name))
+
+
+def _jump(arguments: argparse.Namespace) -> int:
+    return pass_on(arguments, requests.JumpMission(arguments.state, arguments.name))
+
+
 def _list(arguments: argparse.Namespace) -> int:
     missions = ask(arguments.robot, requests.ListMissions())
     emit(json.dumps(to_data(missions)) if arguments.json else _table(missions))
@@ -112,8 +165,12 @@ def _list(arguments: argparse.Namespace) -> int:
 
 def _table(missions: Sequence[requests.ListedMission]) -> str:
     names = max((len(mission.name) for mission in missions), default=0)
-    states = max((len(mission.state) for mission in missions), default=0)
-    lines = [f"{mission.name:<{names}}  {mission.state:<{states}}  {mission.about}".rstrip() for mission in missions]
+    shown = [f"{mission.state} at {mission.at}" if mission.at else mission.state for mission in missions]
+    states = max(map(len, shown), default=0)
+    lines = [
+        f"{mission.name:<{names}}  {state:<{states}}  {mission.about}".rstrip()
+        for mission, state in zip(missions, shown, strict=True)
+    ]
     return "\n".join(lines) or "this robot has no missions"
 
 
