@@ -285,7 +285,7 @@ def difference(run: LoggedRun, name: str, robot: Robot, file: str, budget: Repla
         return "the log has results of nodes that the mission does not have: it has changed too much to continue"
     except OtherInterventionError as error:
         did = run.records[error.record]
-        return f"cannot repeat what a person did at {did['time']:g} s: {error}\n  then: {json.dumps(did['did'])}"
+        return f"cannot repeat what was done at {did['time']:g} s: {error}\n  then: {json.dumps(did.get('did', ''))}"
     except ReplayError as error:
         place = _line(file, run.lines[error.record])
         raise NotDoneError(NO_LOG.at(place, f"'{file}' cannot be replayed: {error}")) from error

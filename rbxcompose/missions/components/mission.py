@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -46,6 +47,7 @@ if TYPE_CHECKING:  # a check needs no engine: it is imported when the component 
 RUN = "run_mission"
 RATE = 10.0  # [Hz]
 LOOK_AGAIN = 0.1  # [s] between two checks for a pose that has not arrived yet
+RESTART, ASK = "restart", "ask"  # after a crash
 NO_INPUTS: Mapping[str, str] = {}
 
 T = TypeVar("T")
@@ -61,6 +63,8 @@ class MissionConfig(Config):
     """The mission that starts by itself."""
     inputs: dict[str, dict[str, Any]] = {}
     """Values of the inputs, by mission and name."""
+    after_crash: dict[str, str] = {}
+    """What missions do after a crash, by mission: `restart`, `ask` or `continue`."""
     values: dict[str, Made[ValueSource]] = {}
     """Where the robot's values come from."""
     places: dict[str, Made[Place]] = {}
@@ -142,11 +146,14 @@ class Mission(Component[MissionConfig]):
         """Start with no values and no missions."""
         from rbxcompose.missions.execution.missions import Broadcast, RunningMissions
         from rbxcompose.missions.execution.ordered import OrderedMission
+        from rbxcompose.missions.execution.snapshots import SnapshotStore
         from rbxcompose.missions.execution.topic_skills import Desks
         from rbxcompose.missions.execution.world import Arrivals
 
         self.arrivals, self.desks = Arrivals(self.config.values), Desks(self)
         self.missions = RunningMissions(self.config, self.world, self.story, self.publish)
+        address = self.context.address
+        self.snapshots = SnapshotStore(address.robot, is_kept=bool(address.router))
         self.broadcast = Broadcast(self.config.programs, self.context.window)
         programs = self.config.programs
         self.ordered = OrderedMission(
@@ -155,6 +162,7 @@ class Mission(Component[MissionConfig]):
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
         self.kept: dict[str, requests.RunMission] = {}  # requests by people that began missions that still run
         self.repeated: tuple[Command, ...] = ()  # those, and the breakpoints
+        self.trouble = ""  # with snapshots
         self.shown = ""  # the last reported status
         self.planned: float | None = None  # the last requested wake [s]
         self.misfits: set[str] = set()  # values whose messages have another shape
@@ -174,7 +182,7 @@ class Mission(Component[MissionConfig]):
             self.show(Level.OK, "no mission to start")
             return
         try:
-            run = self.begin(name)
+            run = self.recovered(name) or self.begin(name)
             if self.is_held and not run.is_paused:
                 self.hold_back(run)
         except Refused as refusal:  # a person has already begun it
@@ -189,12 +197,34 @@ class Mission(Component[MissionConfig]):
             Refused: if it cannot run, with the reason.
         """
         run = self.missions.run(name, inputs, state, lent)
+        self.snapshots.set_aside(name)
         if missing := run.missing():
             self.info(f"mission {name} waits for {', '.join(missing)}")
         if self.context.is_stopped:
             self.hold_back(run)
         self.look_soon()
         return run
+
+    def recovered(self, name: str) -> MissionRun | None:
+        """Return a mission that a crash had cut short, if it is to go on where it was; else None."""
+        policy = self.config.after_crash.get(name, RESTART)
+        snapshot = self.snapshots.read(name, is_latest=True) if policy != RESTART else None
+        if snapshot is None:
+            return None
+        try:
+            run = self.missions.resumed(name, snapshot, self.now)
+        except Refused as refusal:
+            self.warn(f"{refusal}; it starts again")
+            return None
+        self.continue_with(run, is_asked=policy == ASK or bool(snapshot["is_paused"]))
+        return run
+
+    def continue_with(self, run: MissionRun, *, is_asked: bool) -> str:
+        """Let a restored mission go on as soon as it knows what it reads, unless a person is asked."""
+        run.goes_on = not is_asked and not self.context.is_stopped
+        self.look_soon()
+        until = "as soon as its values have arrived" if run.goes_on else "when it is resumed"
+        return self.announce(f"mission {run.name} is restored from its snapshot; it goes on {until}")
 
     def hold_back(self, run: MissionRun) -> None:
         """Let a mission begin only at the resume."""
@@ -229,12 +259,22 @@ class Mission(Component[MissionConfig]):
         wakes: list[float] = []
         for mission in self.missions:
             wakes += self.turn(mission)
+            if (due := self.snapshots.keep(mission, self.now)) is not None:
+                wakes.append(due)
+        if self.snapshots.trouble != self.trouble and self.snapshots.trouble:
+            self.warn(self.snapshots.trouble)
+        self.trouble = self.snapshots.trouble
         if wakes:
             self.plan(min(wakes))
         self.broadcast.publish(self.missions)
 
     def turn(self, run: MissionRun) -> list[float]:
         """Do what is due in a mission; return its next wake [s], if any."""
+        if run.goes_on:
+            if missing := run.missing():
+                return self.wait(run, ", ".join(missing))
+            run.goes_on = False
+            run.resume(self.now)
         if run.is_paused:
             run.look(self.now)
             due = run.next_wake()
@@ -287,6 +327,7 @@ class Mission(Component[MissionConfig]):
         """Report that a mission has ended; after the start mission, the robot may go down."""
         level = Level.ERROR if end.result == "failure" else Level.WARN if end.doubt else Level.OK
         self.show(level, ": ".join(filter(None, (name, end.result, end.doubt))))
+        self.snapshots.drop(name)
         self.keep()
         if name == self.config.start:
             self.context.notify(MissionOver(name, end.result, end.words))
@@ -303,6 +344,7 @@ class Mission(Component[MissionConfig]):
         self.is_held = self.is_held or any(run.is_paused for run in self.missions)
         for mission in self.missions:
             mission.abort(self.now)
+            self.snapshots.drop(mission.name)
         self.broadcast.publish(self.missions)
 
     # Commands from people
@@ -310,8 +352,9 @@ class Mission(Component[MissionConfig]):
     @answers(requests.RunMission)
     def run(self, request: requests.RunMission) -> str:
         """Begin a mission, and restart it after a crash."""
-        self.begin(request.mission, request.inputs, request.start)
-        self.keep(request)
+        if not (request.is_repeated and self.recovered(request.mission)):
+            self.begin(request.mission, request.inputs, request.start)
+        self.keep(replace(request, is_repeated=True))
         return f"mission {request.mission} starts"
 
     @answers(requests.CancelMission)
@@ -430,6 +473,17 @@ class Mission(Component[MissionConfig]):
         self.look_soon()
         self.broadcast.publish(self.missions)
         return f"mission {run.name}: done; it goes on from there {'when it is resumed' if run.is_paused else 'now'}"
+
+    @answers(requests.RestoreMission)
+    def restore(self, request: requests.RestoreMission) -> str:
+        """Go on with a mission where a crash had cut it short."""
+        names = [request.mission] if request.mission else [*self.config.programs]
+        found = {name: snapshot for name in names if (snapshot := self.snapshots.read(name))}
+        if len(found) != 1:
+            several = f"several missions have one: {', '.join(found)}; name one"
+            raise Refused(several if found else "there is no snapshot of a mission that was cut short")
+        name, snapshot = next(iter(found.items()))
+        return self.continue_with(self.missions.resumed(name, snapshot, self.now), is_asked=False)
 
     @answers(requests.ListMissions)
     def listed(self, request: requests.ListMissions) -> tuple[requests.ListedMission, ...]:

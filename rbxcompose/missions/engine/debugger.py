@@ -7,7 +7,7 @@ run as if there were no debugger.
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from types import new_class
-from typing import ClassVar, assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 from rbxcompose.missions.engine.build import Around
 from rbxcompose.missions.engine.engine_base import EngineBase
@@ -132,11 +132,7 @@ class Debugger:
 
     def do(self, intervention: Intervention) -> None:
         """Do what a person wants; raise `NotPossible` if that cannot be done."""
-        if not self._outer:
-            for task in self._all:
-                self._inner.setdefault(task.number, task)
-                if not isinstance(task, Around):
-                    self._outer[task.number] = task
+        self._find_tasks()
         match intervention:
             case SetBreakpoints():
                 self._set(intervention)
@@ -159,10 +155,37 @@ class Debugger:
                 probe.steps_in = probe.steps_out = False
             self._settle()
 
+    def pending(self) -> list[list[Any]]:
+        """Return the nodes that only seem to run, as data: number, whether it has not begun, how it will end."""
+        probes = self._engine.probes.items()
+        return [
+            [number, probe.is_waiting, list(probe.result) if probe.result else None]
+            for number, probe in sorted(probes)
+            if probe.is_pending
+        ]
+
+    def take_up(self, pending: Sequence[Sequence[Any]]) -> None:
+        """Restore what `pending` returned; there are no breakpoints then."""
+        if not pending and not self._engine.probes:
+            return
+        self._find_tasks()
+        for probe in self._engine.probes.values():
+            probe.is_waiting, probe.result = False, None
+        for number, is_waiting, result in pending:
+            probe = self._probe(number)
+            probe.is_waiting, probe.result = is_waiting, (result[0], result[1]) if result else None
+        self._settle()
+
     def live(self) -> frozenset[int]:
         """Return the nodes that run or are suspended, with those at which the mission was stopped."""
         courses = (course for run in self._runs for course in run.stack)
         return frozenset(task.number for course in courses if course.current for task in _below(course.current))
+
+    def _find_tasks(self) -> None:
+        for task in () if self._outer else self._all:
+            self._inner.setdefault(task.number, task)
+            if not isinstance(task, Around):
+                self._outer[task.number] = task
 
     def _set(self, wanted: SetBreakpoints) -> None:
         numbers = {*wanted.starts, *(number for number, _ in wanted.ends)}

@@ -111,6 +111,12 @@ class Engine(EngineBase):
             self.status = FAILURE
             self.world.say(MissionEnded("halted"))
 
+    def forget_requests(self) -> None:
+        """Take the results that have arrived; all other requests are lost, with the process that made them."""
+        self._take_results()
+        for leaf in self._leaves.values():
+            leaf.lose()
+
     def intervene(self, intervention: Intervention, now: float) -> None:
         """Do what a person wants; it takes effect at the next tick.
 

@@ -186,6 +186,8 @@ def _again(engine: Engine, call: LoggedCall, index: int) -> None:
                 engine.resume(call.at)
             case "abort":
                 engine.abort(call.at)
+            case "restore":
+                raise OtherInterventionError("it goes on from a snapshot, which the log does not hold", index)
             case "intervene" if call.did:
                 engine.intervene(call.did, call.at)
     except NotPossible as error:

@@ -19,7 +19,8 @@ from rbxcompose.missions.engine.world import Settings, World
 from rbxcompose.missions.program.outcomes import Result
 
 BEGIN, TICK, PAUSE, RESUME, ABORT, INTERVENE = "begin", "tick", "pause", "resume", "abort", "intervene"
-INPUTS = frozenset({BEGIN, TICK, PAUSE, RESUME, ABORT, INTERVENE})
+RESTORE = "restore"  # from a snapshot, which the log does not hold
+INPUTS = frozenset({BEGIN, TICK, PAUSE, RESUME, ABORT, INTERVENE, RESTORE})
 
 V = TypeVar("V")
 LogRecord = dict[str, Any]

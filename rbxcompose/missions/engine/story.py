@@ -29,7 +29,7 @@ class MissionStory:
                 return Level.OK, text
             case events.SkillEnded(leaf=leaf, skill=skill, result=result, duration=duration, message=message):
                 self._results.setdefault(skill, Counter())[result] += 1
-                text = f"{self._labels[leaf]}: {result} ({format_number(round(duration, 1))} s)"
+                text = f"{self._labels.get(leaf, skill)}: {result} ({format_number(round(duration, 1))} s)"
                 return RESULTS.get(result, Level.OK), _with(text, message)
             case events.InterruptStarted(name=name, condition=condition, shown=shown):
                 values = ", ".join(f"{name} {value}" for name, value in shown.items())

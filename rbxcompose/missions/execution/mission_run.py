@@ -14,6 +14,7 @@ from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent, Transition
 from rbxcompose.missions.engine.interventions import Intervention, SetBreakpoints
 from rbxcompose.missions.engine.logbook import LoggedWorld, LogRecord
+from rbxcompose.missions.engine.snapshot import carry_on, restore
 from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.world import PLAIN, POSE, Settings, World
 from rbxcompose.missions.execution.world import RobotWorld
@@ -84,6 +85,7 @@ class MissionRun:
         self.story = MissionStory(name)
         self.transitions: deque[dict[str, Any]] = deque(maxlen=LAST)
         self.breakpoints = SetBreakpoints()
+        self.goes_on = False  # it was restored, and is resumed when every value that it reads has arrived
         self._on_line, self._now = on_line, 0.0
         world, self.robot = make(self._ended, self._said)
         self.log = LoggedWorld(world, lambda record: write({"time": self._now, "mission": name, **record}))
@@ -137,6 +139,20 @@ class MissionRun:
         self._do(logbook.TICK, lambda: self.engine.tick(now), now)
         if self.engine.stops and not self.is_over:
             self.pause(now)
+
+    def restore(self, state: Mapping[str, Any], now: float) -> None:
+        """Go on from a snapshot, of this process or another one; it is paused then.
+
+        Raises:
+            NoSnapshot: if it is none of this mission.
+        """
+        self._now = self.began = now
+        self.log.begin(self._inputs, self._settings)
+        restore(self.engine, state)
+        self._do(logbook.RESTORE, lambda: carry_on(self.engine), now)
+        self.is_paused = True
+        if self.breakpoints != SetBreakpoints():
+            self.intervene(self.breakpoints, now)
 
     def next_wake(self) -> float | None:
         """Return when to tick it next [s]."""

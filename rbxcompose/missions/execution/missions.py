@@ -12,7 +12,8 @@ from rbxcompose.base.requests import Query, Refused
 from rbxcompose.base.units import format_quantity
 from rbxcompose.missions.engine.inputs import NoSuchState, bind_texts, start_at
 from rbxcompose.missions.engine.logbook import LogRecord
-from rbxcompose.missions.engine.world import Observer, Settings
+from rbxcompose.missions.engine.snapshot import from_plain
+from rbxcompose.missions.engine.world import PLAIN, Observer, Settings
 from rbxcompose.missions.execution.debugging import Breakpoints
 from rbxcompose.missions.execution.errands import Equipment
 from rbxcompose.missions.execution.mission_run import LogStore, MakeWorld, MissionRun, claims_of
@@ -25,6 +26,7 @@ from rbxcompose.missions.execution.requests import (
     PictureData,
     Seen,
 )
+from rbxcompose.missions.execution.snapshots import differences, identity_of
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.machines import Datum, Input
 from rbxcompose.missions.program.outcomes import IDLE, NAMES
@@ -78,6 +80,27 @@ class RunningMissions:
             settings = Settings(start_at=start_at(linked, start) if start else {}, observer=self.observer)
         except NoSuchState as error:
             raise Refused(str(error)) from error
+        return self._made(name, program, inputs, settings)
+
+    def resumed(self, name: str, snapshot: Mapping[str, Any], now: float) -> MissionRun:
+        """Restore a mission from its snapshot; it is paused.
+
+        Raises:
+            Refused: if mission or robot have changed, it runs, or a running mission needs the same part of the robot.
+        """
+        program = self._program(name)
+        if name in self.names:
+            raise Refused(f"mission {name} is running: cancel it first")
+        linked = link(program, self._equipment.names.missions)
+        if changed := differences(snapshot["identity"], identity_of(linked, self._equipment.names)):
+            raise Refused(f"mission {name} cannot go on from its snapshot: {changed} changed since")
+        if clash := self._clash(linked, frozenset()):
+            raise Refused(clash)
+        run = self._made(name, program, from_plain(snapshot["state"]["runs"][0]["inputs"]), PLAIN)
+        run.restore(snapshot["state"], now)
+        return run
+
+    def _made(self, name: str, program: Program, inputs: Mapping[str, Value], settings: Settings) -> MissionRun:
         self._counts[name] = self._counts.get(name, 0) + 1
         number = self._counts[name]
         self.runs.pop(name, None)

@@ -25,6 +25,8 @@ class RunMission(Command):
     mission: str
     inputs: Mapping[str, str] = field(default_factory=dict)
     start: str = ""
+    is_repeated: bool = False
+    """Whether a crash had cut it short: it may go on from its snapshot."""
 
     @property
     def words(self) -> str:
@@ -60,6 +62,16 @@ class PauseMission(_OfMission):
 @dataclass(frozen=True, slots=True)
 class ResumeMission(_OfMission):
     """Resume a paused mission."""
+
+
+@dataclass(frozen=True, slots=True)
+class RestoreMission(_OfMission):
+    """Go on with a mission where it was when its process crashed or the machine lost power."""
+
+    @property
+    def words(self) -> str:
+        """Return it as written on the command line."""
+        return shlex.join(["resume", *([self.mission] if self.mission else []), "--from-snapshot"])
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,6 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         sets,
         argument("--from", dest="start", default="", metavar="STATE", help="start in this state: 'outer.inner'"),
     )
+    resumed = (
+        *named,
+        argument("--from-snapshot", action="store_true", help="go on where it was before a crash or a loss of power"),
+    )
     logged = (
         *named,
         argument("-f", "--follow", action="store_true", help="follow new records, until interrupted"),
@@ -80,7 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("run", "start a mission beside those that run", _run, started),
         ("cancel", "end a mission for good", _to(requests.CancelMission), named),
         ("pause", "hold a mission; its timers stand still", _to(requests.PauseMission), named),
-        ("resume", "resume a mission where it was held", _to(requests.ResumeMission), named),
+        ("resume", "resume a mission where it was held", _resume, resumed),
         ("step", "go on to the next leaf or transition", _to(requests.StepMission), named),
         ("break", "stop at a node or a transition; without one, list the breakpoints", _break, broken),
         ("force", "let a node that runs end with an outcome", _force, forced),
@@ -123,6 +127,11 @@ def _run(arguments: argparse.Namespace) -> int:
     except Refused as refusal:
         return refuse(REFUSED.at(None, f"'{folder.path.name}' refuses: {refusal}"))
     return pass_on(arguments, requests.RunMission(arguments.name, inputs, arguments.start))
+
+
+def _resume(arguments: argparse.Namespace) -> int:
+    do = requests.RestoreMission if arguments.from_snapshot else requests.ResumeMission
+    return pass_on(arguments, do(arguments.name))
 
 
 def _break(arguments: argparse.Namespace) -> int:
