@@ -32,6 +32,7 @@ class SnapshotStore:
         self._folder = state_folder() / "snapshots" / robot if is_kept else None
         self._due: dict[str, float] = {}
         self._known: dict[str, Any] = {}  # what the latest snapshot of each mission has
+        self._made_of: dict[str, tuple[MissionRun, Mapping[str, str]]] = {}
         self.trouble = ""  # why the latest one could not be written
 
     def keep(self, run: MissionRun, now: float) -> float | None:
@@ -45,8 +46,10 @@ class SnapshotStore:
         if now < self._due.get(run.name, now) - ROUNDING:
             return self._due[run.name]
         self._due[run.name], self._known[run.name] = now + PERIOD, state
-        identity = identity_of(engine.program, engine.robot)
-        content = {"version": VERSION, "identity": identity, "is_paused": run.is_paused, "state": save(engine)}
+        if self._made_of.get(run.name, (None,))[0] is not run:
+            self._made_of[run.name] = run, identity_of(engine.program, engine.robot)
+        state_now = {"is_paused": run.is_paused, "state": save(engine)}
+        content = {"version": VERSION, "identity": self._made_of[run.name][1], **state_now}
         self._write(self._path(run.name), content)
         return None
 
