@@ -12,6 +12,7 @@ from rbxcompose.missions.engine.log_replay import OtherInterventionError, replay
 from rbxcompose.missions.execution.requests import (
     CancelMission,
     ListMissions,
+    PauseMission,
     RestoreMission,
     ResumeMission,
     RunMission,
@@ -200,3 +201,38 @@ def test_a_robot_on_a_stepped_clock_keeps_no_snapshots(folder: Path) -> None:
     robot.start()
     robot.advance(5.0)
     assert not list(folder.iterdir())
+
+
+WATCHFUL = "interrupts:\n  low:\n    when: $battery < 20 %\n    do: {log: low}\n" + PATROL.lstrip()
+
+
+@pytest.mark.parametrize("how", ["values", "pause", "stop"])
+def test_it_goes_on_only_with_its_values_and_unless_it_is_held_meanwhile(how: str) -> None:
+    first = Real(WATCHFUL)
+    first.start()
+    first.level(80.0)
+    first.advance(2.0)
+    robot = Real(WATCHFUL, policy="continue")
+    robot.start()
+    robot.advance(5.0)
+    assert (state(robot), goals(robot)) == ("paused", [])
+    if how == "pause":
+        robot.mission.handle(PauseMission())
+    elif how == "stop":
+        robot.is_stopped = True
+        robot.mission.stop()
+    robot.level(80.0)
+    robot.advance(1.0)
+    assert goals(robot) == ([1.0] if how == "values" else [])
+
+
+def test_a_mission_that_was_paused_stays_paused() -> None:
+    first = Real()
+    first.start()
+    first.advance(2.0)
+    first.mission.handle(PauseMission())
+    first.advance(2.0)
+    robot = Real(policy="continue")
+    robot.start()
+    robot.advance(1.0)
+    assert (state(robot), goals(robot)) == ("paused", [])

@@ -273,7 +273,6 @@ class Mission(Component[MissionConfig]):
         if run.goes_on:
             if missing := run.missing():
                 return self.wait(run, ", ".join(missing))
-            run.goes_on = False
             run.resume(self.now)
         if run.is_paused:
             run.look(self.now)
@@ -336,7 +335,7 @@ class Mission(Component[MissionConfig]):
         """Pause all missions; the resume requests their unfinished actions again."""
         self.is_held = not self.missions.runs
         for mission in self.missions:
-            if not mission.is_paused:
+            if not mission.is_paused or mission.goes_on:
                 self.hold_running(mission, "stopped")
 
     def brake(self) -> None:
@@ -375,7 +374,7 @@ class Mission(Component[MissionConfig]):
     def pause(self, request: requests.PauseMission) -> str:
         """Hold a mission."""
         run = self.missions.running(request.mission, lambda one: not one.is_paused)
-        if run.is_paused:
+        if run.is_paused and not run.goes_on:
             raise Refused(f"mission {run.name} is already paused")
         return self.hold_running(run, "paused")
 
@@ -483,7 +482,9 @@ class Mission(Component[MissionConfig]):
             several = f"several missions have one: {', '.join(found)}; name one"
             raise Refused(several if found else "there is no snapshot of a mission that was cut short")
         name, snapshot = next(iter(found.items()))
-        return self.continue_with(self.missions.resumed(name, snapshot, self.now), is_asked=False)
+        run = self.missions.resumed(name, snapshot, self.now)
+        self.keep(requests.RunMission(name, is_repeated=True))
+        return self.continue_with(run, is_asked=False)
 
     @answers(requests.ListMissions)
     def listed(self, request: requests.ListMissions) -> tuple[requests.ListedMission, ...]:
@@ -514,6 +515,7 @@ class Mission(Component[MissionConfig]):
         """Hold a mission and return the report of it."""
         run.pause(self.now)
         self.broadcast.publish(self.missions)
+        self.look_soon()  # the snapshot has that it is paused
         return self.announce(f"mission {run.name} {why}")
 
     def keep(self, begun: requests.RunMission | None = None) -> None:

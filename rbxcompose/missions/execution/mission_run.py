@@ -125,7 +125,8 @@ class MissionRun:
 
     def reads(self, name: str) -> bool:
         """Return whether a new value of this name is worth a tick."""
-        return not self.is_over and (self.engine.status == IDLE or name in self.engine.reads())
+        is_waiting = self.engine.status == IDLE or self.goes_on
+        return not self.is_over and (is_waiting or name in self.engine.reads())
 
     def tick(self, now: float) -> None:
         """Do what is due at `now` [s]."""
@@ -168,12 +169,12 @@ class MissionRun:
 
     def pause(self, now: float) -> None:
         """Pause it: its timers stop."""
-        self.is_paused = True
+        self.is_paused, self.goes_on = True, False
         self._do(logbook.PAUSE, lambda: self.engine.pause(now), now)
 
     def resume(self, now: float) -> None:
         """Continue."""
-        self.is_paused = False
+        self.is_paused = self.goes_on = False
         self._do(logbook.RESUME, lambda: self.engine.resume(now), now)
 
     def stop_at(self, breakpoints: SetBreakpoints, now: float) -> None:
