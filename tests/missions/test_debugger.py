@@ -364,6 +364,7 @@ def test_what_cannot_be_done_is_refused_and_the_mission_goes_on(intervention: In
             "there is no 'away->nowhere'; transitions: away->home, away->failed, home->away, home->finished",
         ),
         ("77", "there is no node 77; the last one is"),
+        ("", "there is no ''"),
     ],
 )
 def test_a_place_that_does_not_exist_is_refused_with_those_near_it(where: str, reason: str) -> None:

@@ -49,7 +49,9 @@ def find(program: Program, where: str) -> tuple[Spot, ...]:
     if ARROW in where:
         return _transition(program, *(part.strip() for part in where.split(ARROW, 1)))
     names = {node.name: None for node in program.nodes if node.name}
-    return _only(where, [_start(node) for node in program.nodes if node.name == where], "names and states", names)
+    return _only(
+        where, [_start(node) for node in program.nodes if node.name and node.name == where], "names and states", names
+    )
 
 
 def _start(node: MissionNode) -> Spot:
