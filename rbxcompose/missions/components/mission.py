@@ -434,21 +434,21 @@ class Mission(Component[MissionConfig]):
     @answers(requests.ForceNode)
     def force(self, request: requests.ForceNode) -> str:
         """Let a node that runs end."""
-        from rbxcompose.missions.execution.debugging import forced
+        from rbxcompose.missions.execution.breakpoints import forced
 
         return self.intervene(request.mission, lambda run: [forced(run, request.where, request.outcome)])
 
     @answers(requests.SetMissionData)
     def set_data(self, request: requests.SetMissionData) -> str:
         """Set data of a mission."""
-        from rbxcompose.missions.execution.debugging import changed
+        from rbxcompose.missions.execution.breakpoints import changed
 
         return self.intervene(request.mission, lambda run: changed(run, request.values))
 
     @answers(requests.JumpMission)
     def jump(self, request: requests.JumpMission) -> str:
         """Bring a machine into another state."""
-        from rbxcompose.missions.execution.debugging import jump
+        from rbxcompose.missions.execution.breakpoints import jump
 
         return self.intervene(request.mission, lambda run: [jump(run, request.state)])
 

@@ -10,7 +10,7 @@ from types import new_class
 from typing import Any, ClassVar, assert_never, cast
 
 from rbxcompose.missions.engine.build import Around
-from rbxcompose.missions.engine.engine_base import EngineBase
+from rbxcompose.missions.engine.engine_base import EngineBase, NodeProbe, result_word
 from rbxcompose.missions.engine.events import Intervened, Stopped
 from rbxcompose.missions.engine.interventions import (
     ChangeData,
@@ -21,12 +21,11 @@ from rbxcompose.missions.engine.interventions import (
     SetBreakpoints,
     TakeStep,
 )
-from rbxcompose.missions.engine.probes import NOTHING, Probe, result_word
 from rbxcompose.missions.engine.run import Run
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.program.outcomes import FAILURE, IDLE, RUNNING, SUCCESS
-from rbxcompose.missions.program.program import MissionNode, Program, Target
+from rbxcompose.missions.program.program import NOTHING, MissionNode, Program, Target
 
 BY_HAND = "ended by hand"
 
@@ -81,7 +80,7 @@ class Probed(Task):
         """Return the tasks below that run now."""
         return () if self.engine.probes[self.number].is_pending else super().running()
 
-    def _through(self, status: int, probe: Probe) -> int:
+    def _through(self, status: int, probe: NodeProbe) -> int:
         """Return a status, unless the mission stops at the transition to which it leads."""
         if status == RUNNING or not (probe.ends or probe.steps_out):
             return status
@@ -247,11 +246,11 @@ class Debugger:
             raise NotPossible("the node does not run")
         return self._program.nodes[number]
 
-    def _probe(self, number: int) -> Probe:
+    def _probe(self, number: int) -> NodeProbe:
         """Return the probe of a node; it gets one if it has none."""
         if number not in self._engine.probes:
             task = self._outer[number]
-            self._engine.probes[number] = Probe(only_first=self._is_asked_again(self._program.nodes[number]))
+            self._engine.probes[number] = NodeProbe(only_first=self._is_asked_again(self._program.nodes[number]))
             task.__class__ = _probed(type(task))
         return self._engine.probes[number]
 

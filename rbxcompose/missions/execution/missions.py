@@ -14,7 +14,7 @@ from rbxcompose.missions.engine.inputs import NoSuchState, bind_texts, start_at
 from rbxcompose.missions.engine.logbook import LogRecord
 from rbxcompose.missions.engine.snapshot import from_plain
 from rbxcompose.missions.engine.world import PLAIN, Observer, Settings
-from rbxcompose.missions.execution.debugging import Breakpoints
+from rbxcompose.missions.execution.breakpoints import Breakpoints
 from rbxcompose.missions.execution.errands import Equipment
 from rbxcompose.missions.execution.mission_run import LogStore, MakeWorld, MissionRun, claims_of
 from rbxcompose.missions.execution.requests import (
