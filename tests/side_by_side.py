@@ -24,6 +24,7 @@ REAL_TIME = {
         "tests/runtime/test_changes_for_real",
         "tests/runtime/test_external_clock",
         "tests/runtime/test_lifeline",
+        "tests/runtime/test_mission_recovery",
         "tests/runtime/test_real_processes",
         "tests/systems/test_faults",
         "tests/systems/test_shared_calls",

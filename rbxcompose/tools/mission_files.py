@@ -22,7 +22,13 @@ from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.model.skills import python_skills
 from rbxcompose.missions.engine.inputs import bind_texts
-from rbxcompose.missions.engine.log_replay import OtherMissionError, ReplayBudget, ReplayError, replay
+from rbxcompose.missions.engine.log_replay import (
+    OtherInterventionError,
+    OtherMissionError,
+    ReplayBudget,
+    ReplayError,
+    replay,
+)
 from rbxcompose.missions.engine.logbook import INPUTS, LogRecord
 from rbxcompose.missions.execution.requests import ListMissions, LookAtAll, settings
 from rbxcompose.missions.program.outcomes import IDLE, NAMES
@@ -283,6 +289,9 @@ def difference(run: LoggedRun, name: str, robot: Robot, file: str, budget: Repla
         again = replay(run.records, mission_in(robot, name), robot.names, budget)
     except OtherMissionError:
         return "the log has results of nodes that the mission does not have: it has changed too much to continue"
+    except OtherInterventionError as error:
+        did = run.records[error.record]
+        return f"cannot repeat what was done at {did['time']:g} s: {error}\n  then: {json.dumps(did.get('did', ''))}"
     except ReplayError as error:
         place = _line(file, run.lines[error.record])
         raise NotDoneError(NO_LOG.at(place, f"'{file}' cannot be replayed: {error}")) from error

@@ -26,7 +26,9 @@ _WIDTH = 120  # columns of a picture without a terminal
 def lines_of(picture: MissionPicture, seen: Mapping[str, Any], width: int, *, colour: bool = False) -> list[str]:
     """Return the lines that show the state of a mission."""
     statuses = status_list(joined({"statuses": {}, "data": {}}, seen), picture.count)
-    lines = [fitted(f"mission {plain(seen['mission'])}: {seen['state']}", width)]
+    stops = ", ".join(f"{stop['place']} ({stop['text']})" for stop in seen.get("stopped_at", ()))
+    at = f" at {plain(stops)}" if stops else ""
+    lines = [fitted(f"mission {plain(seen['mission'])}: {seen['state']}{at}", width)]
     lines += mission_lines(picture, statuses, width=width, colour=colour)
     if seen["data"]:
         values = ", ".join(f"{name} {_value(from_plain(data))}" for name, data in seen["data"].items())
@@ -48,7 +50,7 @@ def follow(folder: RobotFolder, name: str, period: float) -> int:
     printed: Mapping[str, Any] = {}
     try:
         while True:
-            if any(printed.get(key) != seen[key] for key in ("version", "state")):
+            if any(printed.get(key) != seen[key] for key in ("version", "state", "stopped_at")):
                 emit(json.dumps(seen))
             if seen["state"] not in ACTIVE:
                 return 0

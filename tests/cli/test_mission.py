@@ -149,3 +149,32 @@ def test_programs_are_answered_in_json(robot: Robot, capsys: pytest.CaptureFixtu
     assert [entry["state"] for entry in json.loads(told(capsys, "ls", "--json"))] == ["running", "idle"]
     assert json.loads(told(capsys, "status", "--json"))["data"] == {"round": 2, "seen": []}
     assert json.loads(told(capsys, "pause", "--json"))["answer"] == "mission test paused"
+
+
+def test_a_mission_is_debugged_from_the_command_line(
+    robot: Robot, capsys: pytest.CaptureFixture[str], golden: Golden
+) -> None:
+    lines: list[str] = []
+    for words, code in (
+        ("break", 0),
+        ("break report", 0),
+        ("break mission.yaml:18 --mission test", 0),
+        ("break repotr", 1),
+        ("break", 0),
+        ("set round=5", 0),
+        ("set round", 1),
+        ("force mission.yaml:20 success", 0),
+        ("ls", 0),
+        ("status test", 0),
+        ("step", 0),
+        ("force mission.yaml:20 success", 1),
+        ("jump look", 0),
+        ("jump nowhere", 1),
+        ("status test", 0),
+        ("break report --clear", 0),
+        ("break --clear", 0),
+        ("break --clear", 1),
+    ):
+        lines.append(f"$ mission {words}\n{told(capsys, *words.split(), code=code)}")
+        robot.advance(0.0)
+    golden.check("debugging.txt", "\n".join(lines))

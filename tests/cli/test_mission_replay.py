@@ -105,6 +105,30 @@ def test_a_wrong_field_is_told_with_its_line(
 
 
 @pytest.mark.parametrize(
+    ("did", "words"),
+    [
+        (None, "cannot be replayed: '' is not known here"),
+        ({"type": "ForceResult", "node": "x", "succeeds": True}, "cannot be replayed: 'node' is not a whole number"),
+        ({"type": "ForceResult", "node": 99, "succeeds": True}, "cannot repeat what was done at"),
+        ({"type": "ChangeData", "name": "nothing", "value": 1}, "the mission has no data 'nothing'"),
+        ({"type": "SetBreakpoints", "starts": [0, 99], "ends": []}, "the mission has no such node"),
+        ({"type": "JumpToState", "machine": 0, "state": "x"}, "has no state 'x'"),
+    ],
+)
+def test_what_people_did_is_checked_before_it_is_repeated(
+    did: object, words: str, log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = log.read_text().splitlines()
+    at = next(number for number, line in enumerate(lines) if '"tick"' in line) + 1
+    record = json.loads(lines[at - 1])
+    lines.insert(
+        at, json.dumps({key: record[key] for key in ("time", "mission", "run")} | {"event": "intervene", "did": did})
+    )
+    log.write_text("\n".join(lines))
+    assert words in told(capsys, code=1)
+
+
+@pytest.mark.parametrize(
     ("limit", "words"), [("_MOST_RUNS", "has more than 0 runs"), ("_MOST_VALUES", "it holds more than 0 values")]
 )
 def test_a_log_beyond_the_limits_is_refused(

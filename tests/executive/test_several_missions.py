@@ -170,7 +170,7 @@ def test_only_the_end_of_the_start_mission_is_told_to_the_supervisor() -> None:
 def test_what_people_began_is_kept_for_a_restart_as_long_as_it_runs() -> None:
     robot = robot_with(look=LOOK)
     robot.mission.handle(RunMission("look"))
-    assert list(robot.repeated) == [RunMission("look")]
+    assert list(robot.repeated) == [RunMission("look", is_repeated=True)]
     robot.mission.handle(CancelMission())
     assert list(robot.repeated) == []
 

@@ -7,11 +7,11 @@ import itertools
 import json
 import re
 
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rbxcompose.missions.engine.events import SkillEnded, SkillStarted
-from rbxcompose.missions.engine.snapshot import restore, save
+from rbxcompose.missions.engine.snapshot import carry_on, restore, save
 from rbxcompose.missions.engine.world import Settings
 from rbxcompose.missions.program.outcomes import IDLE, RUNNING
 from tests.missions.random_missions import CASES, FAILING, NODES, Case, Node, schedule
@@ -152,3 +152,71 @@ def test_the_order_of_branches_never_changes_the_result(
 @given(NODES)
 def test_random_missions_are_of_all_sorts(node: Node) -> None:
     assert Case(node, node, "continue").program().nodes
+
+
+def in_another_process(case: Case, first: Simulated, now: float) -> Simulated:
+    """Return a mission restored from a snapshot at another time, with nothing under way and no messages so far."""
+    second = case.simulated()
+    restore(second.engine, json.loads(json.dumps(save(first.engine))))
+    carry_on(second.engine)
+    assert second.running == {}
+    second.now, second.changes = now, []
+    second.engine.resume(now)
+    return second
+
+
+TIMED = st.sampled_from(({"wait": "0.75 s"}, {"log": "hi"}, {"set": {"n": "$n + 1"}}))
+
+
+@given(st.recursive(TIMED, _lasting, max_leaves=6), LATER, st.integers(0, 400))
+def test_a_mission_restored_in_another_process_goes_on_with_the_time_left(body: Node, at: float, later: int) -> None:
+    case = Case(body, "react", "continue")
+    plain, first = case.simulated(), case.simulated()
+    plain.advance(40.0)
+    first.advance(at)
+    assume(first.engine.status == RUNNING and not first.running)
+    now = later / 4
+    second = in_another_process(case, first, now)
+    second.advance(now + 40.0)
+    told = len(first.told)
+    passed = now - first.engine.now  # since the latest tick, which is the last that a snapshot knows
+    assert [(round(time - passed, 6), type(event)) for time, event in second.events] == [
+        (round(time, 6), type(event)) for time, event in plain.events[told:]
+    ]
+
+
+def _patient(nodes: st.SearchStrategy[Node]) -> st.SearchStrategy[Node]:
+    some = st.lists(nodes, min_size=1, max_size=3)
+    return st.one_of(
+        some.map(lambda steps: {"sequence": steps, "history": "deep"}),
+        some.map(lambda steps: {"parallel": steps}),
+        nodes.map(lambda do: {"repeat": 2, "do": do}),
+        nodes.map(lambda do: {"for": "item", "in": [1, 2], "do": do}),
+        nodes.map(lambda do: {"sequence": [do, {"check": "false"}], "attempts": 2, "optional": True}),
+        nodes.map(
+            lambda do: {
+                "machine": {
+                    "start": "one",
+                    "states": {
+                        "one": {"do": do, "next": {"success": "two", "failure": "failed"}},
+                        "two": {"do": "b", "next": {"success": "finished", "failure": "failed"}},
+                    },
+                }
+            }
+        ),
+    )
+
+
+PATIENT = st.sampled_from(("a", "hold", "recharge", {"call": "reset"}, {"wait": "0.75 s"}, {"set": {"n": "$n + 1"}}))
+
+
+@given(st.recursive(PATIENT, _patient, max_leaves=6), LATER, st.integers(0, 400))
+def test_a_mission_restored_in_another_process_ends_as_one_that_was_not_cut(body: Node, at: float, later: int) -> None:
+    case = Case(body, "react", "continue")
+    plain, first = case.simulated(), case.simulated()
+    plain.advance(200.0)
+    first.advance(at)
+    assume(first.engine.status == RUNNING)
+    second = in_another_process(case, first, later / 4)
+    second.advance(later / 4 + 200.0)
+    assert (second.engine.status, second.engine.data) == (plain.engine.status, plain.engine.data)

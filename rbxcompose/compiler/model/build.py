@@ -211,6 +211,7 @@ def mission_component(robot: Robot) -> RobotComponent:
         "programs": programs,
         "start": manifest.start if manifest.start in missions else None,
         "inputs": {name: dict(mission.inputs) for name, mission in missions.items()},
+        "after_crash": {name: manifest.missions[name].after_crash for name in missions},
         "values": robot.values,
         "places": manifest.places,
         "skills": robot.skills,

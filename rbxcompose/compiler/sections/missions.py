@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field
 
@@ -31,6 +31,8 @@ class MissionModel(Config):
         Annotated[Name, Refers(INPUT, is_reported=True)], Annotated[Any, Refers(ANYTHING, is_reported=True)]
     ] = Field({}, alias="with")
     """Values of its inputs, by name."""
+    after_crash: Literal["restart", "ask", "continue"] = "restart"
+    """After a crash of its process or a loss of power it starts again, waits for `mission resume`, or continues."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +44,7 @@ class MissionEntry:
     with_: MappingNode
     span: Span
     is_sound: bool = True
+    after_crash: str = "restart"
 
 
 def _details(read: Mapping[str, MissionEntry]) -> dict[str, str]:
@@ -82,7 +85,7 @@ def _mission(reading: Reading[MissionModel], name: str, entry: Entry) -> Mission
         reading.report.add(path)
         return None
     given = inputs if isinstance(inputs, MappingNode) else MappingNode()
-    return MissionEntry(name, path, given, entry.key.span, is_sound=sound is not None)
+    return MissionEntry(name, path, given, entry.key.span, is_sound=sound is not None, after_crash=read.after_crash)
 
 
 def _refuse_secrets(node: TreeNode, report: Report) -> None:

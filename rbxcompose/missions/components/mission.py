@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from pydantic import InstanceOf, WithJsonSchema
 
 from rbxcompose.base.expressions.types import Type
+from rbxcompose.base.requests import Command
 from rbxcompose.missions.analysis.uses import Using
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
 from rbxcompose.missions.engine.world import POSE, World
@@ -38,6 +40,7 @@ from rbxcompose.sdk import (
 from rbxcompose.sdk.robot_events import MissionOver, MissionWaits
 
 if TYPE_CHECKING:  # a check needs no engine: it is imported when the component is configured
+    from rbxcompose.missions.engine.interventions import Intervention
     from rbxcompose.missions.engine.logbook import LogRecord
     from rbxcompose.missions.execution.mission_run import MissionRun
     from rbxcompose.missions.execution.world import RobotWorld
@@ -45,6 +48,7 @@ if TYPE_CHECKING:  # a check needs no engine: it is imported when the component 
 RUN = "run_mission"
 RATE = 10.0  # [Hz]
 LOOK_AGAIN = 0.1  # [s] between two checks for a pose that has not arrived yet
+RESTART, ASK = "restart", "ask"  # after a crash
 NO_INPUTS: Mapping[str, str] = {}
 
 T = TypeVar("T")
@@ -60,6 +64,8 @@ class MissionConfig(Config):
     """The mission that starts by itself."""
     inputs: dict[str, dict[str, Any]] = {}
     """Values of the inputs, by mission and name."""
+    after_crash: dict[str, str] = {}
+    """What missions do after a crash, by mission: `restart`, `ask` or `continue`."""
     values: dict[str, Made[ValueSource]] = {}
     """Where the robot's values come from."""
     places: dict[str, Made[Place]] = {}
@@ -144,12 +150,15 @@ class Mission(Component[MissionConfig]):
         """Start with no values and no missions."""
         from rbxcompose.missions.execution.missions import Broadcast, RunningMissions
         from rbxcompose.missions.execution.ordered import OrderedMission
+        from rbxcompose.missions.execution.snapshots import SnapshotStore
         from rbxcompose.missions.execution.topic_skills import Desks
         from rbxcompose.missions.execution.triggers import Triggering
         from rbxcompose.missions.execution.world import Arrivals, RobotWorld
 
         self.arrivals, self.desks = Arrivals(self.config.values), Desks(self)
         self.missions = RunningMissions(self.config, self.world, self.story, self.publish)
+        address = self.context.address
+        self.snapshots = SnapshotStore(address.robot, is_kept=bool(address.router))
         self.broadcast = Broadcast(self.config.programs, self.context.window)
         programs = self.config.programs
         self.ordered = OrderedMission(
@@ -159,6 +168,8 @@ class Mission(Component[MissionConfig]):
         self.triggering = Triggering(self.config.triggers, self.config.names, seen, self)
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
         self.kept: dict[str, requests.RunMission] = {}  # requests by people that began missions that still run
+        self.repeated: tuple[Command, ...] = ()  # those, and the breakpoints
+        self.trouble = ""  # with snapshots
         self.shown = ""  # the last reported status
         self.planned: float | None = None  # the last requested wake [s]
         self.misfits: set[str] = set()  # values whose messages have another shape
@@ -183,7 +194,7 @@ class Mission(Component[MissionConfig]):
             self.show(Level.OK, "no mission to start")
             return
         try:
-            run = self.begin(name)
+            run = self.recovered(name) or self.begin(name)
             if self.is_held and not run.is_paused:
                 self.hold_back(run)
         except Refused as refusal:  # a person has already begun it
@@ -198,12 +209,34 @@ class Mission(Component[MissionConfig]):
             Refused: if it cannot run, with the reason.
         """
         run = self.missions.run(name, inputs, state, lent)
+        self.snapshots.set_aside(name)
         if missing := run.missing():
             self.info(f"mission {name} waits for {', '.join(missing)}")
         if self.context.is_stopped:
             self.hold_back(run)
         self.look_soon()
         return run
+
+    def recovered(self, name: str) -> MissionRun | None:
+        """Return a mission that a crash had cut short, if it is to go on where it was; else None."""
+        policy = self.config.after_crash.get(name, RESTART)
+        snapshot = self.snapshots.read(name, is_latest=True) if policy != RESTART else None
+        if snapshot is None:
+            return None
+        try:
+            run = self.missions.resumed(name, snapshot, self.now)
+        except Refused as refusal:
+            self.warn(f"{refusal}; it starts again")
+            return None
+        self.continue_with(run, is_asked=policy == ASK or bool(snapshot["is_paused"]))
+        return run
+
+    def continue_with(self, run: MissionRun, *, is_asked: bool) -> str:
+        """Let a restored mission go on as soon as it knows what it reads, unless a person is asked."""
+        run.goes_on = not is_asked and not self.context.is_stopped
+        self.look_soon()
+        until = "as soon as its values have arrived" if run.goes_on else "when it is resumed"
+        return self.announce(f"mission {run.name} is restored from its snapshot; it goes on {until}")
 
     def hold_back(self, run: MissionRun) -> None:
         """Let a mission begin only at the resume."""
@@ -241,12 +274,21 @@ class Mission(Component[MissionConfig]):
         wakes = self.triggering.turn()
         for mission in self.missions:
             wakes += self.turn(mission)
+            if (due := self.snapshots.keep(mission, self.now)) is not None:
+                wakes.append(due)
+        if self.snapshots.trouble != self.trouble and self.snapshots.trouble:
+            self.warn(self.snapshots.trouble)
+        self.trouble = self.snapshots.trouble
         if wakes:
             self.plan(min(wakes))
         self.broadcast.publish(self.missions)
 
     def turn(self, run: MissionRun) -> list[float]:
         """Do what is due in a mission; return its next wake [s], if any."""
+        if run.goes_on:
+            if missing := run.missing():
+                return self.wait(run, ", ".join(missing))
+            run.resume(self.now)
         if run.is_paused:
             run.look(self.now)
             due = run.next_wake()
@@ -258,6 +300,8 @@ class Mission(Component[MissionConfig]):
         run.tick(self.now)
         if run.end is not None:
             self.finish(run.name, run.end)
+        elif run.engine.stops:
+            self.show(Level.OK, f"mission {run.name} is stopped at {run.stopped_at[0]['place']}")
         due = run.next_wake()
         return [due] if due is not None else []
 
@@ -297,6 +341,7 @@ class Mission(Component[MissionConfig]):
         """Report that a mission has ended; after the start mission, the robot may go down."""
         level = Level.ERROR if end.result == "failure" else Level.WARN if end.doubt else Level.OK
         self.show(level, ": ".join(filter(None, (name, end.result, end.doubt))))
+        self.snapshots.drop(name)
         self.keep()
         self.triggering.ended(name, end)
         if name == self.config.start:
@@ -307,7 +352,7 @@ class Mission(Component[MissionConfig]):
         self.is_held = not self.missions.runs
         self.triggering.stop()
         for mission in self.missions:
-            if not mission.is_paused:
+            if not mission.is_paused or mission.goes_on:
                 self.hold_running(mission, "stopped")
 
     def brake(self) -> None:
@@ -315,6 +360,7 @@ class Mission(Component[MissionConfig]):
         self.is_held = self.is_held or any(run.is_paused for run in self.missions)
         for mission in self.missions:
             mission.abort(self.now)
+            self.snapshots.drop(mission.name)
         self.broadcast.publish(self.missions)
 
     # Commands from people
@@ -322,8 +368,9 @@ class Mission(Component[MissionConfig]):
     @answers(requests.RunMission)
     def run(self, request: requests.RunMission) -> str:
         """Begin a mission, and restart it after a crash."""
-        self.begin(request.mission, request.inputs, request.start)
-        self.keep(request)
+        if not (request.is_repeated and self.recovered(request.mission)):
+            self.begin(request.mission, request.inputs, request.start)
+        self.keep(replace(request, is_repeated=True))
         return f"mission {request.mission} starts"
 
     @answers(requests.CancelMission)
@@ -344,7 +391,7 @@ class Mission(Component[MissionConfig]):
     def pause(self, request: requests.PauseMission) -> str:
         """Hold a mission."""
         run = self.missions.running(request.mission, lambda one: not one.is_paused)
-        if run.is_paused:
+        if run.is_paused and not run.goes_on:
             raise Refused(f"mission {run.name} is already paused")
         return self.hold_running(run, "paused")
 
@@ -359,6 +406,102 @@ class Mission(Component[MissionConfig]):
         run.resume(self.now)
         self.look_soon()
         return self.announce(f"mission {run.name} resumed")
+
+    # Debugging
+
+    @answers(requests.SetBreakpoint)
+    def set_breakpoint(self, request: requests.SetBreakpoint) -> str:
+        """Stop a mission at a node or a transition, now and whenever it runs again."""
+        self.arm(self.missions.breakpoints.add(request.where, request.mission, self.missions.names))
+        here = [one for one in self.missions.breakpoints.listed() if one.where == request.where]
+        return "; ".join(f"breakpoint in {one.mission}: {one.place}, {one.text}" for one in here)
+
+    @answers(requests.ClearBreakpoints)
+    def clear_breakpoints(self, request: requests.ClearBreakpoints) -> str:
+        """Clear one breakpoint or all."""
+        self.arm(self.missions.breakpoints.clear(request.where, request.mission))
+        return "breakpoint cleared" if request.where else "all breakpoints cleared"
+
+    @answers(requests.ListBreakpoints)
+    def list_breakpoints(self, request: requests.ListBreakpoints) -> tuple[requests.ListedBreakpoint, ...]:
+        """Return all breakpoints."""
+        return self.missions.breakpoints.listed()
+
+    def arm(self, missions: Iterable[str]) -> None:
+        """Let missions stop at their breakpoints, and keep these over a crash."""
+        for run in self.missions:
+            if run.name in missions:
+                run.stop_at(self.missions.breakpoints.of(run.name), self.now)
+        self.keep()
+
+    @answers(requests.StepMission)
+    def take_step(self, request: requests.StepMission) -> str:
+        """Let a mission go on to its next leaf or transition."""
+        from rbxcompose.missions.engine.interventions import TakeStep
+
+        run = self.begun(request.mission, lambda one: one.is_paused)
+        if self.context.is_stopped:
+            raise Refused("the robot is stopped: release it first")
+        run.intervene(TakeStep(), self.now)
+        if run.is_paused:
+            run.resume(self.now)
+        self.look_soon()
+        return f"mission {run.name} goes on to its next step"
+
+    @answers(requests.ForceNode)
+    def force(self, request: requests.ForceNode) -> str:
+        """Let a node that runs end."""
+        from rbxcompose.missions.execution.breakpoints import forced
+
+        return self.intervene(request.mission, lambda run: [forced(run, request.where, request.outcome)])
+
+    @answers(requests.SetMissionData)
+    def set_data(self, request: requests.SetMissionData) -> str:
+        """Set data of a mission."""
+        from rbxcompose.missions.execution.breakpoints import changed
+
+        return self.intervene(request.mission, lambda run: changed(run, request.values))
+
+    @answers(requests.JumpMission)
+    def jump(self, request: requests.JumpMission) -> str:
+        """Bring a machine into another state."""
+        from rbxcompose.missions.execution.breakpoints import jump
+
+        return self.intervene(request.mission, lambda run: [jump(run, request.state)])
+
+    def begun(self, name: str, what: Callable[[MissionRun], bool] = lambda one: True) -> MissionRun:
+        """Return a mission that runs and has begun; raise `Refused` if there is none."""
+        run = self.missions.running(name, what)
+        if run.engine.status == IDLE:
+            raise Refused(f"mission {run.name} has not begun")
+        return run
+
+    def intervene(self, name: str, wanted: Callable[[MissionRun], Iterable[Intervention]]) -> str:
+        """Do in a mission what a person wants, all of it or nothing; raise `Refused` if it cannot be done."""
+        from rbxcompose.missions.engine.interventions import NotPossible
+
+        run = self.begun(name)
+        try:
+            for intervention in wanted(run):
+                run.intervene(intervention, self.now)
+        except NotPossible as error:
+            raise Refused(str(error)) from error
+        self.look_soon()
+        self.broadcast.publish(self.missions)
+        return f"mission {run.name}: done; it goes on from there {'when it is resumed' if run.is_paused else 'now'}"
+
+    @answers(requests.RestoreMission)
+    def restore(self, request: requests.RestoreMission) -> str:
+        """Go on with a mission where a crash had cut it short."""
+        names = [request.mission] if request.mission else [*self.config.programs]
+        found = {name: snapshot for name in names if (snapshot := self.snapshots.read(name))}
+        if len(found) != 1:
+            several = f"several missions have one: {', '.join(found)}; name one"
+            raise Refused(several if found else "there is no snapshot of a mission that was cut short")
+        name, snapshot = next(iter(found.items()))
+        run = self.missions.resumed(name, snapshot, self.now)
+        self.keep(requests.RunMission(name, is_repeated=True))
+        return self.continue_with(run, is_asked=False)
 
     @answers(requests.ListMissions)
     def listed(self, request: requests.ListMissions) -> tuple[requests.ListedMission, ...]:
@@ -394,15 +537,17 @@ class Mission(Component[MissionConfig]):
         """Hold a mission and return the report of it."""
         run.pause(self.now)
         self.broadcast.publish(self.missions)
+        self.look_soon()  # the snapshot has that it is paused
         return self.announce(f"mission {run.name} {why}")
 
     def keep(self, begun: requests.RunMission | None = None) -> None:
-        """Let the supervisor repeat, after a crash, the requests by which people began missions that still run."""
+        """Let the supervisor repeat, after a crash, what set breakpoints and began missions that still run."""
         kept = {**self.kept, **({begun.mission: begun} if begun else {})}
-        still = {name: entry for name, entry in kept.items() if name in self.missions.names}
-        if still != self.kept:
-            self.kept = still
-            self.context.repeat(tuple(still.values()))
+        self.kept = {name: entry for name, entry in kept.items() if name in self.missions.names}
+        repeated = (*self.missions.breakpoints.requests, *self.kept.values())
+        if repeated != self.repeated:
+            self.repeated = repeated
+            self.context.repeat(repeated)
 
     # Reports
 

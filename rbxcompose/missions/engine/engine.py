@@ -5,8 +5,10 @@ from collections.abc import Mapping
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.engine.build import Builder
 from rbxcompose.missions.engine.course import Reaction
+from rbxcompose.missions.engine.debugger import Debugger
 from rbxcompose.missions.engine.engine_base import ROUNDING, EngineBase
 from rbxcompose.missions.engine.events import MissionEnded, Reported
+from rbxcompose.missions.engine.interventions import Intervention
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.engine.world import PLAIN, Settings, World
 from rbxcompose.missions.program.linker import link
@@ -35,6 +37,7 @@ class Engine(EngineBase):
         self.tasks, self.runs, self._leaves = builder.tasks, builder.runs, builder.leaves
         self._indexes = {task: index for index, task in enumerate(self.tasks)}
         self._inputs = dict(inputs)
+        self.debugger = Debugger(self, self.tasks, self.runs, self._take_results)
         self.instant = -1.0
         self.ticks = 0  # at this instant
         self.held_until: float | None = None  # slowed down until then [s]
@@ -64,7 +67,7 @@ class Engine(EngineBase):
         while self.status == RUNNING:
             self.ticks += 1
             self._tick_once()
-            if not (self.wants_again or self.arrived):
+            if not (self.wants_again or self.arrived) or self.stops:
                 break
             if self.ticks >= TICKS_AT_ONCE:
                 self._slow_down()
@@ -94,6 +97,7 @@ class Engine(EngineBase):
         """Continue; the skills that were halted are requested again at the next tick."""
         if self.is_paused:
             self.is_paused = False
+            self.debugger.release()
             self.lost += now
             self.main.stack[-1].resume(now)
 
@@ -106,6 +110,21 @@ class Engine(EngineBase):
             self.main.halt()
             self.status = FAILURE
             self.world.say(MissionEnded("halted"))
+
+    def forget_requests(self) -> None:
+        """Take the results that have arrived; all other requests are lost, with the process that made them."""
+        self._take_results()
+        for leaf in self._leaves.values():
+            leaf.lose()
+
+    def intervene(self, intervention: Intervention, now: float) -> None:
+        """Do what a person wants; it takes effect at the next tick.
+
+        Raises:
+            NotPossible: if the mission cannot do it, with the reason; nothing has changed then.
+        """
+        self.now = now
+        self.debugger.do(intervention)
 
     def index_of(self, task: Task) -> int:
         """Return the index of a task in `tasks`."""

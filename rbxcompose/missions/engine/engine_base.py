@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from random import Random
 from typing import Protocol
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.text import Template, fill
 from rbxcompose.base.expressions.types import Type
 from rbxcompose.base.expressions.values import Value
@@ -13,8 +14,8 @@ from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.resume_points import ResumableTask, ResumePoints
 from rbxcompose.missions.engine.scopes import MissionScope, RunScope
 from rbxcompose.missions.engine.world import Settings, Watched, World
-from rbxcompose.missions.program.outcomes import IDLE, Result
-from rbxcompose.missions.program.program import Program, RobotNames, Target
+from rbxcompose.missions.program.outcomes import IDLE, NAMES, SKIPPED, SUCCESS, Result
+from rbxcompose.missions.program.program import NOTHING, Program, RobotNames, Target
 
 ROUNDING = 1e-6  # [s] tolerance with which a deadline counts as reached
 
@@ -26,6 +27,39 @@ class TickSource(Protocol):
     def place(self) -> str:
         """Return its file and line."""
         ...
+
+
+@dataclass(slots=True)
+class NodeProbe:
+    """Where a debugger stops the mission at a node, and what has come of that; a node without one never asks.
+
+    `ends` are the transitions of a state that stop it, by the outcomes under which they are written. A step stops at
+    the start of a leaf (`steps_in`) and at any transition of a state (`steps_out`). `is_waiting` is a node that was to
+    start and has not begun. `result` is the status and the outcome with which a node will end at its next tick.
+    """
+
+    starts: bool = False
+    ends: frozenset[str] = NOTHING
+    steps_in: bool = False
+    steps_out: bool = False
+    only_first: bool = False  # a condition that a reactive list evaluates again and again
+    is_waiting: bool = False
+    result: tuple[int, str] | None = None
+
+    @property
+    def is_pending(self) -> bool:
+        """Return whether the node only seems to run: it has not begun, or has ended."""
+        return self.is_waiting or self.result is not None
+
+    @property
+    def is_needed(self) -> bool:
+        """Return whether the node must still be observed."""
+        return self.starts or bool(self.ends) or self.steps_in or self.steps_out or self.is_pending
+
+
+def result_word(status: int) -> str:
+    """Return the result that a status counts as for the transitions of a state."""
+    return NAMES[SUCCESS if status == SKIPPED else status]
 
 
 class EngineBase:
@@ -52,6 +86,8 @@ class EngineBase:
         self.arrived: list[tuple[int, Result]] = []
         self.wake: float | None = None
         self.reading: set[str] = set()
+        self.probes: dict[int, NodeProbe] = {}  # breakpoints and what follows from them, by node number
+        self.stops: list[int] = []  # nodes at which probes stopped the mission; the shell then pauses it
         self.wants_again: TickSource | None = None  # what requested another tick at this instant
 
     @property

@@ -113,6 +113,23 @@ class Reported:
 
 
 @dataclass(frozen=True, slots=True)
+class Stopped:
+    """A breakpoint or a step stops the mission at a node, before it begins or `after` it ended; `text` is the node."""
+
+    node: int
+    place: str
+    text: str
+    after: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Intervened:
+    """A person changed the course of the mission: without this, the run cannot be reproduced."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class MissionEnded:
     """The mission ended in `success` or `failure`, or was `halted` from outside; `outcome` may be an end's name.
 
@@ -144,5 +161,7 @@ MissionEvent = (
     | InterruptEnded
     | Logged
     | Reported
+    | Stopped
+    | Intervened
     | MissionEnded
 )

@@ -70,6 +70,13 @@ class Leaf(Task):
             self.engine.forget_result(self.number)
             self.engine.world.halt(self.number)
 
+    def lose(self) -> None:
+        """Repeat the request later, since nobody carries it out any more; fail if it must not be repeated."""
+        if self.is_asked:
+            self.is_asked = self.is_held = False
+            if not self.is_restartable:
+                self.status, self.engine.reasons[self.number] = FAILURE, STOPPED
+
     def suspend(self, from_start: bool) -> bool:
         """Stop the request, to be repeated later; keep a result that has already arrived.
 

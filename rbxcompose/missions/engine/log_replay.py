@@ -1,14 +1,17 @@
 """A mission run again from its log, which is not trusted: each record is checked once, when it is read."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from rbxcompose.base.expressions.values import NOT_ARRIVED, Value, is_number
+from rbxcompose.base.requests import UnreadableError
 from rbxcompose.base.units import MOST
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEvent
-from rbxcompose.missions.engine.logbook import BEGIN, INPUTS, LogRecord, record_of
+from rbxcompose.missions.engine.interventions import INTERVENTIONS, ChangeData, Intervention, NotPossible
+from rbxcompose.missions.engine.logbook import BEGIN, INPUTS, INTERVENE, LogRecord, record_of
 from rbxcompose.missions.engine.snapshot import NoValue, from_plain
 from rbxcompose.missions.engine.world import PLAIN, Settings
 from rbxcompose.missions.program.outcomes import Result
@@ -32,6 +35,10 @@ class OtherMissionError(ReplayError):
     """Raised when a log does not fit the mission: it has results of other nodes, or lacks what the mission reads."""
 
 
+class OtherInterventionError(ReplayError):
+    """Raised when the mission cannot do now what a person did then; the text has the reason."""
+
+
 class _WrongRecordError(ValueError):
     """Raised with what is wrong with a record."""
 
@@ -49,6 +56,7 @@ class LoggedCall(NamedTuple):
     results: tuple[tuple[int, Result], ...] = ()
     inputs: Mapping[str, Value] = _NOTHING
     settings: Settings = PLAIN
+    did: Intervention | None = None
 
 
 class ReplayBudget:
@@ -148,7 +156,7 @@ def replay(
     for index, record in enumerate(records):
         try:
             call = _read(record)
-        except (_WrongRecordError, NoValue) as error:
+        except (_WrongRecordError, UnreadableError, NoValue) as error:
             raise ReplayError(str(error), index) from error
         world.now_reads(call)
         work = _WORK_TO_READ
@@ -160,7 +168,7 @@ def replay(
         elif call.what in INPUTS:
             before = engine.work
             _again(engine, call, index)
-            work += engine.work - before
+            work += engine.work - before + (len(engine.statuses) if call.did else 0)
         budget.spend(work, index)
     return world.said
 
@@ -178,6 +186,12 @@ def _again(engine: Engine, call: LoggedCall, index: int) -> None:
                 engine.resume(call.at)
             case "abort":
                 engine.abort(call.at)
+            case "restore":
+                raise OtherInterventionError("it goes on from a snapshot, which the log does not hold", index)
+            case "intervene" if call.did:
+                engine.intervene(call.did, call.at)
+    except NotPossible as error:
+        raise OtherInterventionError(str(error), index) from error
     except KeyError as error:  # of a leaf, or of a value that was not read then
         raise OtherMissionError(f"the mission has no {error.args[0]}", index) from error
 
@@ -199,13 +213,20 @@ def _read(record: object) -> LoggedCall:
     if what == BEGIN:
         inputs = {name: from_plain(entry) for name, entry in _map(entries.get("inputs"), "'inputs'").items()}
         return LoggedCall(what, float(at), inputs=inputs, settings=_settings(entries))
-    if what not in INPUTS or not ("read" in entries or "results" in entries):
+    if what not in INPUTS or not ("read" in entries or "results" in entries or what == INTERVENE):
         return LoggedCall(what, float(at))
     read = dict(_map(entries.get("read", {}), "'read'"))
     raised = tuple(_raised(one) for one in _list(read.pop("raised", []), "'raised'"))
     values = {key: _known(key, from_plain(value)) for key, value in read.items()}
     results = tuple(_result(one) for one in _list(entries.get("results", []), "'results'"))
-    return LoggedCall(what, float(at), values, raised, results)
+    did = _did(entries.get("did")) if what == INTERVENE else None
+    return LoggedCall(what, float(at), values, raised, results, did=did)
+
+
+def _did(plain: object) -> Intervention:
+    """Return what a person did; raise UnreadableError or NoValue if it is nothing that people can do."""
+    did = INTERVENTIONS.from_data(plain)
+    return replace(did, value=from_plain(did.value)) if isinstance(did, ChangeData) else did
 
 
 def _settings(entries: Mapping[str, Any]) -> Settings:

@@ -1,23 +1,26 @@
 """The log of a mission: its inputs and what it did, as plain records from which it can be replayed.
 
 Each record is a map for JSON with `time` [s] of robot time, `mission`, `run` (how often the mission has been run), and
-`event`. Inputs are `begin`, `tick` (with the values read and the results that arrived), `pause`, `resume`, `abort`;
-all other records are events of the engine. `log_replay.py` gives the same inputs to the same engine again.
+`event`. Inputs are `begin`, `tick` (with the values read and the results that arrived), `pause`, `resume`, `abort`,
+`intervene` (with what a person did while debugging); all other records are events of the engine. `log_replay.py` gives
+the same inputs to the same engine again.
 """
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 from rbxcompose.base.expressions.values import NotArrived, Value
 from rbxcompose.missions.engine.events import MissionEvent
+from rbxcompose.missions.engine.interventions import INTERVENTIONS, ChangeData, Intervention
 from rbxcompose.missions.engine.snapshot import to_plain
 from rbxcompose.missions.engine.world import Settings, World
 from rbxcompose.missions.program.outcomes import Result
 
-BEGIN, TICK, PAUSE, RESUME, ABORT = "begin", "tick", "pause", "resume", "abort"
-INPUTS = frozenset({BEGIN, TICK, PAUSE, RESUME, ABORT})
+BEGIN, TICK, PAUSE, RESUME, ABORT, INTERVENE = "begin", "tick", "pause", "resume", "abort", "intervene"
+RESTORE = "restore"  # from a snapshot, which the log does not hold
+INPUTS = frozenset({BEGIN, TICK, PAUSE, RESUME, ABORT, INTERVENE, RESTORE})
 
 V = TypeVar("V")
 LogRecord = dict[str, Any]
@@ -50,9 +53,13 @@ class LoggedWorld:
         """Note a result, which takes effect at the next tick."""
         self._results.append([leaf, to_plain(result)])
 
-    def did(self, what: str) -> None:
-        """Log a call of the engine, with what the engine read during it."""
+    def did(self, what: str, intervention: Intervention | None = None) -> None:
+        """Log a call of the engine, with what the engine read during it, and what a person did."""
         record: LogRecord = {"event": what}
+        if intervention:
+            if isinstance(intervention, ChangeData):
+                intervention = replace(intervention, value=to_plain(intervention.value))
+            record["did"] = INTERVENTIONS.to_data(intervention)
         if self._read:
             record["read"], self._read = self._read, {}
         if self._results:

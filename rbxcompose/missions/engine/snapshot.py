@@ -13,13 +13,14 @@ from rbxcompose.base.expressions.values import MOST_LEVELS, NOT_ARRIVED, NotArri
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.printable import plain as plain_text
 from rbxcompose.missions.analysis.held_nodes import HeldNode
+from rbxcompose.missions.engine.build import Since
 from rbxcompose.missions.engine.course import Course
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.run import Run
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.program.outcomes import Result
 
-VERSION = 2
+VERSION = 3
 _CLASSES: Mapping[str, type[Any]] = {cls.__name__: cls for cls in (Place, Pose2, HeldNode, Result)}
 _NUMBER = (float, int)
 _POSE = {"x": _NUMBER, "y": _NUMBER, "heading": _NUMBER}
@@ -54,6 +55,8 @@ def save(engine: Engine) -> dict[str, Any]:
         "statuses": list(engine.statuses),
         "engine": {name: to_plain(getattr(engine, name)) for name in _ENGINE},
         "named": sorted(engine.named),
+        "stops": list(engine.stops),
+        "pending": engine.debugger.pending(),
         "reads": sorted(engine.reading),
         "reasons": [[number, reason] for number, reason in sorted(engine.reasons.items())],
         "arrived": [[leaf, to_plain(result)] for leaf, result in engine.arrived],
@@ -87,6 +90,24 @@ def restore(engine: Engine, saved: Mapping[str, Any]) -> None:
         for name, value in zip(task.saved, state[1:], strict=True):
             setattr(task, name, from_plain(value))
         task.restored()
+    engine.stops[:] = saved["stops"]
+    engine.debugger.take_up(saved["pending"])
+
+
+def carry_on(engine: Engine) -> None:
+    """Pause an engine that was restored in another process: what it requested is lost, and is requested again.
+
+    Its next `resume` may be at any time, by any clock. Messages count as new from now on.
+    """
+    engine.held_until, engine.instant = None, -1.0
+    engine.forget_requests()
+    engine.pause(engine.now)
+    for task in engine.tasks:
+        if isinstance(task, Since):
+            task.view.mark()
+    for run in engine.runs:
+        for reaction in run.reactions:
+            reaction.scope.mark()
 
 
 def _task(task: Task, engine: Engine) -> list[Any]:

@@ -29,7 +29,7 @@ class MissionStory:
                 return Level.OK, text
             case events.SkillEnded(leaf=leaf, skill=skill, result=result, duration=duration, message=message):
                 self._results.setdefault(skill, Counter())[result] += 1
-                text = f"{self._labels[leaf]}: {result} ({format_number(round(duration, 1))} s)"
+                text = f"{self._labels.get(leaf, skill)}: {result} ({format_number(round(duration, 1))} s)"
                 return RESULTS.get(result, Level.OK), _with(text, message)
             case events.InterruptStarted(name=name, condition=condition, shown=shown):
                 values = ", ".join(f"{name} {value}" for name, value in shown.items())
@@ -51,6 +51,10 @@ class MissionStory:
                 return LEVELS[level], text
             case events.Reported(place=place, message=message):
                 return Level.WARN, f"{place}: {message}"
+            case events.Stopped(place=place, text=text, after=after):
+                return Level.OK, f"stopped at {place}, {f'after {text}: {after}' if after else f'before {text}'}"
+            case events.Intervened(text=text):
+                return Level.WARN, f"by hand: {text}; the run cannot be reproduced without this"
             case events.MissionEnded(result=result):
                 text = f"mission {self._mission}: {result}"
                 otherwise = Level.WARN if event.doubt else Level.OK

@@ -110,6 +110,14 @@ class Task(ABC):
             return True
         return child.restart(target)
 
+    def running(self) -> tuple[Task, ...]:
+        """Return the tasks below that run now."""
+        return () if self.current is None else (self.current,)
+
+    def jump(self, state: str) -> None:
+        """Leave the state that runs, and enter this one at the next tick; only a machine can."""
+        raise NotImplementedError(f"{type(self).__name__} has no states")
+
     def restored(self) -> None:  # noqa: B027 - most kinds have nothing to do
         """Recompute what follows from the state, after it was restored."""
 

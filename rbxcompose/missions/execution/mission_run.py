@@ -10,9 +10,12 @@ from typing import Any
 from rbxcompose.base.expressions.values import NOT_ARRIVED, Value
 from rbxcompose.base.levels import Level
 from rbxcompose.missions.engine import logbook
+from rbxcompose.missions.engine.debugger import named
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent, Transition
+from rbxcompose.missions.engine.interventions import Intervention, SetBreakpoints
 from rbxcompose.missions.engine.logbook import LoggedWorld, LogRecord
+from rbxcompose.missions.engine.snapshot import carry_on, restore
 from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.world import PLAIN, POSE, Settings, World
 from rbxcompose.missions.execution.world import RobotWorld
@@ -83,6 +86,8 @@ class MissionRun:
         self.patient_until: float | None = None  # [s] of the next warning while it waits for its first values
         self.story = MissionStory(name)
         self.transitions: deque[dict[str, Any]] = deque(maxlen=LAST)
+        self.breakpoints = SetBreakpoints()
+        self.goes_on = False  # it was restored, and is resumed when every value that it reads has arrived
         self._on_line, self._now = on_line, 0.0
         world, self.robot = make(self._ended, self._said)
         self.log = LoggedWorld(world, lambda record: write(self._placed(record)))
@@ -134,7 +139,8 @@ class MissionRun:
 
     def reads(self, name: str) -> bool:
         """Return whether a new value of this name is worth a tick."""
-        return not self.is_over and (self.engine.status == IDLE or name in self.engine.reads())
+        is_waiting = self.engine.status == IDLE or self.goes_on
+        return not self.is_over and (is_waiting or name in self.engine.reads())
 
     def tick(self, now: float) -> None:
         """Do what is due at `now` [s]."""
@@ -142,8 +148,26 @@ class MissionRun:
         if self.began is None:
             self.began = now
             self.log.begin(self._inputs, self._settings)
+            if self.breakpoints != SetBreakpoints():
+                self.intervene(self.breakpoints, now)
         self.robot.look()
         self._do(logbook.TICK, lambda: self.engine.tick(now), now)
+        if self.engine.stops and not self.is_over:
+            self.pause(now)
+
+    def restore(self, state: Mapping[str, Any], now: float) -> None:
+        """Go on from a snapshot, of this process or another one; it is paused then.
+
+        Raises:
+            NoSnapshot: if it is none of this mission.
+        """
+        self._now = self.began = now
+        self.log.begin(self._inputs, self._settings)
+        restore(self.engine, state)
+        self._do(logbook.RESTORE, lambda: carry_on(self.engine), now)
+        self.is_paused = True
+        if self.breakpoints != SetBreakpoints():
+            self.intervene(self.breakpoints, now)
 
     def next_wake(self) -> float | None:
         """Return when to tick it next [s]."""
@@ -159,13 +183,30 @@ class MissionRun:
 
     def pause(self, now: float) -> None:
         """Pause it: its timers stop."""
-        self.is_paused = True
+        self.is_paused, self.goes_on = True, False
         self._do(logbook.PAUSE, lambda: self.engine.pause(now), now)
 
     def resume(self, now: float) -> None:
         """Continue."""
-        self.is_paused = False
+        self.is_paused = self.goes_on = False
         self._do(logbook.RESUME, lambda: self.engine.resume(now), now)
+
+    def stop_at(self, breakpoints: SetBreakpoints, now: float) -> None:
+        """Stop at these breakpoints from now on, and at no others."""
+        self.breakpoints = breakpoints
+        if self.began is not None and not self.is_over:
+            self.intervene(breakpoints, now)
+
+    def intervene(self, intervention: Intervention, now: float) -> None:
+        """Do what a person wants; raise `NotPossible` if that cannot be done."""
+        self._do(logbook.INTERVENE, lambda: self.engine.intervene(intervention, now), now, intervention)
+
+    @property
+    def stopped_at(self) -> list[dict[str, Any]]:
+        """Return the nodes at which a breakpoint or a step has stopped it: number, file and line, and what it is."""
+        nodes = self.engine.program.nodes
+        stops = () if self.is_over else self.engine.stops
+        return [{"node": at, "place": nodes[at].span.place, "text": named(nodes[at])} for at in stops]
 
     def abort(self, now: float) -> None:
         """End it from outside."""
@@ -178,13 +219,13 @@ class MissionRun:
     def seen(self, since: int = 0) -> dict[str, Any]:
         """Return what has changed since the version that a viewer has; 0 gives the full state."""
         more = {"state": self.state, "began": self.began, "transitions": list(self.transitions)}
-        return {"mission": self.name, **self.mirror.look(since), **more}
+        return {"mission": self.name, **self.mirror.look(since), **more, "stopped_at": self.stopped_at}
 
-    def _do(self, what: str, call: Callable[[], object], now: float) -> None:
+    def _do(self, what: str, call: Callable[[], object], now: float, intervention: Intervention | None = None) -> None:
         """Call the engine, and log what it read during the call."""
         self._now = now
         call()
-        self.log.did(what)
+        self.log.did(what, intervention)
 
     def _ended(self, leaf: int, result: Result) -> None:
         self.log.arrived(leaf, result)

@@ -12,7 +12,9 @@ from rbxcompose.base.requests import Query, Refused
 from rbxcompose.base.units import format_quantity
 from rbxcompose.missions.engine.inputs import NoSuchState, bind_texts, start_at
 from rbxcompose.missions.engine.logbook import LogRecord
-from rbxcompose.missions.engine.world import Observer, Settings
+from rbxcompose.missions.engine.snapshot import from_plain
+from rbxcompose.missions.engine.world import PLAIN, Observer, Settings
+from rbxcompose.missions.execution.breakpoints import Breakpoints
 from rbxcompose.missions.execution.errands import Equipment
 from rbxcompose.missions.execution.mission_run import LogStore, MakeWorld, MissionRun, claims_of
 from rbxcompose.missions.execution.requests import (
@@ -24,6 +26,7 @@ from rbxcompose.missions.execution.requests import (
     PictureData,
     Seen,
 )
+from rbxcompose.missions.execution.snapshots import differences, identity_of
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.machines import Datum, Input
 from rbxcompose.missions.program.outcomes import IDLE, NAMES
@@ -45,6 +48,7 @@ class RunningMissions:
         self.runs: dict[str, MissionRun] = {}
         self._log = LogStore()
         self._counts: dict[str, int] = {}
+        self.breakpoints = Breakpoints(equipment)
 
     def __iter__(self) -> Iterator[MissionRun]:
         """Return the missions that run or are paused."""
@@ -76,6 +80,27 @@ class RunningMissions:
             settings = Settings(start_at=start_at(linked, start) if start else {}, observer=self.observer)
         except NoSuchState as error:
             raise Refused(str(error)) from error
+        return self._made(name, program, inputs, settings)
+
+    def resumed(self, name: str, snapshot: Mapping[str, Any], now: float) -> MissionRun:
+        """Restore a mission from its snapshot; it is paused.
+
+        Raises:
+            Refused: if mission or robot have changed, it runs, or a running mission needs the same part of the robot.
+        """
+        program = self._program(name)
+        if name in self.names:
+            raise Refused(f"mission {name} is running: cancel it first")
+        linked = link(program, self._equipment.names.missions)
+        if changed := differences(snapshot["identity"], identity_of(linked, self._equipment.names)):
+            raise Refused(f"mission {name} cannot go on from its snapshot: {changed} changed since")
+        if clash := self._clash(linked, frozenset()):
+            raise Refused(clash)
+        run = self._made(name, program, from_plain(snapshot["state"]["runs"][0]["inputs"]), PLAIN)
+        run.restore(snapshot["state"], now)
+        return run
+
+    def _made(self, name: str, program: Program, inputs: Mapping[str, Value], settings: Settings) -> MissionRun:
         self._counts[name] = self._counts.get(name, 0) + 1
         number = self._counts[name]
         self.runs.pop(name, None)
@@ -89,6 +114,7 @@ class RunningMissions:
             name=name,
             settings=settings,
         )
+        self.runs[name].breakpoints = self.breakpoints.of(name)
         return self.runs[name]
 
     def seen(self, name: str, since: int = 0) -> Seen:
@@ -141,7 +167,8 @@ class RunningMissions:
         inputs = tuple(map(_listed_input, program.inputs.values()))
         states = program.nodes[program.main].step.states
         starts = states.names if states else ()
-        return ListedMission(name, program.about, run.state if run else NAMES[IDLE], tuple(claims), inputs, starts)
+        at = ", ".join(stop["place"] for stop in run.stopped_at) if run else ""
+        return ListedMission(name, program.about, run.state if run else NAMES[IDLE], tuple(claims), inputs, starts, at)
 
     def since(self, number: int) -> LogPart:
         """Return the records of the log after the first `number`."""
@@ -191,6 +218,7 @@ class RunningMissions:
 
 
 PATH = "missions"
+_TOLD = "version", "state", "transitions", "began", "stopped_at"  # what is news
 _ALWAYS = frozenset({"mission", "version", "whole", "state"})  # what is in all updates
 
 Open = Callable[[str, Query[Any]], Window]  # takes a path and the query that is made there
@@ -226,7 +254,7 @@ class MissionFeed:
         seen = run.seen(self._published.get("version", 0))
         fresh = {key: value for key, value in seen.items() if key in _ALWAYS or self._published.get(key) != value}
         fresh |= {"statuses": seen["statuses"], "data": seen["data"]}
-        if all(self._published.get(key) == seen[key] for key in ("version", "state", "transitions", "began")):
+        if all(self._published.get(key) == seen[key] for key in _TOLD):
             return
         self._published = seen
         self._window.put(fresh)

@@ -25,6 +25,8 @@ class RunMission(Command):
     mission: str
     inputs: Mapping[str, str] = field(default_factory=dict)
     start: str = ""
+    is_repeated: bool = False
+    """Whether a crash had cut it short: it may go on from its snapshot."""
 
     @property
     def words(self) -> str:
@@ -63,6 +65,113 @@ class ResumeMission(_OfMission):
 
 
 @dataclass(frozen=True, slots=True)
+class RestoreMission(_OfMission):
+    """Go on with a mission where it was when its process crashed or the machine lost power."""
+
+    @property
+    def words(self) -> str:
+        """Return it as written on the command line."""
+        return shlex.join(["resume", *([self.mission] if self.mission else []), "--from-snapshot"])
+
+
+@dataclass(frozen=True, slots=True)
+class StepMission(_OfMission):
+    """Let a mission go on to the start of its next leaf, or to the next transition of a machine."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetBreakpoint(Command):
+    """Stop a mission at a node or a transition: `patrol.yaml:12`, a name, a state, `away->home`, or a number."""
+
+    about = MISSION
+    where: str
+    mission: str = ""
+
+    @property
+    def words(self) -> str:
+        """Return it as written on the command line."""
+        return shlex.join(["break", self.where, *_in(self.mission)])
+
+
+@dataclass(frozen=True, slots=True)
+class ClearBreakpoints(Command):
+    """Clear the breakpoint at `where`; without it, all of them."""
+
+    about = MISSION
+    where: str = ""
+    mission: str = ""
+
+    @property
+    def words(self) -> str:
+        """Return it as written on the command line."""
+        return shlex.join(["break", *([self.where] if self.where else []), *_in(self.mission), "--clear"])
+
+
+@dataclass(frozen=True, slots=True)
+class ListedBreakpoint:
+    """A breakpoint: the mission, how it was written, its file and line, and what is there."""
+
+    mission: str
+    where: str
+    place: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class ListBreakpoints(Query[tuple[ListedBreakpoint, ...]]):
+    """Query the list of breakpoints."""
+
+    about = MISSION
+
+
+@dataclass(frozen=True, slots=True)
+class ForceNode(Command):
+    """Halt a node that runs, and let it end with this outcome."""
+
+    about = MISSION
+    where: str
+    outcome: str
+    mission: str = ""
+
+    @property
+    def words(self) -> str:
+        """Return it as written on the command line."""
+        return shlex.join(["force", self.where, self.outcome, *_in(self.mission)])
+
+
+@dataclass(frozen=True, slots=True)
+class SetMissionData(Command):
+    """Set data of a mission that runs, given as text."""
+
+    about = MISSION
+    values: Mapping[str, str]
+    mission: str = ""
+
+    @property
+    def words(self) -> str:
+        """Return it as written on the command line."""
+        return shlex.join(["set", *(f"{name}={text}" for name, text in self.values.items()), *_in(self.mission)])
+
+
+@dataclass(frozen=True, slots=True)
+class JumpMission(Command):
+    """Let a machine that runs leave its state and enter this one."""
+
+    about = MISSION
+    state: str
+    mission: str = ""
+
+    @property
+    def words(self) -> str:
+        """Return it as written on the command line."""
+        return shlex.join(["jump", self.state, *_in(self.mission)])
+
+
+def _in(mission: str) -> list[str]:
+    return ["--mission", mission] if mission else []
+
+
+@dataclass(frozen=True, slots=True)
 class ListedInput:
     """An input of a mission: what may be given in words, the words of a choice, and its default as it is written."""
 
@@ -84,6 +193,8 @@ class ListedMission:
     inputs: tuple[ListedInput, ...] = ()
     starts: tuple[str, ...] = ()
     """The states in which it may start, if it is a machine."""
+    at: str = ""
+    """Where a breakpoint or a step has stopped it: file and line."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,6 +46,12 @@ class MachineTask(sdk.WithHistory):
             return RUNNING
         return self._go_on(SUCCESS if status == SKIPPED else status)
 
+    def jump(self, state: str) -> None:
+        """Leave the state that runs, and enter this one at the next tick."""
+        self.halt_below()
+        self.index = self.machine.names.index(state)
+        self.forget()
+
     def _go_on(self, status: int) -> int:
         name, counts_as = self.machine.names[self.index], NAMES[status]
         outcome = self.engine.outcome or counts_as
@@ -65,9 +71,9 @@ class MachineTask(sdk.WithHistory):
     def _next(self, state: str, outcome: str, counts_as: str) -> str:
         """Return the target of an outcome: of its own transition, else of the one for the result it counts as."""
         leads = self.leads[self.index]
-        for key in (outcome, counts_as, "") if leads else ():
-            if leads and key in leads.to:
-                return leads.to[key]
+        key = leads.key_for(outcome, counts_as) if leads else None
+        if leads and key is not None:
+            return leads.to[key]
         raise sdk.NodeFailed(f"state '{state}' ended with '{outcome}', which leads nowhere")
 
 

@@ -73,6 +73,10 @@ class ParallelTask(sdk.Task):
                 self.runs[index] = False
                 child.halt()
 
+    def running(self) -> tuple[sdk.Task, ...]:
+        """Return the branches that run."""
+        return tuple(child for child, runs in zip(self.children, self.runs, strict=True) if runs)
+
     def suspend(self, from_start: bool) -> bool:
         """Suspend all branches that run."""
         for index, child in enumerate(self.children):

@@ -61,6 +61,13 @@ class Next:
     spans: Mapping[str, Span] = field(default_factory=dict)  # of the names of these states, by outcome
     keys: Mapping[str, Span] = field(default_factory=dict)  # of the outcomes
 
+    def key_for(self, outcome: str, counts_as: str) -> str | None:
+        """Return the key of the transition that an outcome takes: its own, or that of what it counts as."""
+        for key in (outcome, counts_as, ""):
+            if key in self.to:
+                return key
+        return None
+
 
 @dataclass(frozen=True, slots=True)
 class MachineStates:

@@ -1,4 +1,4 @@
-"""Run, hold, watch, draw and explore the missions of a robot.
+"""Run, hold, watch, debug, draw and explore the missions of a robot.
 
 Exit codes: 0 fine, 1 refused or errors found, 2 wrong usage.
 """
@@ -38,12 +38,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         sets,
         argument("--from", dest="start", default="", metavar="STATE", help="start in this state: 'outer.inner'"),
     )
+    resumed = (
+        *named,
+        argument("--from-snapshot", action="store_true", help="go on where it was before a crash or a loss of power"),
+    )
     logged = (
         *named,
         argument("-f", "--follow", action="store_true", help="follow new records, until interrupted"),
         argument("--all", action="store_true", help="also its inputs, so that it can be run again"),
     )
     again = (argument("log", metavar="FILE", help="the output of 'mission log --all'"), robot)
+    where = "FILE:LINE, the name of a node, a state, STATE->STATE, or the node's number"
+    which = argument("--mission", dest="name", default="", metavar="MISSION", help="which one, if that is not clear")
+    broken = (
+        argument("where", nargs="?", default="", metavar="WHERE", help=where),
+        which,
+        argument("--clear", action="store_true", help="clear it; without WHERE, clear all"),
+        add_asking_options,
+    )
+    forced = (
+        argument("where", metavar="WHERE", help=where),
+        argument("outcome", metavar="OUTCOME", help="success, failure, or an outcome of its own"),
+        which,
+        add_asking_options,
+    )
+    changed = (argument("sets", nargs="+", metavar="NAME=VALUE", help="what to set"), which, add_asking_options)
+    jumped = (argument("state", metavar="STATE", help="the state to enter"), which, add_asking_options)
     drawn = (
         the_mission,
         robot,
@@ -65,7 +85,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("run", "start a mission beside those that run", _run, started),
         ("cancel", "end a mission for good", _to(requests.CancelMission), named),
         ("pause", "hold a mission; its timers stand still", _to(requests.PauseMission), named),
-        ("resume", "resume a mission where it was held", _to(requests.ResumeMission), named),
+        ("resume", "resume a mission where it was held", _resume, resumed),
+        ("step", "go on to the next leaf or transition", _to(requests.StepMission), named),
+        ("break", "stop at a node or a transition; without one, list the breakpoints", _break, broken),
+        ("force", "let a node that runs end with an outcome", _force, forced),
+        ("set", "set data of a mission that runs", _set, changed),
+        ("jump", "bring a machine that runs into another state", _jump, jumped),
         ("status", "show where a mission is, with its data", _status, named),
         ("watch", "show a mission live", _watch, named),
         ("log", "print what missions did, as JSON, one line each", _log, logged),
@@ -105,6 +130,43 @@ def _run(arguments: argparse.Namespace) -> int:
     return pass_on(arguments, requests.RunMission(arguments.name, inputs, arguments.start))
 
 
+def _resume(arguments: argparse.Namespace) -> int:
+    do = requests.RestoreMission if arguments.from_snapshot else requests.ResumeMission
+    return pass_on(arguments, do(arguments.name))
+
+
+def _break(arguments: argparse.Namespace) -> int:
+    where, name = arguments.where, arguments.name
+    if arguments.clear:
+        return pass_on(arguments, requests.ClearBreakpoints(where, name))
+    if where:
+        return pass_on(arguments, requests.SetBreakpoint(where, name))
+    found = [one for one in ask(arguments.robot, requests.ListBreakpoints()) if name in ("", one.mission)]
+    if arguments.json:
+        emit(json.dumps(to_data(found)))
+    else:
+        rows = [(one.mission, one.where, one.place, one.text) for one in found]
+        emit(table([("mission", "breakpoint", "place", "what"), *rows]) if rows else "no breakpoints")
+    return 0
+
+
+def _force(arguments: argparse.Namespace) -> int:
+    return pass_on(arguments, requests.ForceNode(arguments.where, arguments.outcome, arguments.name))
+
+
+def _set(arguments: argparse.Namespace) -> int:
+    folder = find_robot(arguments.robot)
+    try:
+        values = requests.settings(arguments.sets)
+    except Refused as refusal:
+        return refuse(REFUSED.at(None, f"'{folder.path.name}' refuses: {refusal}"))
+    return pass_on(arguments, requests.SetMissionData(values, arguments.name))
+
+
+def _jump(arguments: argparse.Namespace) -> int:
+    return pass_on(arguments, requests.JumpMission(arguments.state, arguments.name))
+
+
 def _list(arguments: argparse.Namespace) -> int:
     missions = ask(arguments.robot, requests.ListMissions())
     emit(json.dumps(to_data(missions)) if arguments.json else _table(missions))
@@ -113,8 +175,12 @@ def _list(arguments: argparse.Namespace) -> int:
 
 def _table(missions: Sequence[requests.ListedMission]) -> str:
     names = max((len(mission.name) for mission in missions), default=0)
-    states = max((len(mission.state) for mission in missions), default=0)
-    lines = [f"{mission.name:<{names}}  {mission.state:<{states}}  {mission.about}".rstrip() for mission in missions]
+    shown = [f"{mission.state} at {mission.at}" if mission.at else mission.state for mission in missions]
+    states = max(map(len, shown), default=0)
+    lines = [
+        f"{mission.name:<{names}}  {state:<{states}}  {mission.about}".rstrip()
+        for mission, state in zip(missions, shown, strict=True)
+    ]
     return "\n".join(lines) or "this robot has no missions"
 
 

@@ -1,0 +1,196 @@
+"""What people ask for while they debug missions, with the names they use, as interventions in a run."""
+
+from collections.abc import Mapping
+
+from rbxcompose.base.expressions.types import TypeKind
+from rbxcompose.base.findings import clauses, suggest
+from rbxcompose.base.requests import Refused
+from rbxcompose.manifest.reader import read_text
+from rbxcompose.manifest.tree import NOWHERE, MappingNode, ScalarNode, TreeNode
+from rbxcompose.missions.analysis.examined import Ending
+from rbxcompose.missions.engine.addresses import ARROW, Spot, find, is_line, is_number
+from rbxcompose.missions.engine.debugger import named
+from rbxcompose.missions.engine.interventions import ChangeData, ForceResult, JumpToState, NotPossible, SetBreakpoints
+from rbxcompose.missions.execution.errands import Equipment
+from rbxcompose.missions.execution.mission_run import MissionRun
+from rbxcompose.missions.execution.requests import ListedBreakpoint, SetBreakpoint
+from rbxcompose.missions.language.literals import WrongValue, typed
+from rbxcompose.missions.program.answers import Form
+from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.program.outcomes import SUCCEEDS
+from rbxcompose.missions.program.program import MissionNode, Program
+
+_PLACED = (TypeKind.PLACE, TypeKind.POSE)
+
+
+class Breakpoints:
+    """The breakpoints of a robot, by mission and by how they were written; they stay while missions come and go."""
+
+    def __init__(self, equipment: Equipment) -> None:
+        self._equipment = equipment
+        self._set: dict[str, dict[str, tuple[Spot, ...]]] = {}
+
+    def of(self, mission: str) -> SetBreakpoints:
+        """Return where a mission stops."""
+        spots = [spot for found in self._set.get(mission, {}).values() for spot in found]
+        ends = ((spot.node, spot.outcome) for spot in spots if spot.outcome is not None)
+        return SetBreakpoints(tuple(spot.node for spot in spots if spot.outcome is None), tuple(ends))
+
+    @property
+    def requests(self) -> tuple[SetBreakpoint, ...]:
+        """Return the requests that set them again."""
+        return tuple(SetBreakpoint(where, mission) for mission, found in self._set.items() for where in found)
+
+    def listed(self) -> tuple[ListedBreakpoint, ...]:
+        """Return all of them."""
+        return tuple(
+            ListedBreakpoint(mission, where, spots[0].span.place, self._text(mission, spots[0]))
+            for mission, found in self._set.items()
+            for where, spots in found.items()
+        )
+
+    def add(self, where: str, mission: str, active: list[str]) -> tuple[str, ...]:
+        """Set a breakpoint in this mission, else in that which has such a place; return the missions that have it now.
+
+        Raises:
+            Refused: if there is no such place, or several missions have one; of these, an `active` one is meant.
+        """
+        programs = self._equipment.programs
+        if mission and mission not in programs:
+            raise Refused(clauses(f"the robot has no mission '{mission}'", suggest(mission, programs, "its missions")))
+        if is_number(where) and not mission:
+            if len(active) != 1:
+                raise Refused(f"node {where} of which mission? Add '--mission NAME'")
+            mission = active[0]
+        found: dict[str, tuple[Spot, ...]] = {}
+        reasons: dict[str, str] = {}
+        for name in [mission] if mission else programs:
+            try:
+                found[name] = find(self.linked(name), where)
+            except NotPossible as error:
+                reasons[name] = str(error)
+        if not found:
+            raise Refused(next((reasons[name] for name in (*active, *reasons) if name in reasons), "no missions"))
+        if len(found) > 1 and not is_line(where):
+            found = {name: spots for name, spots in found.items() if name in active} or found
+            if len({spots[0].span for spots in found.values()}) > 1:
+                raise Refused(f"several missions have '{where}': {', '.join(found)}; add '--mission NAME'")
+        for name, spots in found.items():
+            self._set.setdefault(name, {})[where] = spots
+        return tuple(found)
+
+    def clear(self, where: str, mission: str) -> tuple[str, ...]:
+        """Clear a breakpoint, or all; return the missions that had it.
+
+        Raises:
+            Refused: if there is none.
+        """
+        had = [
+            (name, written)
+            for name, found in self._set.items()
+            for written, spots in found.items()
+            if mission in ("", name) and where in ("", written, spots[0].span.place)
+        ]
+        if not had:
+            known = [written for found in self._set.values() for written in found]
+            at = f" at '{where}'" if where else ""
+            raise Refused(clauses(f"there is no breakpoint{at}", suggest(where, known, "breakpoints")))
+        for name, written in had:
+            del self._set[name][written]
+        return tuple(dict.fromkeys(name for name, _ in had))
+
+    def linked(self, mission: str) -> Program:
+        """Return a mission with those that it uses."""
+        return link(self._equipment.programs[mission], self._equipment.names.missions)
+
+    def _text(self, mission: str, spot: Spot) -> str:
+        node = self.linked(mission).nodes[spot.node]
+        leads = node.step.leads_to
+        return named(node) if spot.outcome is None or not leads else f"{node.name}{ARROW}{leads.to[spot.outcome]}"
+
+
+def forced(run: MissionRun, where: str, outcome: str) -> ForceResult:
+    """Return the intervention that lets a running node end with an outcome.
+
+    Raises:
+        NotPossible: if no such node runs, several do, or it cannot end so.
+    """
+    program = run.engine.program
+    node = _one(run, [program.nodes[spot.node] for spot in find(program, where)], f"'{where}' does not run now")
+    words = Ending(program, run.engine.robot).of(node.number).words
+    if outcome not in words:
+        help_text = suggest(outcome, words, "it may end in")
+        raise NotPossible(clauses(f"{named(node)} at {node.span.place} cannot end in '{outcome}'", help_text))
+    return ForceResult(node.number, words[outcome] == SUCCEEDS, "" if outcome == words[outcome] else outcome)
+
+
+def jump(run: MissionRun, where: str) -> JumpToState:
+    """Return the intervention that brings a machine that runs into a state.
+
+    Raises:
+        NotPossible: if no machine runs, or none that runs has this state, or several have it.
+    """
+    nodes, live = run.engine.program.nodes, run.engine.debugger.live()
+    machines = [nodes[number] for number in sorted(live) if nodes[number].step.states]
+    if not machines:
+        raise NotPossible("no machine runs now, so there is no state to leave")
+    if is_line(where) or is_number(where):
+        meant = {spot.node for spot in find(run.engine.program, where)}
+    else:
+        meant = {child for machine in machines for child in machine.children if nodes[child].name == where}
+    states = [nodes[number] for number in meant if nodes[number].step.look.form is Form.STATE]
+    if not states:
+        names = [nodes[child].name for machine in machines for child in machine.children]
+        raise NotPossible(clauses(f"there is no state '{where}'", suggest(where, names, "states")))
+    parents = [nodes[state.parent] for state in states if state.parent is not None]
+    machine = _one(run, parents, f"the machine of '{where}' does not run now")
+    return JumpToState(machine.number, next(state.name for state in states if state.parent == machine.number))
+
+
+def _one(run: MissionRun, nodes: list[MissionNode], otherwise: str) -> MissionNode:
+    """Return the one of some nodes that runs."""
+    live = run.engine.debugger.live()
+    running = [node for node in nodes if node.number in live]
+    if not running:
+        raise NotPossible(otherwise)
+    if len(running) > 1:
+        numbers = ", ".join(str(node.number) for node in running)
+        raise NotPossible(f"several such nodes run: {numbers}; name one by its number")
+    return running[0]
+
+
+def changed(run: MissionRun, given: Mapping[str, str]) -> list[ChangeData]:
+    """Return the interventions that set data, given as text.
+
+    Raises:
+        NotPossible: if there is no such data, or a value does not have its type.
+    """
+    data, places = run.engine.program.data, run.engine.robot.places
+    made = []
+    for name, text in given.items():
+        if name not in data:
+            raise NotPossible(clauses(f"the mission has no data '{name}'", suggest(name, data, "its data")))
+        wanted = data[name].type
+        try:
+            found = typed(_node(name, text), wanted)
+        except WrongValue as error:
+            raise NotPossible(clauses(f"'{name}' {error.message}", error.label, error.help)) from error
+        if wanted.kind in _PLACED and found.value not in places:
+            raise NotPossible(clauses(f"there is no place '{text}'", suggest(text, places, "places of this robot")))
+        if wanted.kind is TypeKind.LIST and found.value and _differ(found.type.entry.kind, wanted.entry.kind):
+            raise NotPossible(f"'{name}' must be {wanted.phrase}; this is {found.type.phrase}")
+        made.append(ChangeData(name, found.value))
+    return made
+
+
+def _differ(kind: TypeKind, wanted: TypeKind) -> bool:
+    """Return whether one is a text or a flag and the other a number."""
+    return (
+        kind is not wanted and not {kind, wanted}.isdisjoint((TypeKind.TEXT, TypeKind.FLAG)) and wanted not in _PLACED
+    )
+
+
+def _node(name: str, text: str) -> TreeNode:
+    root, findings = read_text(f"{name}: {text}", "")
+    is_read = isinstance(root, MappingNode) and root.entries.keys() == {name} and not findings
+    return root.entries[name].value if is_read and isinstance(root, MappingNode) else ScalarNode(text, NOWHERE)

@@ -1,0 +1,129 @@
+"""Snapshots of missions on disk: how far a mission was, for when its process crashed or the machine lost power.
+
+One file for each mission of a robot, below `$XDG_STATE_HOME/rbxcompose/snapshots`, replaced at most once in `PERIOD`.
+It is not flushed to disk, which would take longer than all the rest: a power failure may lose the last seconds.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from rbxcompose.base.files import TEMPORARY, state_folder
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.missions.engine.snapshot import save, to_plain
+from rbxcompose.missions.execution.mission_run import MissionRun
+from rbxcompose.missions.program.outcomes import RUNNING
+from rbxcompose.missions.program.program import Program, RobotNames
+
+PERIOD = 1.0  # [s] between two snapshots of a mission
+ROUNDING = 1e-6  # [s]
+VERSION = 1
+_ASIDE = ".before"  # the snapshot of an earlier run that did not end
+
+
+class SnapshotStore:
+    """The snapshots of a robot's missions; a robot on a stepped clock keeps none."""
+
+    def __init__(self, robot: str, *, is_kept: bool) -> None:
+        self._folder = state_folder() / "snapshots" / robot if is_kept else None
+        self._due: dict[str, float] = {}
+        self._known: dict[str, Any] = {}  # what the latest snapshot of each mission has
+        self._made_of: dict[str, tuple[MissionRun, Mapping[str, str]]] = {}
+        self.trouble = ""  # why the latest one could not be written
+
+    def keep(self, run: MissionRun, now: float) -> float | None:
+        """Write a snapshot if something has changed; return when to look again [s] if that is too early."""
+        engine = run.engine
+        if self._folder is None or engine.status != RUNNING:
+            return None
+        state = (list(engine.statuses), dict(engine.data), run.is_paused)
+        if self._known.get(run.name) == state:
+            return None
+        if now < self._due.get(run.name, now) - ROUNDING:
+            return self._due[run.name]
+        self._due[run.name], self._known[run.name] = now + PERIOD, state
+        if self._made_of.get(run.name, (None,))[0] is not run:
+            self._made_of[run.name] = run, identity_of(engine.program, engine.robot)
+        state_now = {"is_paused": run.is_paused, "state": save(engine)}
+        content = {"version": VERSION, "identity": self._made_of[run.name][1], **state_now}
+        self._write(self._path(run.name), content)
+        return None
+
+    def read(self, mission: str, *, is_latest: bool = False) -> Mapping[str, Any] | None:
+        """Return the snapshot of a mission that did not end: of the latest run, else of one before."""
+        for aside in ("",) if is_latest else ("", _ASIDE):
+            with suppress(OSError, ValueError):
+                content = json.loads(self._path(mission, aside).read_bytes()) if self._folder else None
+                if isinstance(content, dict) and content.get("version") == VERSION:
+                    return content
+        return None
+
+    def drop(self, mission: str) -> None:
+        """Forget the snapshot of a mission that has ended."""
+        self._due.pop(mission, None)
+        self._known.pop(mission, None)
+        if self._folder:
+            with suppress(OSError):
+                self._path(mission).unlink()
+
+    def set_aside(self, mission: str) -> None:
+        """Keep the snapshot of a run that did not end for whoever asks for it, since a new run begins."""
+        if self._folder:
+            with suppress(OSError):
+                os.replace(self._path(mission), self._path(mission, _ASIDE))
+
+    def _path(self, mission: str, aside: str = "") -> Path:
+        return (self._folder or Path()) / f"{mission}{aside}.json"
+
+    def _write(self, path: Path, content: Mapping[str, Any]) -> None:
+        temporary = path.with_suffix(TEMPORARY)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            temporary.write_text(json.dumps(content), encoding="utf-8")
+            os.replace(temporary, path)
+            self.trouble = ""
+        except OSError as error:
+            self.trouble = f"snapshots cannot be written: {error.strerror}"
+
+
+def identity_of(program: Program, robot: RobotNames) -> dict[str, str]:
+    """Return what a snapshot depends on, each with its digest: the missions, and what the robot offers them."""
+    used = [program, *(node.inner for node in program.nodes if node.inner)]
+    skills = {node.skill: robot.skills[node.skill] for node in program.nodes if node.skill in robot.skills}
+    shapes = {
+        name: [sorted(skill.arguments), skill.claims, skill.restartable, skill.pausable, sorted(skill.outcomes)]
+        for name, skill in sorted(skills.items())
+    }
+    values = {name: robot.values[name].detail for name in sorted(program.reads & robot.values.keys())}
+    parts: dict[str, Any] = {
+        **{f"mission '{one.name}'": _plain(one.root) for one in used},
+        "places": {name: to_plain(place) for name, place in sorted(robot.places.items())},
+        "skills": shapes,
+        "values": values,
+    }
+    return {name: hashlib.sha256(json.dumps(part).encode()).hexdigest()[:16] for name, part in parts.items()}
+
+
+def differences(saved: Mapping[str, Any], now: Mapping[str, str]) -> str:
+    """Return in words what has changed since a snapshot; empty if nothing has."""
+    return " and ".join(sorted(_changed(saved, now)))
+
+
+def _changed(saved: Mapping[str, Any], now: Mapping[str, str]) -> Iterator[str]:
+    for name in {*saved, *now}:
+        if saved.get(name) != now.get(name):
+            yield f"the {name}" if name.startswith("mission") else f"the robot's {name}"
+
+
+def _plain(node: TreeNode) -> Any:
+    match node:
+        case MappingNode():
+            return {key: _plain(entry.value) for key, entry in node.entries.items()}
+        case SequenceNode():
+            return [_plain(item) for item in node.items]
+        case ScalarNode():
+            return [node.text, str(node.filled)]

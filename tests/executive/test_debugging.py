@@ -1,0 +1,233 @@
+"""Breakpoints and other interventions, as people ask a running robot for them."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from rbxcompose.base.requests import Command, Refused
+from rbxcompose.missions.engine.log_replay import OtherInterventionError, replay
+from rbxcompose.missions.engine.logbook import INPUTS
+from rbxcompose.missions.execution.requests import (
+    CancelMission,
+    ClearBreakpoints,
+    ForceNode,
+    JumpMission,
+    ListBreakpoints,
+    ListMissions,
+    PauseMission,
+    ResumeMission,
+    RunMission,
+    SetBreakpoint,
+    SetMissionData,
+    StepMission,
+)
+from rbxcompose.sdk import Outcome
+from tests.executive.fake_robot import Robot
+
+PATROL = """
+data:
+  rounds: 0
+  corners: [corner, dock]
+  goal: dock
+  mode: slow
+machine:
+  start: away
+  states:
+    away:
+      do:
+        - go_to: corner
+          timeout: 10 s
+        - set: {rounds: $rounds + 1}
+      next:
+        success: home
+        failure: failed
+    home:
+      do:
+        name: go_home
+        go_to: dock
+      next:
+        success: finished
+        failure: failed
+"""
+REST = "name: rest\ndo:\n  - wait: 1 s\n  - {name: nap, wait: 2 s}\n  - log: awake\n"
+
+
+def robot_at(*requests: Command) -> Robot:
+    robot = Robot(PATROL, rest=REST)
+    for request in requests:
+        robot.mission.handle(request)
+    robot.start()
+    robot.level(80.0)
+    return robot
+
+
+def arrive(robot: Robot) -> None:
+    robot.go_to.end(Outcome.SUCCEEDED)
+    robot.advance(0.0)
+
+
+def state(robot: Robot, name: str = "test") -> tuple[str, str]:
+    return next((one.state, one.at) for one in robot.mission.handle(ListMissions()) if one.name == name)
+
+
+def records(robot: Robot) -> list[dict[str, Any]]:
+    return [json.loads(json.dumps(record)) for record in robot.mission.missions.since(0).records]
+
+
+def is_reproducible(robot: Robot) -> bool:
+    found = records(robot)
+    again = replay(found, robot.mission.config.programs["test"], robot.mission.config.names)
+    before = [record for record in found if record["event"] not in INPUTS]
+    own = [{key: value for key, value in record.items() if key not in ("mission", "run")} for record in before]
+    return bool(own == json.loads(json.dumps(again)))
+
+
+def test_a_breakpoint_pauses_the_mission_and_says_where() -> None:
+    robot = robot_at(SetBreakpoint("go_home"))
+    arrive(robot)
+    assert state(robot) == ("paused", "mission.yaml:21")
+    seen = robot.mission.missions.seen("test")
+    assert seen["stopped_at"] == [{"node": 6, "place": "mission.yaml:21", "text": "go_home"}]
+    assert len(robot.go_to.goals) == 1
+    robot.advance(60.0)
+    robot.mission.handle(ResumeMission())
+    robot.advance(0.0)
+    arrive(robot)
+    assert robot.lines[-1] == "60 mission test: success"
+    assert "0 stopped at mission.yaml:21, before go_home" in robot.lines
+    assert is_reproducible(robot)
+
+
+def test_a_timeout_stands_still_while_a_mission_is_stopped_and_what_moved_is_sent_again() -> None:
+    robot = robot_at()
+    robot.advance(9.0)
+    robot.mission.handle(PauseMission())
+    robot.mission.handle(StepMission())
+    robot.advance(0.5)
+    assert len(robot.go_to.goals) == 2
+    arrive(robot)
+    assert state(robot) == ("paused", "mission.yaml:14")
+    robot.advance(60.0)
+    robot.mission.handle(StepMission())
+    robot.advance(0.0)
+    assert state(robot) == ("paused", "mission.yaml:10")
+    assert robot.lines[-1] == "69.5 stopped at mission.yaml:10, after away: success, on to home"
+    assert is_reproducible(robot)
+
+
+def test_a_breakpoint_stays_for_the_next_run_and_over_a_crash_until_it_is_cleared() -> None:
+    robot = robot_at(SetBreakpoint("mission.yaml:14"))
+    arrive(robot)
+    robot.mission.handle(CancelMission())
+    robot.mission.handle(RunMission("test", is_repeated=True))
+    robot.advance(0.0)
+    arrive(robot)
+    assert state(robot) == ("paused", "mission.yaml:14")
+    assert robot.repeated == (SetBreakpoint("mission.yaml:14", "test"), RunMission("test", is_repeated=True))
+    other = robot_at(*robot.repeated[:1])
+    arrive(other)
+    assert state(other) == ("paused", "mission.yaml:14")
+    other.mission.handle(ClearBreakpoints("mission.yaml:14"))
+    assert other.repeated == ()
+    assert other.mission.handle(ListBreakpoints()) == ()
+    assert state(other)[0] == "paused"
+    other.mission.handle(ResumeMission())
+    other.advance(0.0)
+    assert len(other.go_to.goals) == 2
+
+
+def test_a_mission_that_is_stopped_stops_no_other() -> None:
+    robot = robot_at(SetBreakpoint("go_home"))
+    robot.mission.handle(RunMission("rest"))
+    arrive(robot)
+    robot.advance(5.0)
+    assert state(robot)[0] == "paused"
+    assert state(robot, "rest")[0] == "success"
+
+
+def test_breakpoints_are_listed_with_what_is_there() -> None:
+    robot = robot_at(SetBreakpoint("away->home"), SetBreakpoint("nap"))
+    listed = robot.mission.handle(ListBreakpoints())
+    assert [(one.mission, one.place, one.text) for one in listed] == [
+        ("test", "mission.yaml:16", "away->home"),
+        ("rest", "mission.yaml:4", "nap"),
+    ]
+
+
+def test_all_that_people_do_is_told_and_a_replay_repeats_it() -> None:
+    robot = robot_at()
+    robot.mission.handle(SetMissionData({"rounds": "3", "corners": "[dock]", "mode": "fast"}))
+    robot.mission.handle(ForceNode("mission.yaml:12", "success"))
+    robot.advance(0.0)
+    robot.mission.handle(JumpMission("away"))
+    robot.advance(0.5)
+    robot.mission.handle(ForceNode("away", "failure"))
+    robot.advance(0.0)
+    run = robot.mission.missions.runs["test"]
+    assert run.engine.data == {"rounds": 4.0, "corners": ["dock"], "goal": "dock", "mode": "fast"}
+    assert [line for line in robot.lines if "by hand" in line] == [
+        "0 by hand: rounds = 3; the run cannot be reproduced without this",
+        "0 by hand: corners = dock; the run cannot be reproduced without this",
+        "0 by hand: mode = fast; the run cannot be reproduced without this",
+        "0 by hand: mission.yaml:12, go_to corner ends in success; the run cannot be reproduced without this",
+        "0 go_to corner: halted (0 s): ended by hand",
+        "0 by hand: mission.yaml:7, jump to state away; the run cannot be reproduced without this",
+        "0 go_to dock: halted (0 s): ended by hand",
+        "0.5 by hand: mission.yaml:10, away ends in failure; the run cannot be reproduced without this",
+        "0.5 go_to corner: halted (0.5 s): ended by hand",
+        "0.5 mission test: failure: mission.yaml:10: ended by hand",
+    ]
+    assert is_reproducible(robot)
+
+
+def test_a_replay_says_what_a_changed_mission_cannot_repeat() -> None:
+    robot = robot_at()
+    robot.mission.handle(SetMissionData({"rounds": "3"}))
+    changed = Robot(PATROL.replace("rounds", "laps")).mission.config
+    with pytest.raises(OtherInterventionError, match="the mission has no data 'rounds'"):
+        replay(records(robot), changed.programs["test"], changed.names)
+
+
+@pytest.mark.parametrize(
+    ("request_", "reason"),
+    [
+        (SetBreakpoint("go_hone"), r"there is no 'go_hone'; did you mean 'go_home'\?"),
+        (SetBreakpoint("mission.yaml:99"), "nothing begins in line 99 of 'mission.yaml'"),
+        (SetBreakpoint("go_home", "tset"), "the robot has no mission 'tset'"),
+        (ClearBreakpoints("go_home"), "there is no breakpoint at 'go_home'"),
+        (StepMission("rest"), "mission rest is not running"),
+        (ForceNode("nap", "success", "rest"), "mission rest is not running"),
+        (ForceNode("go_home", "success"), "'go_home' does not run now"),
+        (ForceNode("away", "lost"), "away at mission.yaml:10 cannot end in 'lost'; it may end in: success, failure"),
+        (SetMissionData({"rounds": "many"}), "'rounds' must be a whole number"),
+        (SetMissionData({"round": "1"}), "the mission has no data 'round'; did you mean 'rounds'"),
+        (SetMissionData({"mode": "fast", "corners": "[1, 2]"}), "'corners' must be a list"),
+        (JumpMission("hom"), "there is no state 'hom'; did you mean 'home'"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_and_the_mission_is_unharmed(request_: Command, reason: str) -> None:
+    robot = robot_at()
+    with pytest.raises(Refused, match=reason):
+        robot.mission.handle(request_)
+    arrive(robot)
+    arrive(robot)
+    assert robot.lines[-1] == "0 mission test: success"
+    assert robot.mission.missions.runs["test"].engine.data["mode"] == "slow"
+    assert is_reproducible(robot)
+
+
+def test_there_is_no_state_to_leave_where_no_machine_runs() -> None:
+    robot = Robot(REST.replace("name: rest\n", ""))
+    robot.start()
+    with pytest.raises(Refused, match="no machine runs now"):
+        robot.mission.handle(JumpMission("home"))
+
+
+def test_nothing_can_be_done_to_a_mission_that_has_not_begun() -> None:
+    robot = Robot("do:\n  wait_for: $battery > 10 %\n")
+    robot.start()
+    with pytest.raises(Refused, match="mission test has not begun"):
+        robot.mission.handle(StepMission())
