@@ -56,6 +56,10 @@ _SERVICES = {
     "/console/stop": Role.VIEW,  # whoever sees that something goes wrong
     "/console/ask": Role.VIEW,  # the request decides
     "/console/log": Role.VIEW,
+    "/console/mission/check": Role.VIEW,  # of a text that nobody else sees
+    "/console/mission/look": Role.VIEW,
+    "/console/mission/read": Role.VIEW,
+    "/console/mission/save": Role.CONFIGURE,
     "/console/tested": Role.VIEW,
     "/console/save": Role.CONFIGURE,
     "/rosapi/set_param": Role.CONFIGURE,

@@ -42,6 +42,7 @@ from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import NAME, Guest
 from rbxcompose.commands.lookup import place_of
 from rbxcompose.domains.console.access import LOCAL_NAMES, Door, Role, network_names, own_secret, role_of, secret_path
+from rbxcompose.domains.console.editor_process import EditorProcess
 from rbxcompose.domains.console.foxglove_server import FoxgloveServer, RobotAccess
 from rbxcompose.domains.console.lease import DriveLimits
 from rbxcompose.domains.console.log_tail import findings, tail
@@ -55,6 +56,7 @@ from rbxcompose.domains.console.protocol import (
     Bridge,
     BusRequest,
     CancelGoal,
+    EditMission,
     GoalEnd,
     GoalFeedback,
     Publish,
@@ -469,6 +471,7 @@ class GatewaySession:
         self._foxglove: FoxgloveServer | None = None
         self.trouble = ""  # what is not served beside the page
         self._saving = asyncio.Lock()
+        self._editor = EditorProcess(folder.path.name)
         self._watches: dict[str, asyncio.Task[None]] = {}  # by window
         guest.scheduler.on_error = lambda owner, error: self._loop.call_exception_handler(
             {"message": str(error), "exception": error}
@@ -514,6 +517,7 @@ class GatewaySession:
                 timer.cancel()
         for task in self._tasks:
             task.cancel()
+        self._editor.close()
         if self._foxglove is not None:
             self._foxglove.close()
         self._graph.close()
@@ -834,6 +838,8 @@ class GatewaySession:
                 self._begin(self._read_log(request))
             case ReadTested(number, mission):
                 self._begin(self._read_tested(number, mission))
+            case EditMission(number, asked):
+                self._begin(self._edit_mission(number, asked))
             case SaveSettings():
                 self._begin(self._save(request))
             case Watch():
@@ -1036,6 +1042,11 @@ class GatewaySession:
             except (subprocess.TimeoutExpired, ValueError) as error:
                 answer, refusal = None, f"it was not saved: {type(error).__name__}"
         self._bridge.robot_answered(request.number, answer, refusal)
+        self._pump()
+
+    async def _edit_mission(self, number: int, request: Mapping[str, Any]) -> None:
+        answer, refusal = await self._editor.ask(request)
+        self._bridge.robot_answered(number, answer, refusal)
         self._pump()
 
     async def _asked(

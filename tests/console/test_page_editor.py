@@ -1,0 +1,198 @@
+"""The editor of missions in a real browser; behind it, the real editor and a project on disk."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from rbxcompose.base.requests import Refused
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.tools.mission_editor.editor import REQUESTS, MissionEditor
+from tests.console.browser import CHROMIUM
+from tests.console.fake_gateway import CONFIG, FakeGateway
+from tests.console.looks import PHONE, WIDE, expect_fit, violations
+from tests.mission_editor.test_editor import FETCH, ROBOT
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
+
+TEXT = "Text of the mission"
+
+
+class Project:
+    """A robot on disk, and its editor behind a gateway."""
+
+    def __init__(self, gateway: FakeGateway, folder: Path) -> None:
+        self.gateway, self.robot, self.file = (
+            gateway,
+            folder / "robots/fetcher/robot.yaml",
+            folder / "missions/fetch.yaml",
+        )
+        for file, text in ((self.robot, ROBOT), (self.file, FETCH)):
+            file.parent.mkdir(parents=True)
+            file.write_text(text, encoding="utf-8")
+        self.editor = MissionEditor(self.compiled, self.robot)
+        for do in REQUESTS:
+            gateway.answers[f"/console/mission/{do}"] = partial(self.answer, do)
+        plain = {"about": "Fetch it.", "claims": [], "inputs": [], "starts": []}
+        gateway.windows["mission/ListMissions"] = [{"name": "fetch", "state": "idle", **plain}]
+
+    def compiled(self, unsaved: Any) -> Any:
+        return compile_robot(str(self.robot), environment=os.environ, unsaved=unsaved, tries_profiles=False)
+
+    def answer(self, do: str, given: dict[str, Any]) -> dict[str, Any]:
+        try:
+            return {"success": True, "message": "", "answer": self.editor.answer({"do": do, **given})}
+        except Refused as refusal:
+            return {"success": False, "message": str(refusal), "answer": None}
+
+    def text(self) -> str:
+        return self.file.read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def project(gateway: FakeGateway, tmp_path: Path) -> Project:
+    return Project(gateway, tmp_path)
+
+
+def edits(page: Page) -> Page:
+    page.get_by_role("button", name="Edit").click()
+    expect(page.get_by_role("textbox", name=TEXT)).to_be_visible()
+    return page
+
+
+def types(page: Page, old: str, new: str) -> None:
+    """Replace a word of the text as a person does."""
+    page.locator(".editor-text .cm-line", has_text=old).first.click()
+    page.keyboard.press("End")
+    for _ in range(len(old)):
+        page.keyboard.press("Backspace")
+    page.keyboard.type(new)
+
+
+def test_a_mistake_is_marked_as_it_is_typed_and_a_button_fixes_it(
+    open_page: Callable[..., Page], project: Project
+) -> None:
+    page = edits(open_page(page_name="mission"))
+    expect(page.get_by_text("No mistakes")).to_be_visible()
+    types(page, "wait: 2 s", "wait: 2 secs")
+    row = page.get_by_label("Mistakes", exact=True).get_by_role("listitem").first
+    expect(row).to_contain_text("Line 7")
+    expect(page.locator(".cm-says")).to_be_visible()
+    assert violations(page) == []
+    row.get_by_role("button", name="Line 7").click()
+    expect(page.get_by_role("textbox", name=TEXT)).to_be_focused()
+    types(page, "wait: 2 secs", "go_to: tabel")
+    page.get_by_role("button", name=re.compile("table")).click()
+    expect(page.get_by_text("No mistakes")).to_be_visible()
+    expect(page.locator(".cm-content")).to_contain_text("- go_to: table")
+    page.get_by_role("button", name="Undo").click()
+    expect(page.locator(".cm-content")).to_contain_text("tabel")
+
+
+def test_space_in_a_text_is_a_space_and_stops_nothing(
+    open_page: Callable[..., Page], project: Project, gateway: FakeGateway
+) -> None:
+    page = edits(open_page(page_name="mission"))
+    types(page, "2 s", "3 s")
+    expect(page.locator(".cm-content")).to_contain_text("wait: 3 s")
+    assert gateway.calls("/console/stop") == []
+    page.locator("body").evaluate("() => document.activeElement.blur()")
+    page.keyboard.press("Space")
+    expect(page.get_by_text("Nothing moves until you press Release")).to_be_visible()
+
+
+def test_save_shows_what_changes_and_writes_it(open_page: Callable[..., Page], project: Project) -> None:
+    page = edits(open_page(page_name="mission"))
+    expect(page.get_by_role("button", name="Save")).to_be_disabled()
+    types(page, "wait: 2 s", "wait: 3 s")
+    page.get_by_role("button", name="Save").click()
+    dialog = page.get_by_role("dialog")
+    expect(dialog).to_contain_text("+  - wait: 3 s")
+    assert violations(page) == []
+    dialog.get_by_role("button", name="Not now").click()
+    assert project.text() == FETCH
+    page.get_by_role("button", name="Save").click()
+    page.get_by_role("dialog").get_by_role("button", name="Write it").click()
+    expect(page.get_by_text("Saved in 'missions/fetch.yaml'")).to_be_visible()
+    assert project.text() == FETCH.replace("2 s", "3 s")
+    expect(page.get_by_role("button", name="Save")).to_be_disabled()
+
+
+def test_a_file_that_others_changed_is_not_overwritten(open_page: Callable[..., Page], project: Project) -> None:
+    page = edits(open_page(page_name="mission"))
+    theirs = FETCH.replace("table", "dock")
+    project.file.write_text(theirs, encoding="utf-8")
+    types(page, "wait: 2 s", "wait: 3 s")
+    page.get_by_role("button", name="Save").click()
+    expect(page.get_by_text("has changed on disk")).to_be_visible()
+    assert project.text() == theirs
+    page.get_by_role("button", name="Load it").click()
+    expect(page.locator(".cm-content")).to_contain_text("go_to: dock")
+    page.get_by_role("button", name="Undo").click()
+    expect(page.locator(".cm-content")).to_contain_text("wait: 3 s")
+
+
+def test_after_a_connection_was_lost_in_a_save_it_is_told_what_became_of_it(
+    open_page: Callable[..., Page], project: Project, gateway: FakeGateway
+) -> None:
+    def lost(given: dict[str, Any]) -> dict[str, Any]:
+        answer = project.answer("save", given)
+        if not given.get("dry_run"):
+            gateway.drop()
+        return answer
+
+    gateway.answers["/console/mission/save"] = lost
+    page = edits(open_page(page_name="mission"))
+    types(page, "wait: 2 s", "wait: 3 s")
+    page.get_by_role("button", name="Save").click()
+    page.get_by_role("dialog").get_by_role("button", name="Write it").click()
+    expect(page.get_by_text("The connection is back: it was saved.")).to_be_visible()
+    assert project.text() == FETCH.replace("2 s", "3 s")
+
+
+def test_what_was_typed_stays_while_another_page_is_shown(open_page: Callable[..., Page], project: Project) -> None:
+    page = edits(open_page(page_name="mission"))
+    types(page, "wait: 2 s", "wait: 3 s")
+    page.get_by_role("link", name="Log").click()
+    page.get_by_role("link", name="Mission").click()
+    expect(edits(page).locator(".cm-content")).to_contain_text("wait: 3 s")
+    page.get_by_role("button", name="Undo").click()
+
+
+def test_who_may_not_configure_reads_and_does_not_change(
+    open_page: Callable[..., Page], project: Project, gateway: FakeGateway
+) -> None:
+    gateway.config = {**CONFIG, "role": "operate"}
+    page = edits(open_page(page_name="mission"))
+    expect(page.get_by_text("open the link of the role configure")).to_be_visible()
+    page.get_by_role("textbox", name=TEXT).click()
+    page.keyboard.type("x")
+    expect(page.get_by_role("button", name="Save")).to_be_disabled()
+    expect(page.get_by_role("button", name="Undo")).to_be_disabled()
+
+
+def test_a_mission_that_cannot_be_read_says_why(open_page: Callable[..., Page], project: Project) -> None:
+    project.file.write_bytes(b"\xff")
+    page = open_page(page_name="mission")
+    page.get_by_role("button", name="Edit").click()
+    expect(page.get_by_text("is not UTF-8")).to_be_visible()
+    project.file.write_text(FETCH, encoding="utf-8")
+    page.get_by_role("button", name="Try again").click()
+    expect(page.get_by_role("textbox", name=TEXT)).to_be_visible()
+
+
+def test_it_fits_the_window_and_the_finger(open_page: Callable[..., Page], project: Project) -> None:
+    project.file.write_text(FETCH.replace("table ", "tabel "), encoding="utf-8")
+    page = edits(open_page(page_name="mission"))
+    for size in (WIDE, PHONE):
+        page.set_viewport_size(size)
+        expect_fit(page)
+        if (shots := os.environ.get("SHOTS")) is not None:
+            page.screenshot(path=f"{shots}/editor_{size['width']}.png", full_page=True)
