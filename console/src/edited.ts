@@ -28,7 +28,39 @@ export interface Elsewhere {
   place: string;
 }
 
+/** A place for blocks: what it holds is one step, several in a list, or entries with names. */
+export interface Slot {
+  path: Path;
+  holds: "one" | "several" | "named";
+  of: "step" | "state";
+}
+
+/** Where something is in the tree of a text: keys, and numbers in lists. */
+export type Path = (string | number)[];
+
+/** A step, a state or an interrupt with its part of the text; what `is_fixed` cannot be moved by itself. */
+export interface Block {
+  path: Path;
+  kind: string;
+  text: string;
+  name: string;
+  role: string;
+  from: number;
+  to: number;
+  is_fixed: boolean;
+  notes: string[];
+  slots: Slot[];
+  children: Block[];
+}
+
+export interface Outline {
+  blocks: Block[];
+  slots: Slot[];
+}
+
 export interface Looked {
+  /** What `check` answers has none. */
+  outline?: Outline;
   findings: Found[];
   /** How many there are; of very many, only the first are told. */
   count: number;
@@ -75,4 +107,31 @@ export function kindOf(line: string): "old" | "new" | "place" | "same" {
   if (line.startsWith("@@")) return "place";
   if (line.startsWith("-")) return "old";
   return line.startsWith("+") ? "new" : "same";
+}
+
+/** Returns all blocks, each before those below it. */
+export function allBlocks(blocks: readonly Block[]): Block[] {
+  return blocks.flatMap((block) => [block, ...allBlocks(block.children)]);
+}
+
+/** Returns the innermost block at a place of the text; null if there is none. */
+export function blockAt(blocks: readonly Block[], at: number): Block | null {
+  const found = blocks.find(({ from, to }) => from <= at && at < to);
+  return found ? (blockAt(found.children, at) ?? found) : null;
+}
+
+export function isSame(one: Path, other: Path): boolean {
+  return one.length === other.length && one.every((key, turn) => key === other[turn]);
+}
+
+/** Returns where a new step goes: behind the chosen block, or into it if it is a place for states or interrupts. */
+export function placeBehind(outline: Outline, chosen: Block | null): { path: Path; index: number } | null {
+  const last = chosen?.path.at(-1);
+  if (chosen && typeof last === "number") return { path: chosen.path.slice(0, -1), index: last + 1 };
+  if (chosen && chosen.slots.length > 0 && (chosen.kind === "state" || chosen.kind === "interrupt")) {
+    return { path: chosen.slots[0]!.path, index: 1_000 };
+  }
+  if (chosen) return { path: chosen.path, index: 1 };
+  const slot = outline.slots.find(({ of, holds }) => of === "step" && holds !== "named");
+  return slot ? { path: slot.path, index: 1_000 } : null;
 }

@@ -1,6 +1,19 @@
 /** The editor of one mission: its text, what is wrong with it, undo, and saving it on the robot. */
 import { emptyCard, h, icon, setText } from "./dom";
-import { askEditor, kindOf, RefusedError, verdict, type Elsewhere, type Found, type Looked, type ReadText } from "./edited";
+import {
+  askEditor,
+  kindOf,
+  RefusedError,
+  verdict,
+  type Block,
+  type Edit,
+  type Elsewhere,
+  type Found,
+  type Looked,
+  type Path,
+  type ReadText,
+} from "./edited";
+import { OutlineView, type Operation } from "./outline";
 import type { Robot } from "./page";
 import { LostError } from "./rosbridge";
 import type { TextEditor } from "./text_editor";
@@ -24,12 +37,20 @@ export class MissionEditor {
   readonly #says = h("p", { class: "editor-says", role: "status" });
   readonly #verdict = h("span", { class: "chip", role: "status" });
   readonly #list = h("ul", { class: "findings", "aria-label": "Mistakes" });
+  readonly #panes = h("div", { class: "editor-panes" });
   readonly #file = h("p", { class: "label" });
   readonly #undo = button("undo", "Undo", () => this.#text?.undo());
   readonly #redo = button("redo", "Redo", () => this.#text?.redo());
   readonly #save = button("check", "Save", () => void this.#offer());
   readonly #closers: (() => void)[] = [];
+  readonly #outline = new OutlineView(
+    (operation) => void this.#change(operation),
+    (block, isByHand) => this.#chose(block, isByHand),
+    () => this.#text?.focus(),
+  );
   #text: TextEditor | null = null;
+  #wanted: Path | null = null; // the block to choose in the next outline
+  #isChanging = false;
   #saved = "";
   #hash = "";
   #canSave = false;
@@ -65,7 +86,7 @@ export class MissionEditor {
         "Text of the mission",
         read.text,
         () => this.#changed(),
-        () => undefined,
+        (at) => this.#outline.follow(at),
       );
       this.#text.element.className = "editor-text";
       this.#take(read);
@@ -74,6 +95,7 @@ export class MissionEditor {
       if (draft) this.#hash = draft.hash;
       this.#canSave = this.#robot.config.role === "configure" && !read.why_not;
       this.#text.allow(this.#canSave);
+      this.#outline.allow(this.#canSave);
       const why = read.why_not || (this.#canSave ? "" : "To change it, open the link of the role configure.");
       setText(this.#file, why ? `${read.file}: ${why}` : read.file);
       this.#draw();
@@ -93,7 +115,8 @@ export class MissionEditor {
   #draw(): void {
     const close = button("cross", "Close", this.#done);
     const bar = h("div", { class: "editor-bar" }, this.#undo, this.#redo, this.#save, this.#verdict, close);
-    this.element.replaceChildren(bar, this.#file, this.#says, this.#text!.element, this.#list);
+    this.element.replaceChildren(bar, this.#file, this.#says, this.#panes, this.#list);
+    this.#panes.replaceChildren(this.#outline.element, this.#text!.element);
   }
 
   #read(): Promise<ReadText> {
@@ -140,6 +163,10 @@ export class MissionEditor {
   }
 
   #show(looked: Looked): void {
+    if (looked.outline) {
+      this.#outline.show(looked.outline, this.#wanted, this.#text!.cursor);
+      this.#wanted = null;
+    }
     this.#text!.mark(looked.findings);
     this.#verdict.dataset.state = looked.errors > 0 ? "failure" : looked.count > 0 ? "waiting" : "success";
     this.#verdict.replaceChildren(icon(looked.count > 0 ? "warning" : "check"), verdict(looked));
@@ -170,6 +197,32 @@ export class MissionEditor {
       );
     }
     return row;
+  }
+
+  // The outline
+
+  #chose(block: Block | null, isByHand: boolean): void {
+    if (block && isByHand) this.#text?.show(block.from, block.to);
+    else this.#text?.hideBlock();
+  }
+
+  /** Has the robot say how a change of the outline changes the text. */
+  async #change(operation: Operation): Promise<void> {
+    if (this.#isChanging || this.#isClosed) return;
+    this.#isChanging = true;
+    const { text } = this.#text!;
+    try {
+      const made = await askEditor<{ edits: Edit[]; chosen: Path }>(this.#robot.link, "edit", this.#mission, { text, operation });
+      if (this.#isClosed || this.#text!.text !== text) return; // it was typed meanwhile: that counts
+      this.#wanted = made.chosen;
+      this.#text!.edit(made.edits);
+      clearTimeout(this.#timer);
+      void this.#ask("look");
+    } catch (error) {
+      this.#robot.notify((error as Error).message);
+    } finally {
+      this.#isChanging = false;
+    }
   }
 
   #mayUndo(): void {

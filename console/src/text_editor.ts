@@ -79,6 +79,7 @@ export class TextEditor {
   readonly #view: EditorView;
   readonly #access = new Compartment();
   #found: readonly Found[] = [];
+  #isShowing = false;
   #block: { from: number; to: number } | null = null;
 
   /** `onChange` is called after each change of the text, `onMove` when the cursor was moved. */
@@ -107,7 +108,7 @@ export class TextEditor {
           this.#access.of(EditorState.readOnly.of(false)),
           EditorView.updateListener.of((update) => {
             if (update.docChanged) onChange();
-            else if (update.selectionSet) onMove(update.state.selection.main.head);
+            else if (update.selectionSet && !this.#isShowing) onMove(update.state.selection.main.head);
           }),
         ],
       }),
@@ -164,8 +165,16 @@ export class TextEditor {
   show(from: number, to = from): void {
     const most = this.#view.state.doc.length;
     const anchor = Math.min(from, most);
+    this.#isShowing = to > from;
     this.#view.dispatch({ selection: { anchor }, effects: EditorView.scrollIntoView(anchor, { y: "center" }) });
+    this.#isShowing = false;
     this.#block = to > from ? { from: anchor, to: Math.min(to, most) } : null;
+    this.#mark();
+  }
+
+  hideBlock(): void {
+    if (!this.#block) return;
+    this.#block = null;
     this.#mark();
   }
 
@@ -189,7 +198,7 @@ export class TextEditor {
       ranges.push(Decoration.widget({ widget: new Words(message, severity), side: 1 }).range(line.to));
     }
     if (this.#block) {
-      const last = doc.lineAt(Math.min(this.#block.to, doc.length)).number;
+      const last = doc.lineAt(Math.min(Math.max(this.#block.to - 1, this.#block.from), doc.length)).number;
       for (let number = doc.lineAt(Math.min(this.#block.from, doc.length)).number; number <= last; number += 1) {
         ranges.push(Decoration.line({ class: "cm-block" }).range(doc.line(number).from));
       }

@@ -196,3 +196,48 @@ def test_it_fits_the_window_and_the_finger(open_page: Callable[..., Page], proje
         expect_fit(page)
         if (shots := os.environ.get("SHOTS")) is not None:
             page.screenshot(path=f"{shots}/editor_{size['width']}.png", full_page=True)
+
+
+def block(page: Page, text: str) -> Any:
+    return page.get_by_role("treeitem").filter(has_text=text).last
+
+
+def lines(page: Page) -> list[str]:
+    """Return the lines of the text as they are shown, without what is said at their ends."""
+    shown: list[str] = page.locator(".cm-line").evaluate_all(
+        "lines => lines.map(line => [...line.childNodes].filter(one => !one.classList?.contains('cm-says'))"
+        ".map(one => one.textContent).join(''))"
+    )
+    return shown
+
+
+def test_the_outline_and_the_text_choose_the_same_block(open_page: Callable[..., Page], project: Project) -> None:
+    page = edits(open_page(page_name="mission"))
+    block(page, "wait 2 s").locator(".outline-row").click()
+    expect(page.locator(".cm-block")).to_have_text("  - wait: 2 s")
+    page.locator(".editor-text .cm-line", has_text="table").click()
+    expect(block(page, "go_to table")).to_have_attribute("aria-selected", "true")
+    expect(block(page, "wait 2 s")).to_have_attribute("aria-selected", "false")
+    assert violations(page) == []
+
+
+def test_steps_are_moved_copied_and_deleted_by_keys_alone(open_page: Callable[..., Page], project: Project) -> None:
+    page = edits(open_page(page_name="mission"))
+    block(page, "go_to table").focus()
+    page.keyboard.press("Home")
+    page.keyboard.press("Alt+ArrowDown")
+    expect(page.locator(".cm-line").nth(5)).to_contain_text("wait")
+    assert lines(page)[5:7] == ["  - wait: 2 s", "  - go_to: table   # there"]
+    expect(block(page, "go_to table")).to_be_focused()
+    page.keyboard.press("Insert")
+    expect(page.get_by_role("treeitem")).to_have_count(3)
+    page.keyboard.press("Delete")
+    expect(page.get_by_role("treeitem")).to_have_count(2)
+    page.keyboard.press("Alt+ArrowDown")
+    expect(page.get_by_text("this is the last one here")).to_be_visible()
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("textbox", name=TEXT)).to_be_focused()
+    for _ in range(3):
+        page.keyboard.press("Control+z")
+    expect(page.locator(".cm-line").nth(5)).to_contain_text("go_to: table")
+    assert "\n".join(lines(page)) == FETCH

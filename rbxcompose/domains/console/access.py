@@ -57,6 +57,7 @@ _SERVICES = {
     "/console/ask": Role.VIEW,  # the request decides
     "/console/log": Role.VIEW,
     "/console/mission/check": Role.VIEW,  # of a text that nobody else sees
+    "/console/mission/edit": Role.VIEW,
     "/console/mission/look": Role.VIEW,
     "/console/mission/read": Role.VIEW,
     "/console/mission/save": Role.CONFIGURE,

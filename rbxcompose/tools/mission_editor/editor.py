@@ -18,11 +18,14 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import open_regular, replace_file
 from rbxcompose.base.findings import Finding, Severity, Span
 from rbxcompose.base.fixes import places
+from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.base.requests import Refused
 from rbxcompose.compiler.compile import Compilation, look_at_mission
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import project_of, shown_name
 from rbxcompose.manifest.tree import FILE_BYTES
+from rbxcompose.tools.mission_editor.outline import Outline, told
+from rbxcompose.tools.mission_editor.patches import change
 from rbxcompose.tools.mission_editor.units import Utf16
 
 MOST_FINDINGS = 200
@@ -82,12 +85,20 @@ class MissionEditor:
         name = request["mission"]
         self._compile({})
         read = self._read_file(name)
-        told = {"file": self._shown(read.path), "text": read.text, "hash": read.hash}
-        return {**told, "why_not": self._why_not(read.path), **self._looked_at(name, read.text)}
+        shown = {"file": self._shown(read.path), "text": read.text, "hash": read.hash}
+        return {**shown, "why_not": self._why_not(read.path), **self._looked_at(name, read.text)}
 
     def _look(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Return what is wrong with a text, as far as that is known at once."""
         return self._looked_at(request["mission"], request["text"])
+
+    def _edit(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Return how a change of the outline changes the text, and the block that is chosen afterwards."""
+        text, units = request["text"], Utf16(request["text"])
+        with paused_collection():
+            made = change(text, request["operation"])
+        edits = [{"from": units.at(one.start), "to": units.at(one.end), "text": one.text} for one in made.edits]
+        return {"edits": edits, "chosen": list(made.chosen)}
 
     def _check(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Return all that `check` finds with a text in place of a mission's file."""
@@ -173,7 +184,9 @@ class MissionEditor:
     def _looked_at(self, mission: str, text: str) -> dict[str, Any]:
         path = self._path(mission)
         report, _ = look_at_mission(self._known, mission, os.environ, {path: text})
-        return self._told(path, text, report)
+        with paused_collection():
+            outline = Outline(text)
+        return {**self._told(path, text, report), "outline": told(outline, Utf16(text).at)}
 
     def _told(self, path: Path, text: str, report: Any) -> dict[str, Any]:
         """Return findings as data: those of the text with their offsets and fixes, others with their places."""
@@ -183,8 +196,8 @@ class MissionEditor:
         others = [one for one in found if one.span is None or one.span.file != shown]
         fixes = [one.fix for one in own if one.fix is not None]
         applied = dict(zip(map(id, fixes), places(fixes, {shown: text}), strict=True))
-        told = [self._finding(one, units) for one in own[:MOST_FINDINGS]]
-        for data, one in zip(told, own, strict=False):
+        findings = [self._finding(one, units) for one in own[:MOST_FINDINGS]]
+        for data, one in zip(findings, own, strict=False):
             if one.fix is not None and (edits := applied[id(one.fix)]):
                 moved = [
                     {"from": units.at(edit.start), "to": units.at(edit.end), "text": edit.text}
@@ -194,7 +207,7 @@ class MissionEditor:
                 data["fix"] = {"title": one.fix.title, "edits": moved}
         errors = sum(one.severity is Severity.ERROR for one in own)
         elsewhere = [{**_words(one), "place": str(one.span or "")} for one in others[:MOST_FINDINGS]]
-        return {"findings": told, "errors": errors, "count": len(own), "elsewhere": elsewhere}
+        return {"findings": findings, "errors": errors, "count": len(own), "elsewhere": elsewhere}
 
     def _finding(self, finding: Finding, units: Utf16) -> dict[str, Any]:
         span = finding.span or Span("", 1, 1, 1, 1)
@@ -211,6 +224,7 @@ class MissionEditor:
 REQUESTS: Mapping[str, Callable[[MissionEditor, Mapping[str, Any]], Any]] = MappingProxyType(
     {
         "check": MissionEditor._check,
+        "edit": MissionEditor._edit,
         "look": MissionEditor._look,
         "read": MissionEditor._read,
         "save": MissionEditor._save,
