@@ -68,6 +68,12 @@ export interface Looked {
   elsewhere: Elsewhere[];
 }
 
+/** How the robot changes a text, and the block that is chosen then. */
+export interface Changed {
+  edits: Edit[];
+  chosen: Path;
+}
+
 export interface ReadText extends Looked {
   file: string;
   text: string;

@@ -3,10 +3,11 @@ import { emptyCard, h, icon, setText } from "./dom";
 import {
   askEditor,
   kindOf,
+  placeBehind,
   RefusedError,
   verdict,
   type Block,
-  type Edit,
+  type Changed,
   type Elsewhere,
   type Found,
   type Looked,
@@ -16,10 +17,12 @@ import {
 import { OutlineView, type Operation } from "./outline";
 import type { Robot } from "./page";
 import { LostError } from "./rosbridge";
+import { Palette, StepForm, type Form, type Offered } from "./step_form";
 import type { TextEditor } from "./text_editor";
 import "./mission_editor.css";
 
 const PAUSE = 200; // [ms] after a key, until the text is looked at
+const FORM = 150; // [ms] after a choice, until its form is drawn
 const REST = 1_000; // [ms] after that, until the whole robot is checked with it
 
 /** What was typed and not saved, by mission: it stays while the page shows something else. */
@@ -37,6 +40,7 @@ export class MissionEditor {
   readonly #says = h("p", { class: "editor-says", role: "status" });
   readonly #verdict = h("span", { class: "chip", role: "status" });
   readonly #list = h("ul", { class: "findings", "aria-label": "Mistakes" });
+  readonly #tools = h("div", { class: "editor-tools" });
   readonly #panes = h("div", { class: "editor-panes" });
   readonly #file = h("p", { class: "label" });
   readonly #undo = button("undo", "Undo", () => this.#text?.undo());
@@ -48,7 +52,10 @@ export class MissionEditor {
     (block, isByHand) => this.#chose(block, isByHand),
     () => this.#text?.focus(),
   );
+  readonly #palette = new Palette((offered) => this.#add(offered));
+  readonly #form = new StepForm((key, value) => this.#set(key, value));
   #text: TextEditor | null = null;
+  #formTimer: ReturnType<typeof setTimeout> | undefined;
   #wanted: Path | null = null; // the block to choose in the next outline
   #isChanging = false;
   #saved = "";
@@ -72,6 +79,7 @@ export class MissionEditor {
   close(): void {
     this.#isClosed = true;
     clearTimeout(this.#timer);
+    clearTimeout(this.#formTimer);
     for (const close of this.#closers) close();
     this.#keepDraft();
     this.#text?.close();
@@ -99,6 +107,7 @@ export class MissionEditor {
       const why = read.why_not || (this.#canSave ? "" : "To change it, open the link of the role configure.");
       setText(this.#file, why ? `${read.file}: ${why}` : read.file);
       this.#draw();
+      void this.#fillPalette();
       if (!draft) this.#show(read);
       this.#mayUndo();
     } catch (error) {
@@ -115,7 +124,8 @@ export class MissionEditor {
   #draw(): void {
     const close = button("cross", "Close", this.#done);
     const bar = h("div", { class: "editor-bar" }, this.#undo, this.#redo, this.#save, this.#verdict, close);
-    this.element.replaceChildren(bar, this.#file, this.#says, this.#panes, this.#list);
+    this.element.replaceChildren(bar, this.#file, this.#says, this.#panes, this.#list, this.#tools);
+    this.#tools.replaceChildren(this.#palette.element, this.#form.element);
     this.#panes.replaceChildren(this.#outline.element, this.#text!.element);
   }
 
@@ -204,6 +214,36 @@ export class MissionEditor {
   #chose(block: Block | null, isByHand: boolean): void {
     if (block && isByHand) this.#text?.show(block.from, block.to);
     else this.#text?.hideBlock();
+    clearTimeout(this.#formTimer);
+    this.#formTimer = setTimeout(() => void this.#fillForm(block), FORM);
+  }
+
+  async #fillPalette(): Promise<void> {
+    const offered = await askEditor<Offered[]>(this.#robot.link, "palette", this.#mission).catch(() => []);
+    this.#palette.show(offered, this.#canSave);
+  }
+
+  async #fillForm(block: Block | null): Promise<void> {
+    if (this.#isClosed) return;
+    if (!block) return this.#form.hide("Choose a step to see its options.");
+    const { text } = this.#text!;
+    try {
+      const form = await askEditor<Form>(this.#robot.link, "form", this.#mission, { text, path: block.path });
+      if (block === this.#outline.chosen && text === this.#text!.text) this.#form.show(form, this.#canSave);
+    } catch (error) {
+      if (block === this.#outline.chosen) this.#form.hide((error as Error).message);
+    }
+  }
+
+  #add(offered: Offered): void {
+    const place = placeBehind(this.#outline.outline, this.#outline.chosen);
+    if (place) void this.#change({ op: "insert", yaml: offered.yaml, ...place });
+    else this.#robot.notify("Choose a step first: the new one goes behind it.");
+  }
+
+  #set(key: string, value: string): void {
+    const block = this.#outline.chosen;
+    if (block) void this.#change({ op: "set", path: block.path, key, value });
   }
 
   /** Has the robot say how a change of the outline changes the text. */
@@ -212,7 +252,7 @@ export class MissionEditor {
     this.#isChanging = true;
     const { text } = this.#text!;
     try {
-      const made = await askEditor<{ edits: Edit[]; chosen: Path }>(this.#robot.link, "edit", this.#mission, { text, operation });
+      const made = await askEditor<Changed>(this.#robot.link, "edit", this.#mission, { text, operation });
       if (this.#isClosed || this.#text!.text !== text) return; // it was typed meanwhile: that counts
       this.#wanted = made.chosen;
       this.#text!.edit(made.edits);

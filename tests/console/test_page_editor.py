@@ -241,3 +241,47 @@ def test_steps_are_moved_copied_and_deleted_by_keys_alone(open_page: Callable[..
         page.keyboard.press("Control+z")
     expect(page.locator(".cm-line").nth(5)).to_contain_text("go_to: table")
     assert "\n".join(lines(page)) == FETCH
+
+
+def test_a_step_is_found_by_a_search_and_added_behind_the_chosen_one(
+    open_page: Callable[..., Page], project: Project
+) -> None:
+    page = edits(open_page(page_name="mission"))
+    page.locator(".editor-text .cm-line", has_text="table").click()
+    page.get_by_text("Add a step").click()
+    expect(page.get_by_role("button", name=re.compile("^go_to Skill of"))).to_be_visible()
+    page.get_by_role("searchbox").fill("do nodes of a list in order")
+    assert violations(page) == []
+    page.get_by_role("searchbox").fill("time wait")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("treeitem")).to_have_count(3)
+    assert lines(page)[5:8] == ["  - go_to: table   # there", "  - wait: 5 s", "  - wait: 2 s"]
+
+
+def test_the_form_of_a_step_has_what_it_can_be_given_and_writes_it(
+    open_page: Callable[..., Page], project: Project
+) -> None:
+    page = edits(open_page(page_name="mission"))
+    page.locator(".editor-text .cm-line", has_text="table").click()
+    expect(page.get_by_text("Options of go_to")).to_be_visible()
+    place = page.locator("#option-go_to")
+    expect(place).to_have_value("table")
+    assert page.locator("#option-go_to-choices option").evaluate_all("all => all.map(one => one.value)") == [
+        "dock",
+        "table",
+    ]
+    place.fill("dock")
+    place.press("Tab")
+    expect(block(page, "go_to dock")).to_be_visible()
+    page.locator("#option-timeout").fill("1 min")
+    page.locator("#option-timeout").press("Enter")
+    expect(block(page, "go_to dock")).to_contain_text("timeout 1 min")
+    assert lines(page)[5:8] == ["  - go_to: dock   # there", "    timeout: 1 min", "  - wait: 2 s"]
+    assert violations(page) == []
+    page.locator("#option-timeout").fill("")
+    page.locator("#option-timeout").press("Enter")
+    expect(block(page, "go_to dock")).not_to_contain_text("timeout")
+    assert lines(page)[5:7] == ["  - go_to: dock   # there", "  - wait: 2 s"]
+    if (shots := os.environ.get("SHOTS")) is not None:
+        page.get_by_text("Add a step").click()
+        page.screenshot(path=f"{shots}/form.png", full_page=True)

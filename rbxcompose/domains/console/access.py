@@ -58,6 +58,8 @@ _SERVICES = {
     "/console/log": Role.VIEW,
     "/console/mission/check": Role.VIEW,  # of a text that nobody else sees
     "/console/mission/edit": Role.VIEW,
+    "/console/mission/form": Role.VIEW,
+    "/console/mission/palette": Role.VIEW,
     "/console/mission/look": Role.VIEW,
     "/console/mission/read": Role.VIEW,
     "/console/mission/save": Role.CONFIGURE,

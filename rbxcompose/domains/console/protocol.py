@@ -1425,7 +1425,7 @@ _ANSWERED = frozenset({"call_service", "send_action_goal"})  # operations whose 
 
 _EDITOR: Mapping[str, tuple[str, ...]] = {"check": ("text",), "look": ("text",), "read": (), "save": ("text", "hash")}
 """What can be asked about the text of a mission, with its arguments besides `mission`."""
-_EDITED: Mapping[str, type] = {"operation": dict}
+_EDITED: Mapping[str, type] = {"operation": dict, "path": list}
 """The types of those arguments that are no texts."""
 _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str, Any] | None]] = {
     "/console/ask": Bridge._ask_service,

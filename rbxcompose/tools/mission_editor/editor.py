@@ -25,7 +25,8 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import project_of, shown_name
 from rbxcompose.manifest.tree import FILE_BYTES
 from rbxcompose.tools.mission_editor.outline import Outline, told
-from rbxcompose.tools.mission_editor.patches import change
+from rbxcompose.tools.mission_editor.palette import form, palette
+from rbxcompose.tools.mission_editor.patches import change, path_of
 from rbxcompose.tools.mission_editor.units import Utf16
 
 MOST_FINDINGS = 200
@@ -99,6 +100,15 @@ class MissionEditor:
             made = change(text, request["operation"])
         edits = [{"from": units.at(one.start), "to": units.at(one.end), "text": one.text} for one in made.edits]
         return {"edits": edits, "chosen": list(made.chosen)}
+
+    def _palette(self, request: Mapping[str, Any]) -> list[dict[str, str]]:
+        """Return what can be put into a mission of this robot."""
+        return palette(self._known, self._path(request["mission"]))
+
+    def _form(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the values of a block that can be typed in one line."""
+        path = path_of(request["path"])
+        return form(self._known, self._path(request["mission"]), request["text"], path)
 
     def _check(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Return all that `check` finds with a text in place of a mission's file."""
@@ -225,7 +235,9 @@ REQUESTS: Mapping[str, Callable[[MissionEditor, Mapping[str, Any]], Any]] = Mapp
     {
         "check": MissionEditor._check,
         "edit": MissionEditor._edit,
+        "form": MissionEditor._form,
         "look": MissionEditor._look,
+        "palette": MissionEditor._palette,
         "read": MissionEditor._read,
         "save": MissionEditor._save,
     }

@@ -80,7 +80,7 @@ class _Patch:
 
     def delete(self, operation: Mapping[str, Any]) -> Change:
         """Take a step, a state or an interrupt out."""
-        path = _path(operation["path"])
+        path = path_of(operation["path"])
         first, last, _ = self.movable(path)
         above = self.node(path[:-1])
         if len(above.items) + len(above.pairs) == 1:
@@ -91,7 +91,7 @@ class _Patch:
 
     def duplicate(self, operation: Mapping[str, Any]) -> Change:
         """Write a block once more below itself; a named one gets another name."""
-        path = _path(operation["path"])
+        path = path_of(operation["path"])
         first, last, _ = self.movable(path)
         block, container = self.text_of(first, last), _at(self.tree, path[:-1])
         if isinstance(path[-1], int):
@@ -109,7 +109,7 @@ class _Patch:
 
     def move(self, operation: Mapping[str, Any]) -> Change:
         """Move a block `up`, `down`, `in` (to the end of the step before it) or `out` (behind the step around it)."""
-        path, way = _path(operation["path"]), operation["way"]
+        path, way = path_of(operation["path"]), operation["way"]
         self.movable(path)
         above = self.node(path[:-1])
         names = [key.text for key, _ in above.pairs]
@@ -139,7 +139,7 @@ class _Patch:
 
     def move_to(self, operation: Mapping[str, Any]) -> Change:
         """Move a block to a place: before the one with `index` in the slot `to`."""
-        path, to, index = _path(operation["path"]), _path(operation["to"]), int(operation["index"])
+        path, to, index = path_of(operation["path"]), path_of(operation["to"]), int(operation["index"])
         self.movable(path)
         return self.place(path, to, index)
 
@@ -148,7 +148,7 @@ class _Patch:
 
         In a slot whose entries have names, `name` is the one of the new entry.
         """
-        path, index = _path(operation["path"]), int(operation["index"])
+        path, index = path_of(operation["path"]), int(operation["index"])
         snippet, name = str(operation["yaml"]).rstrip("\n"), str(operation.get("name") or "")
         new = placed(snippet)
         if new is None or compose(snippet, "")[1] is not None or not snippet.strip():
@@ -163,7 +163,7 @@ class _Patch:
 
     def set(self, operation: Mapping[str, Any]) -> Change:
         """Give the key `key` of the block at `path` a value; an empty one takes the key away."""
-        path, key, value = _path(operation["path"]), str(operation["key"]), str(operation["value"])
+        path, key, value = path_of(operation["path"]), str(operation["key"]), str(operation["value"])
         node, written = self.node(path), _scalar(value)
         old = node.get(key) if node.form == "map" else None
         if not value.strip():
@@ -451,7 +451,12 @@ def _take(tree: Plain, key: str | int) -> None:
 # Texts
 
 
-def _path(given: Any) -> Path:
+def path_of(given: Any) -> Path:
+    """Return a path that came from outside.
+
+    Raises:
+        Refused: if it is none.
+    """
     if not isinstance(given, list | tuple) or not all(type(key) in (str, int) for key in given):
         raise Refused("this is no place in a mission")
     return tuple(given)
