@@ -89,8 +89,14 @@ export class RefusedError extends Error {
 const PATIENCE = 35_000; // [ms]
 
 /** Asks the robot's editor of missions. Throws a RefusedError, or a CallError if there was no answer. */
-export async function askEditor<T>(link: Rosbridge, what: string, mission: string, given: Message = {}): Promise<T> {
-  const values = await link.call(`/console/mission/${what}`, { mission, ...given }, PATIENCE);
+export async function askEditor<T>(
+  link: Rosbridge,
+  what: string,
+  mission: string,
+  given: Message = {},
+  patience = PATIENCE,
+): Promise<T> {
+  const values = await link.call(`/console/mission/${what}`, { mission, ...given }, patience);
   if (!isMessage(values) || values.success !== true) {
     throw new RefusedError(isMessage(values) ? String(values.message) : "the robot gave no answer");
   }

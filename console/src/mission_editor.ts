@@ -16,12 +16,14 @@ import {
 } from "./edited";
 import { OutlineView, type Operation } from "./outline";
 import type { Robot } from "./page";
-import { LostError } from "./rosbridge";
+import { LostError, type Message } from "./rosbridge";
 import { Palette, StepForm, type Form, type Offered } from "./step_form";
+import { showDryRun, showTests, type DryRun, type TestReport } from "./trial";
 import type { TextEditor } from "./text_editor";
 import "./mission_editor.css";
 
 const PAUSE = 200; // [ms] after a key, until the text is looked at
+const TRYING = 95_000; // [ms] for a dry run
 const FORM = 150; // [ms] after a choice, until its form is drawn
 const REST = 1_000; // [ms] after that, until the whole robot is checked with it
 
@@ -46,6 +48,9 @@ export class MissionEditor {
   readonly #undo = button("undo", "Undo", () => this.#text?.undo());
   readonly #redo = button("redo", "Redo", () => this.#text?.redo());
   readonly #save = button("check", "Save", () => void this.#offer());
+  readonly #try = button("play", "Dry run", () => void this.#run("try"));
+  readonly #test = button("check", "Test", () => void this.#run("test"));
+  readonly #trial = h("div", {});
   readonly #closers: (() => void)[] = [];
   readonly #outline = new OutlineView(
     (operation) => void this.#change(operation),
@@ -58,6 +63,8 @@ export class MissionEditor {
   #formTimer: ReturnType<typeof setTimeout> | undefined;
   #wanted: Path | null = null; // the block to choose in the next outline
   #isChanging = false;
+  #isTrying = false;
+  #ran: { text: string; run: DryRun } | null = null; // the last dry run, and the text that ran
   #saved = "";
   #hash = "";
   #canSave = false;
@@ -123,8 +130,8 @@ export class MissionEditor {
 
   #draw(): void {
     const close = button("cross", "Close", this.#done);
-    const bar = h("div", { class: "editor-bar" }, this.#undo, this.#redo, this.#save, this.#verdict, close);
-    this.element.replaceChildren(bar, this.#file, this.#says, this.#panes, this.#list, this.#tools);
+    const bar = h("div", { class: "editor-bar" }, this.#undo, this.#redo, this.#save, this.#try, this.#test, this.#verdict, close);
+    this.element.replaceChildren(bar, this.#file, this.#says, this.#panes, this.#list, this.#trial, this.#tools);
     this.#tools.replaceChildren(this.#palette.element, this.#form.element);
     this.#panes.replaceChildren(this.#outline.element, this.#text!.element);
   }
@@ -176,6 +183,7 @@ export class MissionEditor {
     if (looked.outline) {
       this.#outline.show(looked.outline, this.#wanted, this.#text!.cursor);
       this.#wanted = null;
+      this.#colour();
     }
     this.#text!.mark(looked.findings);
     this.#verdict.dataset.state = looked.errors > 0 ? "failure" : looked.count > 0 ? "waiting" : "success";
@@ -265,7 +273,40 @@ export class MissionEditor {
     }
   }
 
+  // Trying it
+
+  /** Runs the text as it is here on the simulated robot, or the tests of the file as it is on disk. */
+  async #run(what: "try" | "test"): Promise<void> {
+    const { text } = this.#text!;
+    this.#isTrying = true;
+    this.#mayUndo();
+    this.#trial.replaceChildren(h("p", { role: "status" }, what === "try" ? "Running on the simulated robot\u2026" : "Running its tests\u2026"));
+    try {
+      const given = what === "try" ? { text } : {};
+      if (what === "test") this.#trial.replaceChildren(showTests(await this.#askLong<TestReport>(what, given)));
+      else {
+        const run = await this.#askLong<DryRun>(what, given);
+        this.#trial.replaceChildren(showDryRun(run));
+        this.#ran = { text, run };
+        this.#colour();
+      }
+    } catch (error) {
+      this.#trial.replaceChildren(h("p", { role: "status" }, icon("warning"), ` ${(error as Error).message}`));
+    }
+    this.#isTrying = false;
+    this.#mayUndo();
+  }
+
+  #colour(): void {
+    if (this.#ran?.text === this.#text!.text) this.#outline.colour(this.#ran.run.statuses);
+  }
+
+  #askLong<T>(what: string, given: Message): Promise<T> {
+    return askEditor<T>(this.#robot.link, what, this.#mission, given, TRYING);
+  }
+
   #mayUndo(): void {
+    this.#try.disabled = this.#test.disabled = this.#isTrying || this.#robot.config.role === "view";
     this.#undo.disabled = !this.#text?.canUndo;
     this.#redo.disabled = !this.#text?.canRedo;
     this.#save.disabled = !this.#canSave || this.#text?.text === this.#saved;
@@ -346,7 +387,7 @@ export class MissionEditor {
   }
 }
 
-function button(picture: "undo" | "redo" | "check" | "cross", text: string, act: () => void): HTMLButtonElement {
+function button(picture: "undo" | "redo" | "check" | "cross" | "play", text: string, act: () => void): HTMLButtonElement {
   const made = h("button", { type: "button" }, icon(picture), text);
   made.onclick = act;
   return made;

@@ -71,6 +71,18 @@ export class OutlineView {
     if (block !== this.#chosen) this.#mark(block, false);
   }
 
+  /** Colours the blocks by how each ended, until another outline is shown. */
+  colour(statuses: readonly { path: Path; status: string }[]): void {
+    for (const old of this.#tree.querySelectorAll(".outline-status")) old.remove();
+    for (const { path, status } of statuses) {
+      const block = this.#order.find((one) => isSame(one.path, path));
+      const item = block && this.#rows.get(block);
+      if (!item) continue;
+      item.dataset.status = status;
+      item.firstElementChild!.append(h("span", { class: "outline-status" }, status));
+    }
+  }
+
   #row(block: Block): HTMLElement {
     const words = h("span", { class: "outline-words" });
     if (block.role) words.append(h("span", { class: "label" }, `${block.role}: `));

@@ -37,6 +37,11 @@ export function matching(offered: readonly Offered[], search: string): Offered[]
   return found.sort((one, other) => first(one) - first(other));
 }
 
+/** Returns a help as plain text. */
+function said(about: string): string {
+  return about.replaceAll("`", "'");
+}
+
 export class Palette {
   readonly element = h("details", { class: "palette" });
   readonly #list = h("ul", { "aria-label": "Steps to add" });
@@ -66,7 +71,7 @@ export class Palette {
   #draw(): void {
     this.#list.replaceChildren(
       ...matching(this.#offered, this.#search.value).map((one) => {
-        const words = h("span", { class: "offered-words" }, h("strong", {}, one.word), h("span", { class: "label" }, ` ${one.about}`));
+        const words = h("span", { class: "offered-words" }, h("strong", {}, one.word), h("span", { class: "label" }, ` ${said(one.about)}`));
         const button = h("button", { type: "button", class: "offered" }, words);
         button.disabled = !this.#mayAdd;
         button.onclick = () => this.#add(one);
@@ -104,14 +109,14 @@ export class StepForm {
     const focused = (document.activeElement as HTMLElement | null)?.id ?? "";
     this.#shown = key;
     setText(this.#title, `Options of ${form.kind}`);
-    setText(this.#about, form.about);
+    setText(this.#about, said(form.about));
     this.#fields.replaceChildren(...form.fields.map((field) => this.#row(field, mayChange)));
     if (focused.startsWith("option-")) document.getElementById(focused)?.focus();
   }
 
   #row(field: FormField, mayChange: boolean): HTMLElement {
     const id = `option-${field.key}`;
-    const label = h("label", { for: id }, formatName(field.key), h("span", { class: "label" }, ` ${field.about}`));
+    const label = h("label", { for: id }, formatName(field.key), h("span", { class: "label" }, ` ${said(field.about)}`));
     const unit = field.units.length > 0 ? [h("span", { class: "unit" }, `with a unit: ${field.units.slice(0, 4).join(", ")}`)] : [];
     if (field.is_fixed) {
       return h("div", { class: "field" }, h("span", {}, formatName(field.key)), h("span", { class: "label" }, "Several lines: change it in the text."));

@@ -285,3 +285,32 @@ def test_the_form_of_a_step_has_what_it_can_be_given_and_writes_it(
     if (shots := os.environ.get("SHOTS")) is not None:
         page.get_by_text("Add a step").click()
         page.screenshot(path=f"{shots}/form.png", full_page=True)
+
+
+def test_a_dry_run_tells_the_story_and_colours_the_outline(open_page: Callable[..., Page], project: Project) -> None:
+    page = edits(open_page(page_name="mission"))
+    types(page, "wait: 2 s", "check: 1 > 2")
+    page.get_by_role("button", name="Dry run").click()
+    expect(page.get_by_text("It ended in failure after")).to_be_visible()
+    expect(block(page, "go_to table")).to_contain_text("success")
+    expect(block(page, "check 1 > 2")).to_contain_text("failure")
+    assert page.get_by_label("Story of the dry run").get_by_role("listitem").count() > 1
+    assert violations(page) == []
+    if (shots := os.environ.get("SHOTS")) is not None:
+        page.screenshot(path=f"{shots}/dry_run.png", full_page=True)
+    page.get_by_role("button", name="Test").click()
+    expect(page.get_by_text("there are no tests of 'fetch'")).to_be_visible()
+
+
+def test_a_robot_is_watched_paused_and_resumed_beside_the_editor_on_a_phone(
+    open_page: Callable[..., Page], project: Project, gateway: FakeGateway
+) -> None:
+    (listed,) = gateway.windows["mission/ListMissions"]
+    gateway.windows["mission/ListMissions"] = [{**listed, "state": "running"}]
+    gateway.answers["mission.PauseMission"] = lambda _: "fetch is paused"
+    page = edits(open_page(page_name="mission", viewport=PHONE))
+    page.get_by_role("button", name="Pause").click()
+    expect(page.get_by_text("fetch is paused")).to_be_visible()
+    gateway.show("mission/ListMissions", [{**listed, "state": "paused"}])
+    expect(page.get_by_role("button", name="Resume")).to_be_visible()
+    expect(page.get_by_role("textbox", name=TEXT)).to_be_visible()

@@ -85,6 +85,7 @@ def test_a_step_that_is_only_a_word_has_the_options_of_that(editor: MissionEdito
 
 
 def test_what_has_no_options_is_refused(editor: MissionEditor, project: Path) -> None:
-    for path in (["do"], ["do", 3], ["do", 9], ["nothing"], [[]]):
+    paths: tuple[list[Any], ...] = (["do"], ["do", 3], ["do", 9], ["nothing"], [[]])
+    for path in paths:
         with pytest.raises(Refused):
             ask(editor, "form", text=TEXT, path=path)

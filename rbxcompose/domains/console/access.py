@@ -63,6 +63,8 @@ _SERVICES = {
     "/console/mission/look": Role.VIEW,
     "/console/mission/read": Role.VIEW,
     "/console/mission/save": Role.CONFIGURE,
+    "/console/mission/test": Role.OPERATE,
+    "/console/mission/try": Role.OPERATE,
     "/console/tested": Role.VIEW,
     "/console/save": Role.CONFIGURE,
     "/rosapi/set_param": Role.CONFIGURE,

@@ -7,6 +7,7 @@ whole or not at all, and only if it is still the file that was read.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from collections.abc import Callable, Mapping
 from difflib import unified_diff
@@ -64,10 +65,13 @@ class ReadText:
 
 
 class MissionEditor:
-    """Answers requests about the missions of one robot. `compiled` compiles it with unsaved texts, as `check` does."""
+    """Answers requests about the missions of one robot.
 
-    def __init__(self, compiled: Compile, file: Path) -> None:
-        self._compiled = compiled
+    `compiled` compiles it with unsaved texts, as `check` does; `simulated` does so without any real device.
+    """
+
+    def __init__(self, compiled: Compile, file: Path, simulated: Compile | None = None) -> None:
+        self._compiled, self._simulated = compiled, simulated or compiled
         self._project = project_of(file.resolve())
         self._robot: Robot | None = None
 
@@ -109,6 +113,20 @@ class MissionEditor:
         """Return the values of a block that can be typed in one line."""
         path = path_of(request["path"])
         return form(self._known, self._path(request["mission"]), request["text"], path)
+
+    def _try(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Run a text on the simulated robot, and return what came of it."""
+        from rbxcompose.tools.mission_editor.dry_run import dry_run
+
+        path, text = self._path(request["mission"]), request["text"]
+        return dry_run(self._simulated({path: text}), request["mission"], path, text)
+
+    def _test(self, request: Mapping[str, Any]) -> Any:
+        """Run the tests of a mission as it is on disk."""
+        from rbxcompose.tools.mission_editor.dry_run import run_tests
+
+        self._path(request["mission"])
+        return json.loads(run_tests(self._project, request["mission"]))
 
     def _check(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Return all that `check` finds with a text in place of a mission's file."""
@@ -240,6 +258,8 @@ REQUESTS: Mapping[str, Callable[[MissionEditor, Mapping[str, Any]], Any]] = Mapp
         "palette": MissionEditor._palette,
         "read": MissionEditor._read,
         "save": MissionEditor._save,
+        "test": MissionEditor._test,
+        "try": MissionEditor._try,
     }
 )
 

@@ -11,6 +11,7 @@ import os
 import sys
 import traceback
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +27,8 @@ from rbxcompose.tools.mission_editor.editor import Compile, MissionEditor
 _NOT_UP = {"answer": None, "refused": "the robot is not up any more"}
 
 
-def compile_with(file: str, layers: ChosenLayers) -> Compile:
-    """Return what compiles a robot with the layers that it runs with; its system is read once."""
+def compile_with(file: str, layers: ChosenLayers) -> tuple[Compile, Compile]:
+    """Return what compiles a robot as it runs, and what does so without real devices; its system is read once."""
     outside = NOTHING
     if layers.system:
         system = compile_system(
@@ -35,20 +36,20 @@ def compile_with(file: str, layers: ChosenLayers) -> Compile:
         )
         outside = system.robots[layers.member].robot.outside if layers.member in system.robots else NOTHING
 
-    def compiled(unsaved: Mapping[Path, str]) -> Compilation:
+    def compiled(unsaved: Mapping[Path, str], *, real: bool = layers.real) -> Compilation:
         return compile_robot(
             file,
             profiles=layers.profiles,
             overlays=layers.overlays,
             sets=layers.sets,
-            real=layers.real,
+            real=real,
             environment=os.environ,
             unsaved=unsaved,
             outside=outside,
             tries_profiles=False,
         )
 
-    return compiled
+    return compiled, partial(compiled, real=False)
 
 
 def answer_line(editor: MissionEditor, line: str) -> dict[str, Any]:
@@ -64,17 +65,19 @@ def answer_line(editor: MissionEditor, line: str) -> dict[str, Any]:
 
 def main(robot: str) -> int:
     """Answer requests until there are no more; `apply` may have brought other layers in between."""
-    editor, state = None, None
+    editor, state, answers = None, None, sys.stdout
+    sys.stdout = sys.stderr  # whatever a component prints in a dry run is no answer
     for line in sys.stdin:
         try:
             newest = known_state(find_robot(robot))
         except NotDoneError:
             newest = None
         if newest is not None and (state is None or (newest.file, newest.layers) != (state.file, state.layers)):
-            state, editor = newest, MissionEditor(compile_with(newest.file, newest.layers), Path(newest.file))
+            compiled, simulated = compile_with(newest.file, newest.layers)
+            state, editor = newest, MissionEditor(compiled, Path(newest.file), simulated)
         told = _NOT_UP if editor is None else answer_line(editor, line)
-        sys.stdout.write(f"{json.dumps(told)}\n")
-        sys.stdout.flush()
+        answers.write(f"{json.dumps(told)}\n")
+        answers.flush()
     return 0
 
 

@@ -110,6 +110,8 @@ _GOODBYE = 3.0  # [s] to wait for the thread to end
 _STOPPED = 1.0  # [s] for all processes to answer to a stop over the bus
 _SHY = 5.0  # [s] for a client to say who it is
 _SAVING = 30.0  # [s] for a save
+_TRYING = 90.0  # [s] for a dry run, and for the tests of a mission
+_LONG = ("test", "try")
 _LONGEST_LOGIN = 4096  # [bytes]
 _COOKIE_AGE = 365 * 24 * 3600  # [s]
 _POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; object-src 'none'"
@@ -472,6 +474,7 @@ class GatewaySession:
         self.trouble = ""  # what is not served beside the page
         self._saving = asyncio.Lock()
         self._editor = EditorProcess(folder.path.name)
+        self._trier = EditorProcess(folder.path.name, patience=_TRYING)  # so that nobody who types waits for it
         self._watches: dict[str, asyncio.Task[None]] = {}  # by window
         guest.scheduler.on_error = lambda owner, error: self._loop.call_exception_handler(
             {"message": str(error), "exception": error}
@@ -518,6 +521,7 @@ class GatewaySession:
         for task in self._tasks:
             task.cancel()
         self._editor.close()
+        self._trier.close()
         if self._foxglove is not None:
             self._foxglove.close()
         self._graph.close()
@@ -1045,7 +1049,8 @@ class GatewaySession:
         self._pump()
 
     async def _edit_mission(self, number: int, request: Mapping[str, Any]) -> None:
-        answer, refusal = await self._editor.ask(request)
+        process = self._trier if request["do"] in _LONG else self._editor
+        answer, refusal = await process.ask(request)
         self._bridge.robot_answered(number, answer, refusal)
         self._pump()
 
