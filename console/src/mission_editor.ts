@@ -112,7 +112,7 @@ export class MissionEditor {
       this.#text.allow(this.#canSave);
       this.#outline.allow(this.#canSave);
       const why = read.why_not || (this.#canSave ? "" : "To change it, open the link of the role configure.");
-      setText(this.#file, why ? `${read.file}: ${why}` : read.file);
+      setText(this.#file, `${this.#mission} in ${read.file}${why ? `: ${why}` : ""}`);
       this.#draw();
       void this.#fillPalette();
       if (!draft) this.#show(read);

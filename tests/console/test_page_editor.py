@@ -314,3 +314,21 @@ def test_a_robot_is_watched_paused_and_resumed_beside_the_editor_on_a_phone(
     gateway.show("mission/ListMissions", [{**listed, "state": "paused"}])
     expect(page.get_by_role("button", name="Resume")).to_be_visible()
     expect(page.get_by_role("textbox", name=TEXT)).to_be_visible()
+
+
+def test_a_new_mission_is_made_from_a_template_and_opened(open_page: Callable[..., Page], project: Project) -> None:
+    page = open_page(page_name="mission")
+    page.get_by_role("button", name="New mission").click()
+    dialog = page.get_by_role("dialog")
+    dialog.get_by_label("Name").fill("fetch")
+    dialog.get_by_label("What it does").select_option("deliver")
+    dialog.get_by_role("button", name="Make it").click()
+    expect(dialog.get_by_role("alert")).to_contain_text("it is taken")
+    assert violations(page) == []
+    if (shots := os.environ.get("SHOTS")) is not None:
+        page.screenshot(path=f"{shots}/new.png")
+    dialog.get_by_label("Name").fill("bring")
+    dialog.get_by_role("button", name="Make it").click()
+    expect(page.get_by_text("bring in missions/bring.yaml")).to_be_visible()
+    expect(block(page, "Delivered")).to_be_visible()
+    expect(page.get_by_text("No mistakes")).to_be_visible()

@@ -17,6 +17,7 @@ import {
   type Tested,
 } from "../mission";
 import { MissionEditor } from "../mission_editor";
+import { newMission } from "../new_mission";
 import type { Page, Robot } from "../page";
 import { isMessage, type Json } from "../rosbridge";
 import "./mission.css";
@@ -119,7 +120,15 @@ class MissionView {
         return button;
       }),
     );
-    this.#list.hidden = missions.length < 2;
+    if (this.#robot.config.role === "configure") {
+      const make = h("button", { type: "button", class: "new-mission" }, icon("edit"), "New mission");
+      make.onclick = async () => {
+        const name = await newMission(this.#robot, this.element);
+        if (name) this.#edit(name);
+      };
+      this.#list.append(make);
+    }
+    this.#list.hidden = this.#list.childElementCount < 2;
     if (wanted && wanted !== this.#chosen) this.#choose(wanted);
     this.#showHead();
   }

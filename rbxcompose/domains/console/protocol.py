@@ -1279,8 +1279,8 @@ class Bridge:
             request[key] = value
         if given.get("dry_run") is True:
             request["dry_run"] = True
-        elif name == "save":
-            self._note(client, f"saves the mission {_short(request['mission'])}")
+        elif name in _WRITES:
+            self._note(client, f"{_WRITES[name]} the mission {_short(request['mission'])}")
         self._requests.append(EditMission(number, request))
 
     def _rosapi(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -1425,6 +1425,7 @@ _ANSWERED = frozenset({"call_service", "send_action_goal"})  # operations whose 
 
 _EDITOR: Mapping[str, tuple[str, ...]] = {"check": ("text",), "look": ("text",), "read": (), "save": ("text", "hash")}
 """What can be asked about the text of a mission, with its arguments besides `mission`."""
+_WRITES = {"new": "makes", "save": "saves"}
 _EDITED: Mapping[str, type] = {"operation": dict, "path": list}
 """The types of those arguments that are no texts."""
 _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str, Any] | None]] = {

@@ -25,6 +25,7 @@ from rbxcompose.compiler.compile import Compilation, look_at_mission
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import project_of, shown_name
 from rbxcompose.manifest.tree import FILE_BYTES
+from rbxcompose.tools.mission_editor.new_mission import make_mission, templates
 from rbxcompose.tools.mission_editor.outline import Outline, told
 from rbxcompose.tools.mission_editor.palette import form, palette
 from rbxcompose.tools.mission_editor.patches import change, path_of
@@ -72,7 +73,8 @@ class MissionEditor:
 
     def __init__(self, compiled: Compile, file: Path, simulated: Compile | None = None) -> None:
         self._compiled, self._simulated = compiled, simulated or compiled
-        self._project = project_of(file.resolve())
+        self._file = file.resolve()
+        self._project = project_of(self._file)
         self._robot: Robot | None = None
 
     def answer(self, request: Mapping[str, Any]) -> Any:
@@ -113,6 +115,18 @@ class MissionEditor:
         """Return the values of a block that can be typed in one line."""
         path = path_of(request["path"])
         return form(self._known, self._path(request["mission"]), request["text"], path)
+
+    def _templates(self, request: Mapping[str, Any]) -> list[dict[str, str]]:
+        """Return the templates of new missions."""
+        return templates()
+
+    def _new(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Write a new mission from a template into the project, and into the robot's file."""
+        self._compile({})
+        name, template = request["mission"], request["template"]
+        path = make_mission(self._known, self._file, self._project, name, template, self._compiled)
+        self._compile({})
+        return {"file": self._shown(path)}
 
     def _try(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Run a text on the simulated robot, and return what came of it."""
@@ -255,9 +269,11 @@ REQUESTS: Mapping[str, Callable[[MissionEditor, Mapping[str, Any]], Any]] = Mapp
         "edit": MissionEditor._edit,
         "form": MissionEditor._form,
         "look": MissionEditor._look,
+        "new": MissionEditor._new,
         "palette": MissionEditor._palette,
         "read": MissionEditor._read,
         "save": MissionEditor._save,
+        "templates": MissionEditor._templates,
         "test": MissionEditor._test,
         "try": MissionEditor._try,
     }
