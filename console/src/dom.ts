@@ -66,3 +66,21 @@ export function setText(element: Element, text: string): void {
 export function emptyCard(picture: Icon, text: string, ...more: Child[]): HTMLElement {
   return h("section", { class: "card empty", role: "status" }, icon(picture), h("p", {}, text), ...more);
 }
+
+/**
+ * Shows a form over the page, and returns what it was left with: the value of its button, empty if it was left otherwise.
+ * It is not modal: STOP can be pressed meanwhile.
+ */
+export function askInDialog(host: HTMLElement, dialog: HTMLDialogElement): Promise<string> {
+  host.append(dialog);
+  return new Promise((resolve) => {
+    dialog.onclose = () => {
+      dialog.remove();
+      resolve(dialog.returnValue);
+    };
+    dialog.onkeydown = (event) => {
+      if (event.key === "Escape") dialog.close("");
+    };
+    dialog.show();
+  });
+}

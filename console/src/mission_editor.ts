@@ -1,5 +1,5 @@
 /** The editor of one mission: its text, what is wrong with it, undo, and saving it on the robot. */
-import { emptyCard, h, icon, setText } from "./dom";
+import { askInDialog, emptyCard, h, icon, setText } from "./dom";
 import {
   askEditor,
   kindOf,
@@ -406,7 +406,7 @@ function rowElsewhere(found: Elsewhere): HTMLElement {
 }
 
 /** Shows what would change in the file, and returns whether a person wants that. */
-function confirmed(host: HTMLElement, trial: Looked & { diff: string[] }, file: string): Promise<boolean> {
+async function confirmed(host: HTMLElement, trial: Looked & { diff: string[] }, file: string): Promise<boolean> {
   const names = { old: "removed", new: "added", place: "", same: "" };
   const lines = trial.diff.map((line) => {
     const kind = kindOf(line);
@@ -421,12 +421,5 @@ function confirmed(host: HTMLElement, trial: Looked & { diff: string[] }, file: 
   const shown = h("ol", { class: "difference", tabindex: "0", "aria-label": "What changes" }, ...lines);
   const form = h("form", { method: "dialog" }, title, ...warning, shown, h("div", { class: "row" }, yes, no));
   const dialog = h("dialog", { class: "save-dialog", "aria-labelledby": "save-title" }, form);
-  host.append(dialog);
-  return new Promise((resolve) => {
-    dialog.onclose = () => {
-      dialog.remove();
-      resolve(dialog.returnValue === "yes");
-    };
-    dialog.showModal();
-  });
+  return (await askInDialog(host, dialog)) === "yes";
 }

@@ -1,5 +1,5 @@
 /** A new mission from a template: its name, and what it is to do. */
-import { h, icon, setText } from "./dom";
+import { askInDialog, h, icon, setText } from "./dom";
 import { askEditor } from "./edited";
 import { formatName } from "./format";
 import type { Robot } from "./page";
@@ -30,24 +30,17 @@ export async function newMission(robot: Robot, host: HTMLElement): Promise<strin
   const fields = [h("label", { for: "new-name" }, "Name"), name, h("label", { for: "new-template" }, "What it does"), list];
   const form = h("form", {}, h("h2", { id: "new-title" }, "New mission"), ...fields, about, says, h("div", { class: "row" }, make, leave));
   const dialog = h("dialog", { class: "save-dialog", "aria-labelledby": "new-title" }, form);
-  host.append(dialog);
-  return new Promise((resolve) => {
-    leave.onclick = () => dialog.close();
-    form.onsubmit = async (event) => {
-      event.preventDefault();
-      make.disabled = true;
-      try {
-        await askEditor(robot.link, "new", name.value, { template: list.value });
-        dialog.close(name.value);
-      } catch (error) {
-        setText(says, (error as Error).message);
-      }
-      make.disabled = false;
-    };
-    dialog.onclose = () => {
-      dialog.remove();
-      resolve(dialog.returnValue);
-    };
-    dialog.showModal();
-  });
+  leave.onclick = () => dialog.close("");
+  form.onsubmit = async (event) => {
+    event.preventDefault();
+    make.disabled = true;
+    try {
+      await askEditor(robot.link, "new", name.value, { template: list.value });
+      dialog.close(name.value);
+    } catch (error) {
+      setText(says, (error as Error).message);
+    }
+    make.disabled = false;
+  };
+  return askInDialog(host, dialog);
 }

@@ -116,6 +116,10 @@ def test_save_shows_what_changes_and_writes_it(open_page: Callable[..., Page], p
     dialog = page.get_by_role("dialog")
     expect(dialog).to_contain_text("+  - wait: 3 s")
     assert violations(page) == []
+    if (shots := os.environ.get("SHOTS")) is not None:
+        page.screenshot(path=f"{shots}/save.png")
+    page.get_by_role("button", name="STOP").click()
+    expect(page.get_by_text("Nothing moves until you press Release")).to_be_visible()
     dialog.get_by_role("button", name="Not now").click()
     assert project.text() == FETCH
     page.get_by_role("button", name="Save").click()

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.requests import Refused
-from rbxcompose.tools.mission_editor.outline import Block, Outline
-from rbxcompose.tools.mission_editor.patches import OPERATIONS, Change, change
+from rbxcompose.tools.mission_editor.outline import Block, MissionOutline
+from rbxcompose.tools.mission_editor.patches import OPERATIONS, TextPatch, change
 
 HEAD = "# what it is for\nrbx: 1\nkind: Mission\nname: fetch\n"
 WORDS = (
@@ -76,10 +76,10 @@ def missions(draw: st.DrawFn) -> str:
 
 
 def blocks(text: str) -> list[Block]:
-    return [block for top in Outline(text).blocks for block in top.all()]
+    return [block for top in MissionOutline(text).blocks for block in top.all()]
 
 
-def undone(text: str, made: Change) -> str:
+def undone(text: str, made: TextPatch) -> str:
     """Return a changed text with the inverse of each edit."""
     after, shift = made.applied(text), 0
     for edit in made.edits:
@@ -94,7 +94,7 @@ def words(text: str) -> list[str]:
 
 
 @st.composite
-def changes(draw: st.DrawFn) -> tuple[str, dict[str, Any], Change]:
+def changes(draw: st.DrawFn) -> tuple[str, dict[str, Any], TextPatch]:
     """Return a text, an operation that it allows, and its change."""
     text = draw(missions())
     block = draw(st.sampled_from(blocks(text)))
@@ -115,13 +115,13 @@ def changes(draw: st.DrawFn) -> tuple[str, dict[str, Any], Change]:
     try:
         made = change(text, operation)
     except Refused:
-        made = Change((), ())
+        made = TextPatch((), ())
     return text, operation, made
 
 
 @given(changes())
 def test_no_byte_outside_of_the_edits_changes_and_undo_is_the_identity(
-    given_: tuple[str, dict[str, Any], Change],
+    given_: tuple[str, dict[str, Any], TextPatch],
 ) -> None:
     text, _, made = given_
     assert all(one.end <= other.start for one, other in pairwise(made.edits))
@@ -129,7 +129,7 @@ def test_no_byte_outside_of_the_edits_changes_and_undo_is_the_identity(
 
 
 @given(changes())
-def test_what_moves_takes_its_comments_along_and_loses_nothing(given_: tuple[str, dict[str, Any], Change]) -> None:
+def test_what_moves_takes_its_comments_along_and_loses_nothing(given_: tuple[str, dict[str, Any], TextPatch]) -> None:
     text, operation, made = given_
     if operation["op"] in ("move", "move_to"):
         after = made.applied(text)
@@ -142,7 +142,7 @@ def test_what_moves_takes_its_comments_along_and_loses_nothing(given_: tuple[str
 
 
 @given(changes())
-def test_the_tree_afterwards_is_the_one_that_was_meant(given_: tuple[str, dict[str, Any], Change]) -> None:
+def test_the_tree_afterwards_is_the_one_that_was_meant(given_: tuple[str, dict[str, Any], TextPatch]) -> None:
     text, operation, made = given_
     if not made.edits:
         return
@@ -163,10 +163,10 @@ def test_the_tree_afterwards_is_the_one_that_was_meant(given_: tuple[str, dict[s
 
 
 @given(changes())
-def test_the_chosen_block_is_one_of_the_new_outline(given_: tuple[str, dict[str, Any], Change]) -> None:
+def test_the_chosen_block_is_one_of_the_new_outline(given_: tuple[str, dict[str, Any], TextPatch]) -> None:
     text, _, made = given_
     if made.edits:
-        assert Outline(made.applied(text)).at(made.chosen) is not None
+        assert MissionOutline(made.applied(text)).at(made.chosen) is not None
 
 
 @given(missions())

@@ -20,7 +20,7 @@ from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING
 from rbxcompose.sdk.capabilities import RunsProgram
 from rbxcompose.sdk.registry import declared
-from rbxcompose.tools.mission_editor.outline import Block, Outline
+from rbxcompose.tools.mission_editor.outline import Block, MissionOutline
 from rbxcompose.tools.mission_tests.coverage import SeenWays
 from rbxcompose.tools.mission_tests.finding_files import tests_of
 from rbxcompose.tools.mission_tests.model import RUNS, Expectations, Trial
@@ -79,11 +79,11 @@ def dry_run(made: Compilation, mission: str, path: Path, text: str) -> dict[str,
         "time": record.now,
         "left_out": len(record.lines) - len(lines),
         "story": [{"time": line.time, "text": line.text, "is_bad": line.level is not Level.OK} for line in lines],
-        "statuses": _by_block(Outline(text), shown_name(path), linked.nodes, seen.last),
+        "statuses": _by_block(MissionOutline(text), shown_name(path), linked.nodes, seen.last),
     }
 
 
-def _by_block(outline: Outline, file: str, nodes: Any, statuses: dict[int, int]) -> list[dict[str, Any]]:
+def _by_block(outline: MissionOutline, file: str, nodes: Any, statuses: dict[int, int]) -> list[dict[str, Any]]:
     """Return the status of each block whose node began."""
     told: dict[tuple[str | int, ...], str] = {}
     for node in nodes:

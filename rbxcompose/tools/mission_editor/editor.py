@@ -26,7 +26,7 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import project_of, shown_name
 from rbxcompose.manifest.tree import FILE_BYTES
 from rbxcompose.tools.mission_editor.new_mission import make_mission, templates
-from rbxcompose.tools.mission_editor.outline import Outline, told
+from rbxcompose.tools.mission_editor.outline import MissionOutline, told
 from rbxcompose.tools.mission_editor.palette import form, palette
 from rbxcompose.tools.mission_editor.patches import change, path_of
 from rbxcompose.tools.mission_editor.units import Utf16
@@ -227,7 +227,7 @@ class MissionEditor:
         path = self._path(mission)
         report, _ = look_at_mission(self._known, mission, os.environ, {path: text})
         with paused_collection():
-            outline = Outline(text)
+            outline = MissionOutline(text)
         return {**self._told(path, text, report), "outline": told(outline, Utf16(text).at)}
 
     def _told(self, path: Path, text: str, report: Any) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.keys import anywhere
 from rbxcompose.missions.program.registry import kinds
-from rbxcompose.tools.mission_editor.yaml_places import Lines, Path, PlacedNode, placed
+from rbxcompose.tools.mission_editor.yaml_places import Path, PlacedNode, TextLines, placed
 
 ONE, SEVERAL, NAMED = "one", "several", "named"
 """What a slot holds: one step, a list of steps, or entries by their names."""
@@ -90,11 +90,11 @@ def slots_of(step: PlacedNode, path: Path) -> list[Slot]:
     return found
 
 
-class Outline:
+class MissionOutline:
     """The blocks of a text; none if it cannot be read."""
 
     def __init__(self, text: str) -> None:
-        self.lines = Lines(text)
+        self.lines = TextLines(text)
         self.root = placed(text)
         self.slots: list[Slot] = []
         self.blocks = list(self._mission()) if self.root is not None and self.root.form == "map" else []
@@ -247,7 +247,7 @@ def _shown(node: PlacedNode) -> str:
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}\u2026"
 
 
-def told(outline: Outline, at: Callable[[int], int]) -> dict[str, Any]:
+def told(outline: MissionOutline, at: Callable[[int], int]) -> dict[str, Any]:
     """Return an outline as data; `at` turns offsets into those of the reader."""
     return {"blocks": [_block(block, at) for block in outline.blocks], "slots": [_slot(slot) for slot in outline.slots]}
 

@@ -23,9 +23,9 @@ from rbxcompose.tools.lsp.answers import variables
 from rbxcompose.tools.lsp.document import Cursor, Document, Spot, quick_tree
 from rbxcompose.tools.lsp.names import SKILL, KnownNames
 from rbxcompose.tools.lsp.project import MISSION
-from rbxcompose.tools.mission_editor.outline import Outline, kind_of, slots_of
+from rbxcompose.tools.mission_editor.outline import MissionOutline, kind_of, slots_of
 from rbxcompose.tools.mission_editor.patches import change
-from rbxcompose.tools.mission_editor.yaml_places import Lines, Path, placed
+from rbxcompose.tools.mission_editor.yaml_places import Path, TextLines, placed
 
 _EXAMPLE = "Example:"
 _VALUES = frozenset(("string", "number", "integer", "boolean", "null"))
@@ -53,7 +53,7 @@ def form(robot: Robot, file: FilePath, text: str, path: Path) -> dict[str, Any]:
     Raises:
         Refused: if there is none.
     """
-    outline = Outline(text)
+    outline = MissionOutline(text)
     block, node = outline.at(path), outline.root.at(path) if outline.root is not None else None
     if block is None or node is None or node.form not in ("map", "scalar"):
         raise Refused("this block has no options")
@@ -143,7 +143,7 @@ def _example(kind: str) -> str:
     found = [one for one in body.all() if one.form == "map" and kind_of(one) == kind] if body is not None else []
     if not found:
         return f"{kind}:"
-    lines = Lines(text)
+    lines = TextLines(text)
     column = lines.column(found[0].start)
     first, last = lines.of(found[0].start), lines.of(max(found[0].end - 1, 0)) + 1
     rest = [line[column:] for line in lines.lines[first + 1 : last]]

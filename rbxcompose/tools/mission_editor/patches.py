@@ -16,8 +16,8 @@ from typing import Any
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import Refused
 from rbxcompose.manifest.yaml_nodes import compose
-from rbxcompose.tools.mission_editor.outline import ONE, Outline, Slot
-from rbxcompose.tools.mission_editor.yaml_places import Path, PlacedNode, Plain, placed
+from rbxcompose.tools.mission_editor.outline import ONE, MissionOutline, Slot
+from rbxcompose.tools.mission_editor.yaml_places import Path, PlacedNode, PlainTree, placed
 
 INDENT = 2
 INTERRUPTS = "interrupts"
@@ -37,7 +37,7 @@ class TextEdit:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class TextPatch:
     """Edits that do not overlap, in the order of the text, and the path of what is chosen afterwards."""
 
     edits: tuple[TextEdit, ...]
@@ -50,13 +50,13 @@ class Change:
         return text
 
 
-def change(text: str, operation: Mapping[str, Any]) -> Change:
+def change(text: str, operation: Mapping[str, Any]) -> TextPatch:
     """Return how an operation changes a text: its `op`, the `path` of a block, and what else it needs.
 
     Raises:
         Refused: if that is impossible, or cannot be done without touching anything else.
     """
-    outline = Outline(text)
+    outline = MissionOutline(text)
     if outline.root is None:
         raise Refused(f"the text cannot be read: {_BY_HAND} first")
     try:
@@ -69,16 +69,16 @@ def change(text: str, operation: Mapping[str, Any]) -> Change:
 class _Patch:
     """Collects the edits of one operation, and what the tree is to be afterwards."""
 
-    def __init__(self, outline: Outline, root: PlacedNode) -> None:
+    def __init__(self, outline: MissionOutline, root: PlacedNode) -> None:
         self.outline = outline
         self.lines = outline.lines
         self.edits: list[TextEdit] = []
         self.root = root
-        self.tree: Plain = root.plain()
+        self.tree: PlainTree = root.plain()
 
     # Operations
 
-    def delete(self, operation: Mapping[str, Any]) -> Change:
+    def delete(self, operation: Mapping[str, Any]) -> TextPatch:
         """Take a step, a state or an interrupt out."""
         path = path_of(operation["path"])
         first, last, _ = self.movable(path)
@@ -89,7 +89,7 @@ class _Patch:
         _take(_at(self.tree, path[:-1]), path[-1])
         return self.done(path[:-1] if not isinstance(path[-1], int) else (*path[:-1], max(0, path[-1] - 1)))
 
-    def duplicate(self, operation: Mapping[str, Any]) -> Change:
+    def duplicate(self, operation: Mapping[str, Any]) -> TextPatch:
         """Write a block once more below itself; a named one gets another name."""
         path = path_of(operation["path"])
         first, last, _ = self.movable(path)
@@ -107,7 +107,7 @@ class _Patch:
         container[1].insert(index + 1, [("scalar", name, _SCALAR), deepcopy(container[1][index][1])])
         return self.done((*path[:-1], name))
 
-    def move(self, operation: Mapping[str, Any]) -> Change:
+    def move(self, operation: Mapping[str, Any]) -> TextPatch:
         """Move a block `up`, `down`, `in` (to the end of the step before it) or `out` (behind the step around it)."""
         path, way = path_of(operation["path"]), operation["way"]
         self.movable(path)
@@ -137,13 +137,13 @@ class _Patch:
                 return self.place(path, outer[:-1], outer[-1] + 1)
         raise Refused("there is no list of steps around it")
 
-    def move_to(self, operation: Mapping[str, Any]) -> Change:
+    def move_to(self, operation: Mapping[str, Any]) -> TextPatch:
         """Move a block to a place: before the one with `index` in the slot `to`."""
         path, to, index = path_of(operation["path"]), path_of(operation["to"]), int(operation["index"])
         self.movable(path)
         return self.place(path, to, index)
 
-    def insert(self, operation: Mapping[str, Any]) -> Change:
+    def insert(self, operation: Mapping[str, Any]) -> TextPatch:
         """Write a new block, given as lines of YAML, into the slot `path`, before the one with `index`.
 
         In a slot whose entries have names, `name` is the one of the new entry.
@@ -161,7 +161,7 @@ class _Patch:
         lines = _item(snippet.split("\n"))
         return self.done(self.insert_item(path, index, lines, new.plain()))
 
-    def set(self, operation: Mapping[str, Any]) -> Change:
+    def set(self, operation: Mapping[str, Any]) -> TextPatch:
         """Give the key `key` of the block at `path` a value; an empty one takes the key away."""
         path, key, value = path_of(operation["path"]), str(operation["key"]), str(operation["value"])
         node, written = self.node(path), _scalar(value)
@@ -224,7 +224,7 @@ class _Patch:
         is_behind = line >= self.lines.count and self.lines.is_open
         self.edits.append(TextEdit(at, at, f"\n{block}" if is_behind else f"{block}\n"))
 
-    def place(self, path: Path, to: Path, index: int) -> Change:
+    def place(self, path: Path, to: Path, index: int) -> TextPatch:
         """Move a block into a slot."""
         first, last, column = self.movable(path)
         if path == to[: len(path)]:
@@ -245,7 +245,7 @@ class _Patch:
         source[1] = [one for one in source[1] if one is not moved]
         return self.done(_after(made, path))
 
-    def place_near(self, path: Path, index: int) -> Change:
+    def place_near(self, path: Path, index: int) -> TextPatch:
         """Move a block within its list or map."""
         first, last, _ = self.movable(path)
         container, above = _at(self.tree, path[:-1]), self.node(path[:-1])
@@ -270,7 +270,7 @@ class _Patch:
             raise Refused(f"it is written within a line: {_BY_HAND}")
         return found
 
-    def insert_item(self, to: Path, index: int, lines: list[str], new: Plain, column: int = 0) -> Path:
+    def insert_item(self, to: Path, index: int, lines: list[str], new: PlainTree, column: int = 0) -> Path:
         """Write an item, whose dash is at `column`, into a list of steps, or beside the only step of a slot."""
         node = self.node(to)
         if node.form == "list":
@@ -315,7 +315,7 @@ class _Patch:
         self.edits.append(TextEdit(key.end + 1, node.start, f"\n{' ' * column}- "))
         return column
 
-    def insert_entry(self, path: Path, index: int, name: str, snippet: str, plain: Plain) -> Change:
+    def insert_entry(self, path: Path, index: int, name: str, snippet: str, plain: PlainTree) -> TextPatch:
         """Write an entry with a name into a map of states, branches or interrupts."""
         node = self.node(path)
         names = [key.text for key, _ in node.pairs]
@@ -332,7 +332,7 @@ class _Patch:
         _at(self.tree, path)[1].insert(index, [("scalar", name, _SCALAR), plain])
         return self.done((*path, name))
 
-    def first_interrupt(self, name: str, snippet: str, plain: Plain) -> Change:
+    def first_interrupt(self, name: str, snippet: str, plain: PlainTree) -> TextPatch:
         """Write the key `interrupts` with its first entry before what the mission does."""
         keys = [key.text for key, _ in self.root.pairs]
         body = next((key for key in ("do", "machine") if key in keys), "")
@@ -346,7 +346,7 @@ class _Patch:
         self.tree[1].insert(keys.index(body), [("scalar", INTERRUPTS, _SCALAR), inner])
         return self.done((INTERRUPTS, name))
 
-    def add_key(self, path: Path, node: PlacedNode, key: str, written: str, plain: Plain) -> Change:
+    def add_key(self, path: Path, node: PlacedNode, key: str, written: str, plain: PlainTree) -> TextPatch:
         """Write a key that was not there below the others of a step."""
         lines, pair = self.lines, [("scalar", key, _SCALAR), plain]
         if node.form == "map" and node.is_flow:
@@ -379,7 +379,7 @@ class _Patch:
         _put(_at(self.tree, path[:-1]), path[-1], made)
         return self.done(path)
 
-    def unset(self, path: Path, node: PlacedNode, key: str, old: PlacedNode | None) -> Change:
+    def unset(self, path: Path, node: PlacedNode, key: str, old: PlacedNode | None) -> TextPatch:
         """Take a key of a step away, or the value of its word."""
         if old is None:
             raise Refused(f"there is no '{key}'")
@@ -401,19 +401,19 @@ class _Patch:
         _take(_at(self.tree, path), key)
         return self.done(path)
 
-    def done(self, chosen: Path) -> Change:
+    def done(self, chosen: Path) -> TextPatch:
         """Return the change, if it does what was meant and nothing else."""
         edits = sorted(self.edits, key=lambda edit: (edit.start, edit.end))
         if any(other.start < one.end for one, other in pairwise(edits)):
             raise Refused(f"what is moved and where it goes overlap: {_BY_HAND}")
-        made = Change(tuple(edits), chosen)
+        made = TextPatch(tuple(edits), chosen)
         root = placed(made.applied(self.lines.text))
         if root is None or root.plain() != self.tree:
             raise Refused(f"this cannot be done without changing something else: {_BY_HAND}")
         return made
 
 
-OPERATIONS: Mapping[str, Callable[[_Patch, Mapping[str, Any]], Change]] = MappingProxyType(
+OPERATIONS: Mapping[str, Callable[[_Patch, Mapping[str, Any]], TextPatch]] = MappingProxyType(
     {
         "delete": _Patch.delete,
         "duplicate": _Patch.duplicate,
@@ -428,20 +428,20 @@ OPERATIONS: Mapping[str, Callable[[_Patch, Mapping[str, Any]], Change]] = Mappin
 # Trees without places
 
 
-def _at(tree: Plain, path: Path) -> Plain:
+def _at(tree: PlainTree, path: Path) -> PlainTree:
     for key in path:
         tree = tree[1][key] if isinstance(key, int) else next(value for name, value in tree[1] if name[1] == key)
     return tree
 
 
-def _put(tree: Plain, key: str | int, value: Plain) -> None:
+def _put(tree: PlainTree, key: str | int, value: PlainTree) -> None:
     if isinstance(key, int):
         tree[1][key] = value
     else:
         next(pair for pair in tree[1] if pair[0][1] == key)[1] = value
 
 
-def _take(tree: Plain, key: str | int) -> None:
+def _take(tree: PlainTree, key: str | int) -> None:
     if isinstance(key, int):
         del tree[1][key]
     else:

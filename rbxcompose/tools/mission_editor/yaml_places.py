@@ -13,7 +13,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.manifest.yaml_nodes import compose
 
 Path = tuple[str | int, ...]
-Plain = Any
+PlainTree = Any
 """A tree without places, in lists that can be changed: `["list", [...]]`, `["map", [[key, value], ...]]`, scalars."""
 
 
@@ -50,7 +50,7 @@ class PlacedNode:
                 found = found.get(key)
         return found
 
-    def plain(self) -> Plain:
+    def plain(self) -> PlainTree:
         """Return what is written, without places."""
         if self.form == "list":
             return ["list", [item.plain() for item in self.items], self.mark]
@@ -114,7 +114,7 @@ class _Builder:
         return made
 
 
-class Lines:
+class TextLines:
     """A text by its lines, which count from 0; `count` is without an empty one at the end."""
 
     def __init__(self, text: str) -> None:
