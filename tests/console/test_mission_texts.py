@@ -8,9 +8,10 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.domains.console.access import Role
+from rbxcompose.domains.console.access import Role, needed
 from rbxcompose.domains.console.editor_process import MOST_WAITING, EditorProcess
-from rbxcompose.domains.console.protocol import EditMission
+from rbxcompose.domains.console.protocol import MISSION_TEXTS, EditMission
+from rbxcompose.tools.mission_editor.editor import REQUESTS
 from tests.console.clients import Room
 
 READ = {"mission": "patrol"}
@@ -30,6 +31,13 @@ def test_a_request_about_a_text_is_passed_on_and_its_answer_comes_back() -> None
     room.bridge.robot_answered(asked.number, {"text": "x"})
     (answer,) = client.gets()
     assert answer["values"] == {"success": True, "message": "", "answer": {"text": "x"}}
+
+
+def test_the_gateway_passes_on_all_that_the_editor_answers_each_with_a_role_of_its_own() -> None:
+    assert set(MISSION_TEXTS) == set(REQUESTS)
+    roles = {name: needed({"op": "call_service", "service": f"/console/mission/{name}"}, {}) for name in REQUESTS}
+    assert {name for name, role in roles.items() if role is Role.CONFIGURE} == {"new", "save"}
+    assert {name for name, role in roles.items() if role is Role.OPERATE} == {"test", "try"}
 
 
 def test_who_looks_may_read_and_only_who_configures_may_save() -> None:

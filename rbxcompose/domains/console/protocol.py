@@ -1272,7 +1272,7 @@ class Bridge:
 
     def _mission_service(self, client: _Client, given: Mapping[str, Any], number: int, name: str) -> None:
         request: dict[str, Any] = {"do": name}
-        for key in ("mission", *_EDITOR[name]):
+        for key in ("mission", *MISSION_TEXTS[name]):
             value = given.get(key)
             if not isinstance(value, _EDITED.get(key, str)):
                 raise WrongMessageError(f"'{key}' is missing, or of another type")
@@ -1423,7 +1423,19 @@ _OPERATIONS: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any]], None]] 
 _ANSWERED = frozenset({"call_service", "send_action_goal"})  # operations whose refusal is an answer of their own
 
 
-_EDITOR: Mapping[str, tuple[str, ...]] = {"check": ("text",), "look": ("text",), "read": (), "save": ("text", "hash")}
+MISSION_TEXTS: Mapping[str, tuple[str, ...]] = {
+    "check": ("text",),
+    "edit": ("text", "operation"),
+    "form": ("text", "path"),
+    "look": ("text",),
+    "new": ("template",),
+    "palette": (),
+    "read": (),
+    "save": ("text", "hash"),
+    "templates": (),
+    "test": (),
+    "try": ("text",),
+}
 """What can be asked about the text of a mission, with its arguments besides `mission`."""
 _WRITES = {"new": "makes", "save": "saves"}
 _EDITED: Mapping[str, type] = {"operation": dict, "path": list}
@@ -1436,7 +1448,7 @@ _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str,
     "/console/save": Bridge._save_service,
     "/console/stop": Bridge._stop_service,
     "/console/tested": Bridge._tested_service,
-    **{f"/console/mission/{name}": partial(Bridge._mission_service, name=name) for name in _EDITOR},
+    **{f"/console/mission/{name}": partial(Bridge._mission_service, name=name) for name in MISSION_TEXTS},
 }
 """Services of the gateway: what answers, or None if the answer comes later."""
 _PARAMETERS: Mapping[str, tuple[Callable[[Bridge, Mapping[str, Any], int], None], tuple[str, ...]]] = {
