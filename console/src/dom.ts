@@ -26,6 +26,8 @@ const ICONS = {
   wheel:
     "M12 3v18M3 12h18M12 3 9.500 5.500M12 3l2.500 2.500M12 21l-2.500-2.500M12 21l2.500-2.500M3 12l2.500-2.500M3 12l2.500 2.500M21 12l-2.500-2.500M21 12l-2.500 2.500",
   undo: "M4 9h10a5 5 0 0 1 0 10H8M4 9l4-4M4 9l4 4",
+  redo: "M20 9H10a5 5 0 0 0 0 10h6M20 9l-4-4M20 9l-4 4",
+  edit: "M4 20l1-5L16 4l4 4L9 19z",
   pause: "M8 5v14M16 5v14",
   cross: "M6 6l12 12M18 6 6 18",
   skip: "M6 12h12",
@@ -63,4 +65,22 @@ export function setText(element: Element, text: string): void {
 /** Returns what a page shows in place of its content: that it is loading, empty, or what went wrong. */
 export function emptyCard(picture: Icon, text: string, ...more: Child[]): HTMLElement {
   return h("section", { class: "card empty", role: "status" }, icon(picture), h("p", {}, text), ...more);
+}
+
+/**
+ * Shows a form over the page, and returns what it was left with: the value of its button, empty if it was left otherwise.
+ * It is not modal: STOP can be pressed meanwhile.
+ */
+export function askInDialog(host: HTMLElement, dialog: HTMLDialogElement): Promise<string> {
+  host.append(dialog);
+  return new Promise((resolve) => {
+    dialog.onclose = () => {
+      dialog.remove();
+      resolve(dialog.returnValue);
+    };
+    dialog.onkeydown = (event) => {
+      if (event.key === "Escape") dialog.close("");
+    };
+    dialog.show();
+  });
 }

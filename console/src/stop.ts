@@ -40,12 +40,16 @@ export function stopButtons(link: Rosbridge, stopped: Signal<boolean>, notify: (
     if (state.is === "open" && owed) void sendStop();
   });
   window.addEventListener("keydown", (event) => {
-    const on = event.target instanceof Element ? event.target.closest("a, button, input, select, textarea") : null;
-    if (event.code !== "Space" || event.repeat || on) return;
+    if (event.code !== "Space" || event.repeat || event.composedPath().some(takesSpace)) return;
     event.preventDefault();
     void sendStop();
   });
   return h("section", { class: "stops", "aria-label": "Emergency" }, release, stop);
+}
+
+/** Returns whether Space means something else there: a control, or a text that is edited, also below a root of its own. */
+function takesSpace(target: EventTarget): boolean {
+  return target instanceof HTMLElement && (target.isContentEditable || target.matches("a, button, input, select, textarea"));
 }
 
 /** Calls a service that may answer that it did not succeed: unlike a request, STOP needs no supervisor. */

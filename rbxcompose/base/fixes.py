@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field, replace
 
 from rbxcompose.base.dataclass import dataclass
@@ -62,6 +62,12 @@ def apply(fixes: Iterable[Fix], texts: Mapping[str, str]) -> Applied:
             text = out.texts[place.file]
             out.texts[place.file] = text[: place.start] + place.text + text[place.end :]
     return out
+
+
+def places(fixes: Iterable[Fix], texts: Mapping[str, str]) -> Iterator[list[EditPlace] | None]:
+    """Yield where the edits of each fix apply; None for a fix that does not."""
+    lines = {file: _Lines(text) for file, text in texts.items()}
+    return (_places(fix, lines) for fix in fixes)
 
 
 def safe_fixes(findings: Iterable[Finding], sources: Sources) -> list[Fix]:

@@ -4,21 +4,25 @@ from collections.abc import Mapping, Sequence, Set
 from dataclasses import field, replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Related, Report, Severity, Span, kind, one_compile
+from rbxcompose.base.findings import Finding, Related, Report, Severity, Span, kind, one_compile
 from rbxcompose.base.garbage_collection import paused_collection
-from rbxcompose.compiler.check_runner import run_checks
+from rbxcompose.base.rules import Rule
+from rbxcompose.compiler.check_runner import findings_of, run_checks
 from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_file import load_robot
 from rbxcompose.compiler.doubts import with_removals
-from rbxcompose.compiler.model.build import build_robot, with_missions
+from rbxcompose.compiler.model.build import build_robot, read_missions, with_missions
 from rbxcompose.compiler.model.robot import NOTHING, Outside, Robot
+from rbxcompose.compiler.model.skills import names_of_skills, skills_of
 from rbxcompose.compiler.plan.build import build_plan
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.manifest.files import PROFILE
 from rbxcompose.manifest.reader import ParsedText, Texts
 from rbxcompose.manifest.tree import LEAST_STEPS, PROFILE_STEPS, STEP_BYTES, STEP_VALUES
+from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.msgs import registry
 
 NOT_TRIED = kind("RBX7003", Severity.WARNING)
@@ -49,12 +53,13 @@ def compile_robot(
     environment: Mapping[str, str],
     unsaved: Mapping[Path, str] = MappingProxyType({}),
     outside: Outside = NOTHING,
+    tries_profiles: bool = True,
 ) -> Compilation:
     """Compile a robot's file (a path, a folder with a `robot.yaml`, or `rbx:...`) and report all its mistakes.
 
     `overlays` are files that change it. `unsaved` are texts from an editor, by the real path of the file that each
     replaces. `outside` is what it has of other robots. If no profile was chosen, each profile is tried as
-    well, so that a broken one is found before it is used.
+    well, so that a broken one is found before it is used, unless `tries_profiles` is false.
     """
 
     parsed: dict[tuple[str, str], ParsedText] = {}  # a profile changes no text
@@ -81,7 +86,7 @@ def compile_robot(
         return out
 
     out = compiled(profiles)
-    if out.robot is not None and not profiles:
+    if out.robot is not None and not profiles and tries_profiles:
         steps = sum(len(mission.program.nodes) for mission in out.robot.missions.values())
         steps = max(LEAST_STEPS, steps + _steps_to_read(out.sources))
         keys = out.robot.manifest.profile_keys  # a profile is tried with its own value of what `--set` replaces
@@ -113,6 +118,29 @@ def robot_for_mission(out: Compilation, name: str) -> tuple[Robot, Plan] | None:
         return None
     left = with_missions(robot, wanted)
     return left, build_plan(left)
+
+
+@one_compile()
+@paused_collection()
+def look_at_mission(
+    robot: Robot, name: str, environment: Mapping[str, str], unsaved: Mapping[Path, str]
+) -> tuple[Report, Mapping[str, str]]:
+    """Return what is wrong with the newest text of one mission, and the texts that the findings point into.
+
+    The robot was compiled before. Its own rules are left out: only `compile_robot` sees what a mission does to it.
+    """
+    report, sources = Report(), Texts(unsaved)
+    skills = names_of_skills(robot.components, robot.outside)
+    read = read_missions(robot.manifest, environment, report, sources, skills, only=name).read
+    if (mission := read.get(name)) is not None:
+        missions = {**robot.missions, name: mission}
+        known = skills_of(robot.components, [one.program for one in missions.values()], robot.outside)
+
+        def find(rule: Rule[Any], subject: Robot | Examined) -> list[Finding]:
+            return findings_of(rule, subject) if getattr(subject, "program", None) is mission.program else []
+
+        run_checks(replace(robot, missions=missions, skills=known), report, find)
+    return report, sources
 
 
 def _with_used(robot: Robot, name: str) -> set[str]:

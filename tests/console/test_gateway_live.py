@@ -498,6 +498,14 @@ def test_anyone_stops_and_releases_the_robot(robot: Robot) -> None:
     browse(stop)
 
 
+def test_the_editor_of_missions_answers_from_a_process_of_its_own(robot: Robot) -> None:
+    async def ask(browser: Browser) -> None:
+        answer = await browser.calls("/console/mission/read", mission="patrol")
+        assert answer == {"success": False, "message": "the robot has no mission 'patrol'", "answer": None}
+
+    browse(ask)
+
+
 def test_a_slow_reader_delays_nobody(robot: Robot) -> None:
     async def run() -> None:
         async with connect(f"ws://{HOST}/") as slow, connect(f"ws://{HOST}/") as fast:

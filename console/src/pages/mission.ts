@@ -16,6 +16,8 @@ import {
   type Status,
   type Tested,
 } from "../mission";
+import { MissionEditor } from "../mission_editor";
+import { newMission } from "../new_mission";
 import type { Page, Robot } from "../page";
 import { isMessage, type Json } from "../rosbridge";
 import "./mission.css";
@@ -85,6 +87,7 @@ class MissionView {
   #folded = new Set<string>();
   #untried = new Map<number, string[]>();
   #headOf = "";
+  #editor: MissionEditor | null = null;
 
   constructor(robot: Robot) {
     this.#robot = robot;
@@ -98,6 +101,7 @@ class MissionView {
 
   close(): void {
     this.#look();
+    this.#editor?.close();
     for (const close of this.#closers) close();
   }
 
@@ -116,13 +120,22 @@ class MissionView {
         return button;
       }),
     );
-    this.#list.hidden = missions.length < 2;
+    if (this.#robot.config.role === "configure") {
+      const make = h("button", { type: "button", class: "new-mission" }, icon("edit"), "New mission");
+      make.onclick = async () => {
+        const name = await newMission(this.#robot, this.element);
+        if (name) this.#edit(name);
+      };
+      this.#list.append(make);
+    }
+    this.#list.hidden = this.#list.childElementCount < 2;
     if (wanted && wanted !== this.#chosen) this.#choose(wanted);
     this.#showHead();
   }
 
   #choose(name: string): void {
     this.#look();
+    this.#edit("");
     this.#chosen = name;
     this.#seen = null;
     this.#drawn = "";
@@ -154,7 +167,10 @@ class MissionView {
     const key = `${mission.name} ${isActive} ${mission.state}`;
     if (key === this.#headOf) return;
     this.#headOf = key;
-    const title = h("div", { class: "mission-title" }, h("h2", {}, formatName(mission.name)), stateChip(mission.state));
+    const edit = h("button", { type: "button" }, icon("edit"), "Edit");
+    edit.onclick = () => this.#edit(mission.name);
+    edit.hidden = this.#editor !== null;
+    const title = h("div", { class: "mission-title" }, h("h2", {}, formatName(mission.name)), stateChip(mission.state), edit);
     this.#head.replaceChildren(title, h("p", { class: "label" }, mission.about));
     if (isActive) {
       const paused = mission.state === "paused";
@@ -169,6 +185,19 @@ class MissionView {
     } else {
       this.#head.append(this.#startForm(mission));
     }
+  }
+
+  /** Shows the editor of a mission in place of its steps; without a name, the steps again. */
+  #edit(name: string): void {
+    this.#editor?.close();
+    this.#editor?.element.remove();
+    this.#editor = name ? new MissionEditor(this.#robot, name, () => this.#edit("")) : null;
+    if (this.#editor) this.element.append(this.#editor.element);
+    this.#isChosenByHand ||= this.#editor !== null; // another mission that starts does not take the text away
+    this.#tree.hidden = this.#side.hidden = this.#editor !== null;
+    this.element.classList.toggle("edits", this.#editor !== null);
+    this.#headOf = "";
+    this.#showHead();
   }
 
   #button(picture: Icon, text: string, request: string): HTMLElement {

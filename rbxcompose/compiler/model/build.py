@@ -52,14 +52,17 @@ def read_missions(
     report: Report,
     sources: dict[str, str],
     skills: Collection[str],
+    only: str = "",
 ) -> ReadMissions:
     """Read the robot's mission files; one with mistakes is kept as far as it could be read.
 
-    `skills` are the names of all existing skills.
+    `skills` are the names of all existing skills; `only` is the one mission to read, all if it is empty.
     """
     found: dict[str, RobotMission] = {}
     budget, there = Budget(), frozenset(skills)
     for name, entry in manifest.missions.items():
+        if only and name != only:
+            continue
         root = read_mission(
             entry.path,
             robot=manifest.name,

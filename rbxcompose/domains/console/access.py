@@ -56,6 +56,17 @@ _SERVICES = {
     "/console/stop": Role.VIEW,  # whoever sees that something goes wrong
     "/console/ask": Role.VIEW,  # the request decides
     "/console/log": Role.VIEW,
+    "/console/mission/check": Role.VIEW,  # of a text that nobody else sees
+    "/console/mission/edit": Role.VIEW,
+    "/console/mission/form": Role.VIEW,
+    "/console/mission/new": Role.CONFIGURE,
+    "/console/mission/palette": Role.VIEW,
+    "/console/mission/look": Role.VIEW,
+    "/console/mission/read": Role.VIEW,
+    "/console/mission/save": Role.CONFIGURE,
+    "/console/mission/templates": Role.VIEW,
+    "/console/mission/test": Role.OPERATE,
+    "/console/mission/try": Role.OPERATE,
     "/console/tested": Role.VIEW,
     "/console/save": Role.CONFIGURE,
     "/rosapi/set_param": Role.CONFIGURE,

@@ -11,6 +11,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -212,6 +213,14 @@ class SaveSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class EditMission:
+    """Pass a request to the editor of missions, and its answer to `Bridge.robot_answered`."""
+
+    number: int
+    request: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
 class TailLog:
     """Read the robot's log behind a place, and pass it to `Bridge.robot_answered`."""
 
@@ -261,6 +270,7 @@ BusRequest = (
     | CancelGoal
     | AskRobot
     | SaveSettings
+    | EditMission
     | TailLog
     | ReadTested
     | Watch
@@ -1260,6 +1270,19 @@ class Bridge:
             raise WrongMessageError("'names' are components, or their parameters: 'battery', 'battery.runtime'")
         self._requests.append(SaveSettings(number, tuple(names), given.get("dry_run") is True))
 
+    def _mission_service(self, client: _Client, given: Mapping[str, Any], number: int, name: str) -> None:
+        request: dict[str, Any] = {"do": name}
+        for key in ("mission", *MISSION_TEXTS[name]):
+            value = given.get(key)
+            if not isinstance(value, _EDITED.get(key, str)):
+                raise WrongMessageError(f"'{key}' is missing, or of another type")
+            request[key] = value
+        if given.get("dry_run") is True:
+            request["dry_run"] = True
+        elif name in _WRITES:
+            self._note(client, f"{_WRITES[name]} the mission {_short(request['mission'])}")
+        self._requests.append(EditMission(number, request))
+
     def _rosapi(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
         """Return the answer of `/rosapi/NAME`."""
         found = rosapi.answer(name, given, self._graph, self._stamp)
@@ -1400,6 +1423,23 @@ _OPERATIONS: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any]], None]] 
 _ANSWERED = frozenset({"call_service", "send_action_goal"})  # operations whose refusal is an answer of their own
 
 
+MISSION_TEXTS: Mapping[str, tuple[str, ...]] = {
+    "check": ("text",),
+    "edit": ("text", "operation"),
+    "form": ("text", "path"),
+    "look": ("text",),
+    "new": ("template",),
+    "palette": (),
+    "read": (),
+    "save": ("text", "hash"),
+    "templates": (),
+    "test": (),
+    "try": ("text",),
+}
+"""What can be asked about the text of a mission, with its arguments besides `mission`."""
+_WRITES = {"new": "makes", "save": "saves"}
+_EDITED: Mapping[str, type] = {"operation": dict, "path": list}
+"""The types of those arguments that are no texts."""
 _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str, Any] | None]] = {
     "/console/ask": Bridge._ask_service,
     "/console/drive": Bridge._drive_service,
@@ -1408,6 +1448,7 @@ _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str,
     "/console/save": Bridge._save_service,
     "/console/stop": Bridge._stop_service,
     "/console/tested": Bridge._tested_service,
+    **{f"/console/mission/{name}": partial(Bridge._mission_service, name=name) for name in MISSION_TEXTS},
 }
 """Services of the gateway: what answers, or None if the answer comes later."""
 _PARAMETERS: Mapping[str, tuple[Callable[[Bridge, Mapping[str, Any], int], None], tuple[str, ...]]] = {

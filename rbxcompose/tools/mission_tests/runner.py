@@ -522,14 +522,12 @@ class Verdict:
         return not self.problems
 
 
-def run_trial(trial: Trial) -> Verdict:
-    """Run a test: the mission alone if the test answers everything that it needs, else the whole robot."""
-    seen = SeenWays()
-    if trial.is_complete:
-        record = TrialStage(trial, seen).run()
-    else:
-        pass
+def run_trial(trial: Trial, seen: SeenWays | None = None) -> Verdict:
+    """Run a test: the mission alone if the test answers everything that it needs, else the whole robot.
 
-        record = RobotRun(trial, seen).run()
+    `seen` may observe more than the paths that were taken.
+    """
+    seen = seen or SeenWays()
+    record = TrialStage(trial, seen).run() if trial.is_complete else RobotRun(trial, seen).run()
     types = {name: datum.type for name, datum in trial.program.data.items()}
     return Verdict(trial, record, judge(trial.expect, record, types), seen)

@@ -42,6 +42,7 @@ from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import NAME, Guest
 from rbxcompose.commands.lookup import place_of
 from rbxcompose.domains.console.access import LOCAL_NAMES, Door, Role, network_names, own_secret, role_of, secret_path
+from rbxcompose.domains.console.editor_process import EditorProcess
 from rbxcompose.domains.console.foxglove_server import FoxgloveServer, RobotAccess
 from rbxcompose.domains.console.lease import DriveLimits
 from rbxcompose.domains.console.log_tail import findings, tail
@@ -55,6 +56,7 @@ from rbxcompose.domains.console.protocol import (
     Bridge,
     BusRequest,
     CancelGoal,
+    EditMission,
     GoalEnd,
     GoalFeedback,
     Publish,
@@ -108,6 +110,8 @@ _GOODBYE = 3.0  # [s] to wait for the thread to end
 _STOPPED = 1.0  # [s] for all processes to answer to a stop over the bus
 _SHY = 5.0  # [s] for a client to say who it is
 _SAVING = 30.0  # [s] for a save
+_TRYING = 90.0  # [s] for a dry run, and for the tests of a mission
+_LONG = ("test", "try")
 _LONGEST_LOGIN = 4096  # [bytes]
 _COOKIE_AGE = 365 * 24 * 3600  # [s]
 _POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; object-src 'none'"
@@ -469,6 +473,8 @@ class GatewaySession:
         self._foxglove: FoxgloveServer | None = None
         self.trouble = ""  # what is not served beside the page
         self._saving = asyncio.Lock()
+        self._editor = EditorProcess(folder.path.name)
+        self._trier = EditorProcess(folder.path.name, patience=_TRYING)  # so that nobody who types waits for it
         self._watches: dict[str, asyncio.Task[None]] = {}  # by window
         guest.scheduler.on_error = lambda owner, error: self._loop.call_exception_handler(
             {"message": str(error), "exception": error}
@@ -514,6 +520,8 @@ class GatewaySession:
                 timer.cancel()
         for task in self._tasks:
             task.cancel()
+        self._editor.close()
+        self._trier.close()
         if self._foxglove is not None:
             self._foxglove.close()
         self._graph.close()
@@ -834,6 +842,8 @@ class GatewaySession:
                 self._begin(self._read_log(request))
             case ReadTested(number, mission):
                 self._begin(self._read_tested(number, mission))
+            case EditMission(number, asked):
+                self._begin(self._edit_mission(number, asked))
             case SaveSettings():
                 self._begin(self._save(request))
             case Watch():
@@ -1036,6 +1046,12 @@ class GatewaySession:
             except (subprocess.TimeoutExpired, ValueError) as error:
                 answer, refusal = None, f"it was not saved: {type(error).__name__}"
         self._bridge.robot_answered(request.number, answer, refusal)
+        self._pump()
+
+    async def _edit_mission(self, number: int, request: Mapping[str, Any]) -> None:
+        process = self._trier if request["do"] in _LONG else self._editor
+        answer, refusal = await process.ask(request)
+        self._bridge.robot_answered(number, answer, refusal)
         self._pump()
 
     async def _asked(

@@ -1,0 +1,64 @@
+/** What came of a dry run of a mission, or of its tests, below its text. */
+import { h, icon, type Icon } from "./dom";
+import type { Path } from "./edited";
+
+export interface DryRun {
+  /** Empty if the mission has not ended; `why` tells more. */
+  outcome: string;
+  why: string;
+  /** [s] of robot time */
+  time: number;
+  left_out: number;
+  story: { time: number; text: string; is_bad: boolean }[];
+  statuses: { path: Path; status: string }[];
+}
+
+export interface TestReport {
+  tests: { name: string; passed: boolean; outcome: string; problems: { message: string; place: string }[] }[];
+  coverage: { ways: number; taken: number; missing: { mission: string; line: number; way: string }[] };
+}
+
+/** Returns how a dry run ended, in a sentence. */
+export function ending({ outcome, why, time }: DryRun): string {
+  const when = `after ${Number(time.toFixed(1))} s of robot time`;
+  if (!outcome) return `Not ended: ${why}`;
+  return `It ended in ${outcome} ${when}${why ? `: ${why}` : ""}`;
+}
+
+/** Returns how many tests passed and how many ways they took, in a sentence. */
+export function tested({ tests, coverage }: TestReport): string {
+  const passed = tests.filter((one) => one.passed).length;
+  return `${passed} of ${tests.length} test${tests.length === 1 ? "" : "s"} passed; they took ${coverage.taken} of ${coverage.ways} ways.`;
+}
+
+export function showDryRun(run: DryRun): HTMLElement {
+  const isGood = run.outcome === "success";
+  const lines = run.story.map(({ time, text, is_bad: isBad }) => {
+    const line = h("li", {}, h("time", {}, `${time.toFixed(1)} s`), ` ${text}`);
+    if (isBad) line.prepend(icon("warning"));
+    return line;
+  });
+  const left = run.left_out > 0 ? [h("p", { class: "label" }, `${run.left_out} lines before these are left out.`)] : [];
+  const story = h("ol", { class: "lines", tabindex: "0", "aria-label": "Story of the dry run" }, ...lines);
+  return card("Dry run", isGood ? "check" : run.outcome ? "cross" : "wait", ending(run), ...left, story);
+}
+
+export function showTests(report: TestReport): HTMLElement {
+  const rows = report.tests.map((one) =>
+    h(
+      "li",
+      { "data-passed": String(one.passed) },
+      icon(one.passed ? "check" : "cross"),
+      h("span", {}, `${one.name}: ${one.passed ? "passed" : "failed"}`),
+      ...one.problems.map(({ message, place }) => h("p", { class: "label" }, `${message} ${place}`)),
+    ),
+  );
+  const missing = report.coverage.missing.map(({ way, line }) => h("li", { class: "label" }, `not tested: ${way} (line ${line})`));
+  const all = report.tests.every((one) => one.passed);
+  return card("Tests", all ? "check" : "cross", tested(report), h("ul", { class: "lines", tabindex: "0", "aria-label": "Tests" }, ...rows, ...missing));
+}
+
+function card(title: string, picture: Icon, words: string, ...more: Node[]): HTMLElement {
+  const head = h("p", { role: "status", class: "trial-head" }, icon(picture), words);
+  return h("section", { class: "trial", "aria-label": title }, h("h2", {}, title), head, ...more);
+}

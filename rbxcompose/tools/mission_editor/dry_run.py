@@ -1,0 +1,130 @@
+"""A mission on the simulated robot and the stepped clock, as tests of missions run it: what came of it, and the story.
+
+Nothing of the robot that is up takes part: its bus, its devices and its mission are not touched.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from rbxcompose.base.findings import Severity, Span
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Refused
+from rbxcompose.compiler.compile import Compilation, robot_for_mission
+from rbxcompose.manifest.files import shown_name
+from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING
+from rbxcompose.sdk.capabilities import RunsProgram
+from rbxcompose.sdk.registry import declared
+from rbxcompose.tools.mission_editor.outline import Block, MissionOutline
+from rbxcompose.tools.mission_tests.coverage import SeenWays
+from rbxcompose.tools.mission_tests.finding_files import tests_of
+from rbxcompose.tools.mission_tests.model import RUNS, Expectations, Trial
+from rbxcompose.tools.mission_tests.runner import run_trial
+
+LONGEST = 600.0  # [s] of robot time
+MOST_LINES = 500  # of the story
+MOST_TESTS = 50
+TESTING = 80.0  # [s]
+
+
+class _Statuses(SeenWays):
+    """Observes how each node ended last, by its number."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.last: dict[int, int] = {}
+
+    def started(self, number: int, /) -> None:
+        """Handle the start of a node."""
+        self.last[number] = RUNNING
+
+    def ended(self, number: int, status: int, outcome: str, /) -> None:
+        """Handle the end of a node; one that was halted has not ended."""
+        self.last[number] = RUNNING if status == IDLE else status
+
+
+def dry_run(made: Compilation, mission: str, path: Path, text: str) -> dict[str, Any]:
+    """Run a mission of a compiled robot, and return its `outcome`, the `story`, and the `statuses` of its blocks.
+
+    Raises:
+        Refused: if the robot or the mission has errors, or starts programs.
+    """
+    found = robot_for_mission(made, mission) if made.robot is not None and mission in made.robot.missions else None
+    if found is None:
+        errors = [one for one in made.report if one.severity is Severity.ERROR]
+        raise Refused(f"it cannot run yet: {errors[0].message}" if errors else "it cannot run yet")
+    robot, plan = found
+    started = [one.name for one in plan.instances if declared(one.type, one.config, RunsProgram)]
+    if started:
+        raise Refused(f"'{started[0]}' would start a program: try it with 'rbxcompose test'")
+    program, names = robot.missions[mission].program, robot.names
+    linked, seen = link(program, names.missions), _Statuses()
+    where = Span(program.file, 1, 1, 1, 1)
+    inputs: Any = robot.missions[mission].inputs
+    trial = Trial(
+        "dry run", "", program.file, where, mission, program, linked, names, plan, inputs, {}, (),
+        Expectations(until=LONGEST), is_complete=False,
+    )  # fmt: skip
+    record = run_trial(trial, seen).record
+    outcome = "" if record.outcome == RUNS else record.outcome
+    lines = record.lines[-MOST_LINES:]
+    return {
+        "outcome": outcome,
+        "why": record.trouble or ("" if outcome else f"it has not ended after {LONGEST:g} s of robot time"),
+        "time": record.now,
+        "left_out": len(record.lines) - len(lines),
+        "story": [{"time": line.time, "text": line.text, "is_bad": line.level is not Level.OK} for line in lines],
+        "statuses": _by_block(MissionOutline(text), shown_name(path), linked.nodes, seen.last),
+    }
+
+
+def _by_block(outline: MissionOutline, file: str, nodes: Any, statuses: dict[int, int]) -> list[dict[str, Any]]:
+    """Return the status of each block whose node began."""
+    told: dict[tuple[str | int, ...], str] = {}
+    for node in nodes:
+        if node.number in statuses and node.span.file == file:
+            offset = outline.lines.starts[min(node.span.line, len(outline.lines.lines)) - 1] + node.span.column - 1
+            block = _innermost(outline.blocks, offset)
+            if block is not None:
+                told[block.path] = NAMES[statuses[node.number]]
+    return [{"path": list(path), "status": status} for path, status in told.items()]
+
+
+def _innermost(blocks: list[Block], offset: int) -> Block | None:
+    for block in blocks:
+        if block.start <= offset < block.end:
+            return _innermost(block.children, offset) or block
+    return None
+
+
+def run_tests(project: Path, mission: str) -> str:
+    """Run the tests of a mission with coverage, as `rbxcompose test` does, and return its report in JSON.
+
+    Raises:
+        Refused: if there are none, or they take too long.
+    """
+    folder = project / "missions"
+    named = re.compile(rf"^mission:\s*['\"]?{re.escape(mission)}['\"]?\s*(#.*)?$", re.MULTILINE)
+    files = [file for file in (tests_of([folder]) if folder.is_dir() else ()) if named.search(_text(file))]
+    if not files:
+        raise Refused(f"there are no tests of '{mission}' in 'missions/'")
+    command = [sys.executable, "-m", "rbxcompose", "test", "--coverage", "--json", *map(str, files[:MOST_TESTS])]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=TESTING, check=False, cwd=project)
+    except subprocess.TimeoutExpired as error:
+        raise Refused(f"the tests take more than {TESTING:g} s: run 'rbxcompose test'") from error
+    if not done.stdout.startswith("{"):
+        raise Refused(done.stderr.strip()[-500:] or "the tests did not run")
+    return done.stdout
+
+
+def _text(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""

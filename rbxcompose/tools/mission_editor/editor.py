@@ -1,0 +1,289 @@
+"""The missions of a robot as texts that people edit: read, checked as they are typed, and saved.
+
+The text is the document: nothing here writes YAML anew. Only files of the robot's own project are changed, each as a
+whole or not at all, and only if it is still the file that was read.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Mapping
+from difflib import unified_diff
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import open_regular, replace_file
+from rbxcompose.base.findings import Finding, Severity, Span
+from rbxcompose.base.fixes import places
+from rbxcompose.base.garbage_collection import paused_collection
+from rbxcompose.base.requests import Refused
+from rbxcompose.compiler.compile import Compilation, look_at_mission
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.manifest.files import project_of, shown_name
+from rbxcompose.manifest.tree import FILE_BYTES
+from rbxcompose.tools.mission_editor.new_mission import make_mission, templates
+from rbxcompose.tools.mission_editor.outline import MissionOutline, told
+from rbxcompose.tools.mission_editor.palette import form, palette
+from rbxcompose.tools.mission_editor.patches import change, path_of
+from rbxcompose.tools.mission_editor.units import Utf16
+
+MOST_FINDINGS = 200
+BYTE_ORDER_MARK = "\ufeff"
+_AROUND = 2  # lines shown around a change
+_MOST_LINES = 2000  # of a difference
+
+Compile = Callable[[Mapping[Path, str]], Compilation]
+
+
+@dataclass(frozen=True, slots=True)
+class ReadText:
+    """A mission's file as it is on disk; `text` has lines that end with a line feed, and no byte order mark."""
+
+    path: Path
+    text: str
+    hash: str
+    line_end: str
+    has_mark: bool
+
+    def encoded(self, text: str) -> bytes:
+        """Return another text as this file has it.
+
+        Raises:
+            Refused: if it cannot be written.
+        """
+        whole = text.replace("\n", self.line_end)
+        try:
+            data = f"{BYTE_ORDER_MARK if self.has_mark else ''}{whole}".encode()
+        except UnicodeEncodeError as error:
+            raise Refused("the text has characters that no file can hold") from error
+        if len(data) > FILE_BYTES:
+            raise Refused(f"the text is larger than {FILE_BYTES:,} bytes")
+        return data
+
+
+class MissionEditor:
+    """Answers requests about the missions of one robot.
+
+    `compiled` compiles it with unsaved texts, as `check` does; `simulated` does so without any real device.
+    """
+
+    def __init__(self, compiled: Compile, file: Path, simulated: Compile | None = None) -> None:
+        self._compiled, self._simulated = compiled, simulated or compiled
+        self._file = file.resolve()
+        self._project = project_of(self._file)
+        self._robot: Robot | None = None
+
+    def answer(self, request: Mapping[str, Any]) -> Any:
+        """Return the answer to a request: its `do`, the name of a `mission`, and what else it needs.
+
+        Raises:
+            Refused: with the reason.
+        """
+        return REQUESTS[request["do"]](self, request)
+
+    # What a page asks
+
+    def _read(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the text of a mission with what is wrong with it."""
+        name = request["mission"]
+        self._compile({})
+        read = self._read_file(name)
+        shown = {"file": self._shown(read.path), "text": read.text, "hash": read.hash}
+        return {**shown, "why_not": self._why_not(read.path), **self._looked_at(name, read.text)}
+
+    def _look(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what is wrong with a text, as far as that is known at once."""
+        return self._looked_at(request["mission"], request["text"])
+
+    def _edit(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Return how a change of the outline changes the text, and the block that is chosen afterwards."""
+        text, units = request["text"], Utf16(request["text"])
+        with paused_collection():
+            made = change(text, request["operation"])
+        edits = [{"from": units.at(one.start), "to": units.at(one.end), "text": one.text} for one in made.edits]
+        return {"edits": edits, "chosen": list(made.chosen)}
+
+    def _palette(self, request: Mapping[str, Any]) -> list[dict[str, str]]:
+        """Return what can be put into a mission of this robot."""
+        return palette(self._known, self._path(request["mission"]))
+
+    def _form(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the values of a block that can be typed in one line."""
+        path = path_of(request["path"])
+        return form(self._known, self._path(request["mission"]), request["text"], path)
+
+    def _templates(self, request: Mapping[str, Any]) -> list[dict[str, str]]:
+        """Return the templates of new missions."""
+        return templates()
+
+    def _new(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Write a new mission from a template into the project, and into the robot's file."""
+        self._compile({})
+        name, template = request["mission"], request["template"]
+        path = make_mission(self._known, self._file, self._project, name, template, self._compiled)
+        self._compile({})
+        return {"file": self._shown(path)}
+
+    def _try(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Run a text on the simulated robot, and return what came of it."""
+        from rbxcompose.tools.mission_editor.dry_run import dry_run
+
+        path, text = self._path(request["mission"]), request["text"]
+        return dry_run(self._simulated({path: text}), request["mission"], path, text)
+
+    def _test(self, request: Mapping[str, Any]) -> Any:
+        """Run the tests of a mission as it is on disk."""
+        from rbxcompose.tools.mission_editor.dry_run import run_tests
+
+        self._path(request["mission"])
+        return json.loads(run_tests(self._project, request["mission"]))
+
+    def _check(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Return all that `check` finds with a text in place of a mission's file."""
+        path = self._path(request["mission"])
+        made = self._compile({path: request["text"]}, keeps=False)
+        return self._told(path, request["text"], made.report)
+
+    def _save(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Write a text into a mission's file, or with `dry_run` only show the difference."""
+        name, text = request["mission"], request["text"]
+        read = self._read_file(name)
+        if why := self._why_not(read.path):
+            raise Refused(why)
+        if read.hash != request["hash"]:
+            raise Refused(f"'{self._shown(read.path)}' has changed on disk since it was opened: load it again")
+        data = read.encoded(text)
+        if request.get("dry_run") is True:
+            return {"diff": self._difference(read, text), **self._check(request)}
+        try:
+            if read.path.resolve() != read.path:
+                raise Refused(f"'{self._shown(read.path)}' has become a link")
+            replace_file(read.path, data)
+        except OSError as error:
+            raise Refused(f"'{self._shown(read.path)}' was not saved: {error.strerror}") from error
+        self._compile({})
+        return {"hash": _hash(data), "file": self._shown(read.path)}
+
+    # How it is done
+
+    def _compile(self, unsaved: Mapping[Path, str], *, keeps: bool = True) -> Compilation:
+        """Compile the robot; keep it, if its missions are still known, for what is asked next."""
+        made = self._compiled(unsaved)
+        if keeps and made.robot is not None:
+            self._robot = made.robot
+        return made
+
+    @property
+    def _known(self) -> Robot:
+        if self._robot is None:
+            self._compile({})
+        if self._robot is None:
+            raise Refused("the robot's file cannot be read: 'rbxcompose check' tells why")
+        return self._robot
+
+    def _path(self, mission: str) -> Path:
+        entry = self._known.manifest.missions.get(mission)
+        if entry is None:
+            raise Refused(f"the robot has no mission '{mission[:60]}'")
+        return entry.path
+
+    def _read_file(self, mission: str) -> ReadText:
+        path = self._path(mission)
+        shown = self._shown(path)
+        try:
+            with open_regular(path, follow=False) as file:
+                data = file.read(FILE_BYTES + 1)
+        except OSError as error:
+            raise Refused(f"'{shown}' cannot be read: {error.strerror}") from error
+        if len(data) > FILE_BYTES:
+            raise Refused(f"'{shown}' is larger than {FILE_BYTES:,} bytes")
+        try:
+            text = data.decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise Refused(f"'{shown}' is not UTF-8: there is a wrong byte at {error.start}") from error
+        has_mark = text.startswith(BYTE_ORDER_MARK)
+        text = text.removeprefix(BYTE_ORDER_MARK)
+        line_end = "\r\n" if "\r\n" in text else "\n"
+        plain = text.replace("\r\n", "\n")
+        if "\r" in plain or plain.replace("\n", line_end) != text:
+            raise Refused(f"the lines of '{shown}' end in different ways: use another editor")
+        return ReadText(path, plain, _hash(data), line_end, has_mark)
+
+    def _why_not(self, path: Path) -> str:
+        """Return why a file cannot be changed here; empty if it can."""
+        shown = self._shown(path)
+        if not path.is_relative_to(self._project):
+            return f"'{shown}' belongs to the library: copy it into the project to change it"
+        return "" if os.access(path, os.W_OK) else f"'{shown}' is not writable"
+
+    def _shown(self, path: Path) -> str:
+        return str(path.relative_to(self._project)) if path.is_relative_to(self._project) else shown_name(path)
+
+    def _looked_at(self, mission: str, text: str) -> dict[str, Any]:
+        path = self._path(mission)
+        report, _ = look_at_mission(self._known, mission, os.environ, {path: text})
+        with paused_collection():
+            outline = MissionOutline(text)
+        return {**self._told(path, text, report), "outline": told(outline, Utf16(text).at)}
+
+    def _told(self, path: Path, text: str, report: Any) -> dict[str, Any]:
+        """Return findings as data: those of the text with their offsets and fixes, others with their places."""
+        units, shown = Utf16(text), shown_name(path)
+        found = sorted(report, key=lambda one: (one.span is None, one.span or ()))
+        own = [one for one in found if one.span is not None and one.span.file == shown]
+        others = [one for one in found if one.span is None or one.span.file != shown]
+        fixes = [one.fix for one in own if one.fix is not None]
+        applied = dict(zip(map(id, fixes), places(fixes, {shown: text}), strict=True))
+        findings = [self._finding(one, units) for one in own[:MOST_FINDINGS]]
+        for data, one in zip(findings, own, strict=False):
+            if one.fix is not None and (edits := applied[id(one.fix)]):
+                moved = [
+                    {"from": units.at(edit.start), "to": units.at(edit.end), "text": edit.text}
+                    for edit in edits
+                    if not edit.is_guard
+                ]
+                data["fix"] = {"title": one.fix.title, "edits": moved}
+        errors = sum(one.severity is Severity.ERROR for one in own)
+        elsewhere = [{**_words(one), "place": str(one.span or "")} for one in others[:MOST_FINDINGS]]
+        return {"findings": findings, "errors": errors, "count": len(own), "elsewhere": elsewhere}
+
+    def _finding(self, finding: Finding, units: Utf16) -> dict[str, Any]:
+        span = finding.span or Span("", 1, 1, 1, 1)
+        start, end = units.place(span.line, span.column), units.place(span.end_line, span.end_column)
+        return {**_words(finding), "from": start, "to": max(start, end), "line": span.line, "fix": None}
+
+    def _difference(self, read: ReadText, text: str) -> list[str]:
+        old, new = read.text.split("\n"), text.split("\n")
+        lines = list(unified_diff(old, new, "on disk", "here", n=_AROUND, lineterm=""))[2:]
+        left = len(lines) - _MOST_LINES
+        return lines if left <= 0 else [*lines[:_MOST_LINES], f"@@ and {left} more lines @@"]
+
+
+REQUESTS: Mapping[str, Callable[[MissionEditor, Mapping[str, Any]], Any]] = MappingProxyType(
+    {
+        "check": MissionEditor._check,
+        "edit": MissionEditor._edit,
+        "form": MissionEditor._form,
+        "look": MissionEditor._look,
+        "new": MissionEditor._new,
+        "palette": MissionEditor._palette,
+        "read": MissionEditor._read,
+        "save": MissionEditor._save,
+        "templates": MissionEditor._templates,
+        "test": MissionEditor._test,
+        "try": MissionEditor._try,
+    }
+)
+
+
+def _words(finding: Finding) -> dict[str, Any]:
+    message = f"{finding.message} ({finding.label})" if finding.label else finding.message
+    return {"code": finding.code, "severity": str(finding.severity), "message": message, "help": finding.help}
+
+
+def _hash(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()

@@ -1,0 +1,94 @@
+"""A new mission from a template: its file, and its entry in the robot's file, both or none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path, PurePosixPath
+
+from rbxcompose.base.files import read_regular, replace_file
+from rbxcompose.base.findings import Severity
+from rbxcompose.base.requests import Refused
+from rbxcompose.commands.new_files import AnswerError, read_name, write_new
+from rbxcompose.compiler.compile import Compilation
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.manifest.tree import FILE_BYTES
+from rbxcompose.tools.mission_editor.yaml_places import placed
+from rbxcompose.tools.scaffold import MissionAnswers, with_entry
+
+TEMPLATES = Path(__file__).parent / "templates"
+_NAME, _PLACE, _MOST_PLACES = "NAME", "PLACE_", 2
+
+
+def templates() -> list[dict[str, str]]:
+    """Return the names of the templates, each with what it does."""
+    found = []
+    for file in sorted(TEMPLATES.glob("*.yaml")):
+        root = placed(file.read_text(encoding="utf-8"))
+        about = root.get("about") if root is not None else None
+        found.append({"name": file.stem, "about": about.text if about is not None else ""})
+    return found
+
+
+def filled(template: str, name: str, robot: Robot) -> str:
+    """Return the text of a mission: a template with a name and with places of the robot.
+
+    Raises:
+        Refused: if there is no such template.
+    """
+    if template not in {one["name"] for one in templates()}:
+        raise Refused(f"there is no template '{template[:60]}'")
+    text = (TEMPLATES / f"{template}.yaml").read_text(encoding="utf-8")
+    places = [*robot.manifest.places]
+    for number in range(_MOST_PLACES):
+        if places:
+            text = text.replace(f"{_PLACE}{number + 1}", places[number % len(places)])
+    return text.replace(f"name: {_NAME}", f"name: {name}")
+
+
+def make_mission(
+    robot: Robot,
+    file: Path,
+    project: Path,
+    name: str,
+    template: str,
+    compiled: Callable[[Mapping[Path, str]], Compilation],
+) -> Path:
+    """Write a new mission of a robot, and return its file.
+
+    Raises:
+        Refused: if the name is taken, or the robot cannot do what the template does; nothing is written then.
+    """
+    if not file.is_relative_to(project):
+        raise Refused("the robot belongs to the library: make one of your own with 'rbxcompose new robot NAME'")
+    try:
+        read_name(name, "the mission", robot.manifest.missions)
+    except AnswerError as error:
+        raise Refused(error.finding.message) from error
+    answers = MissionAnswers(name, PurePosixPath(file.relative_to(project)))
+    try:
+        before = read_regular(file, FILE_BYTES)
+        with_it = with_entry(before.decode("utf-8"), answers)
+    except (OSError, UnicodeDecodeError) as error:
+        raise Refused("the robot's file cannot be read") from error
+    if with_it is None:
+        raise Refused(f"there is no safe place for it in the robot's file: write '{name}: {answers.entry}' there")
+    path = project / f"missions/{name}.yaml"
+    text = filled(template, name, robot)
+    if (finding := write_new(project, {f"missions/{name}.yaml": text})) is not None:
+        raise Refused(finding.message)
+    try:
+        made = compiled({file: with_it.removeprefix("\ufeff").replace("\r\n", "\n")})
+        known = {(one.code, one.message) for one in compiled({}).report}
+        errors = [one for one in made.report if one.severity is Severity.ERROR and (one.code, one.message) not in known]
+        if errors or made.robot is None or name not in made.robot.missions:
+            why = errors[0].message if errors else "its file cannot be read"
+            raise Refused(f"this robot cannot do that: {why}")
+        if read_regular(file, FILE_BYTES) != before:
+            raise Refused("the robot's file has changed meanwhile: try again")
+        replace_file(file, with_it.encode("utf-8"))
+    except (Refused, OSError) as error:
+        with suppress(OSError):
+            path.unlink()
+        raise error if isinstance(error, Refused) else Refused(f"it was not written: {error.strerror}") from error
+    return path

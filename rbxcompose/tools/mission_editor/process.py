@@ -1,0 +1,85 @@
+"""The process behind the editor of the console: `python -m rbxcompose.tools.mission_editor.process ROBOT`.
+
+It takes a request in JSON from each line of its input, and writes a line with the `answer`, or why it is `refused`. It
+ends with its input. The compiler runs here, so that nothing holds up the gateway, where people drive.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import traceback
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rbxcompose.base.requests import Refused
+from rbxcompose.commands.console import NotDoneError
+from rbxcompose.commands.lookup import find_robot, known_state
+from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.compiler.model.robot import NOTHING
+from rbxcompose.compiler.systems.reader import compile_system
+from rbxcompose.runtime.folder import ChosenLayers
+from rbxcompose.tools.mission_editor.editor import Compile, MissionEditor
+
+_NOT_UP = {"answer": None, "refused": "the robot is not up any more"}
+
+
+def compile_with(file: str, layers: ChosenLayers) -> tuple[Compile, Compile]:
+    """Return what compiles a robot as it runs, and what does so without real devices; its system is read once."""
+    outside = NOTHING
+    if layers.system:
+        system = compile_system(
+            layers.system, environment=os.environ, real=layers.real, profiles=layers.system_profiles
+        )
+        outside = system.robots[layers.member].robot.outside if layers.member in system.robots else NOTHING
+
+    def compiled(unsaved: Mapping[Path, str], *, real: bool = layers.real) -> Compilation:
+        return compile_robot(
+            file,
+            profiles=layers.profiles,
+            overlays=layers.overlays,
+            sets=layers.sets,
+            real=real,
+            environment=os.environ,
+            unsaved=unsaved,
+            outside=outside,
+            tries_profiles=False,
+        )
+
+    return compiled, partial(compiled, real=False)
+
+
+def answer_line(editor: MissionEditor, line: str) -> dict[str, Any]:
+    """Return the answer to one request."""
+    try:
+        return {"answer": editor.answer(json.loads(line)), "refused": ""}
+    except Refused as refusal:
+        return {"answer": None, "refused": str(refusal)}
+    except Exception as error:  # a mistake of ours must not end what others are typing
+        traceback.print_exc()
+        return {"answer": None, "refused": f"the editor has failed: {type(error).__name__}"}
+
+
+def main(robot: str) -> int:
+    """Answer requests until there are no more; `apply` may have brought other layers in between."""
+    editor, state, answers = None, None, sys.stdout
+    sys.stdout = sys.stderr  # whatever a component prints in a dry run is no answer
+    for line in sys.stdin:
+        try:
+            newest = known_state(find_robot(robot))
+        except NotDoneError:
+            newest = None
+        if newest is not None and (state is None or (newest.file, newest.layers) != (state.file, state.layers)):
+            compiled, simulated = compile_with(newest.file, newest.layers)
+            state, editor = newest, MissionEditor(compiled, Path(newest.file), simulated)
+        told = _NOT_UP if editor is None else answer_line(editor, line)
+        answers.write(f"{json.dumps(told)}\n")
+        answers.flush()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

@@ -1,0 +1,92 @@
+"""Texts of missions through the gateway: who may ask for what, and a process that fails."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from typing import Any
+
+import pytest
+
+from rbxcompose.domains.console.access import Role, needed
+from rbxcompose.domains.console.editor_process import MOST_WAITING, EditorProcess
+from rbxcompose.domains.console.protocol import MISSION_TEXTS, EditMission
+from rbxcompose.tools.mission_editor.editor import REQUESTS
+from tests.console.clients import Room
+
+READ = {"mission": "patrol"}
+SAVE = {"mission": "patrol", "text": "x", "hash": "h"}
+ECHO = 'import sys\nfor line in sys.stdin: print(\'{"answer": \' + line.strip() + \', "refused": ""}\', flush=True)'
+DIES = "import sys; sys.stdin.readline()"
+SLEEPS = "import time; time.sleep(60)"
+
+
+def test_a_request_about_a_text_is_passed_on_and_its_answer_comes_back() -> None:
+    room = Room()
+    client = room.client()
+    assert client.does("call_service", service="/console/mission/read", args=READ) == []
+    (asked,) = room.asked()
+    assert isinstance(asked, EditMission)
+    assert asked.request == {"do": "read", "mission": "patrol"}
+    room.bridge.robot_answered(asked.number, {"text": "x"})
+    (answer,) = client.gets()
+    assert answer["values"] == {"success": True, "message": "", "answer": {"text": "x"}}
+
+
+def test_the_gateway_passes_on_all_that_the_editor_answers_each_with_a_role_of_its_own() -> None:
+    assert set(MISSION_TEXTS) == set(REQUESTS)
+    roles = {name: needed({"op": "call_service", "service": f"/console/mission/{name}"}, {}) for name in REQUESTS}
+    assert {name for name, role in roles.items() if role is Role.CONFIGURE} == {"new", "save"}
+    assert {name for name, role in roles.items() if role is Role.OPERATE} == {"test", "try"}
+
+
+def test_who_looks_may_read_and_only_who_configures_may_save() -> None:
+    room = Room()
+    for role in (Role.VIEW, Role.OPERATE):
+        client = room.client(role)
+        assert client.does("call_service", service="/console/mission/look", args=SAVE) == []
+        assert "needs the role 'configure'" in client.calls("/console/mission/save", SAVE)
+    assert room.client().does("call_service", service="/console/mission/save", args=SAVE) == []
+
+
+def test_who_saved_what_is_in_the_log() -> None:
+    room = Room()
+    client = room.client(who="10.0.0.7")
+    client.does("call_service", service="/console/mission/save", args={**SAVE, "dry_run": True})
+    assert not any("saves" in note for note in room.bridge.notes)
+    client.does("call_service", service="/console/mission/save", args=SAVE)
+    assert room.bridge.notes[-1] == "10.0.0.7 (configure): saves the mission patrol"
+
+
+@pytest.mark.parametrize("args", [None, {}, {"mission": 7}, {"mission": "patrol", "text": ["x"], "hash": "h"}, [1, 2]])
+def test_a_request_without_its_arguments_is_refused(args: Any) -> None:
+    room = Room()
+    assert "is missing" in room.client().calls("/console/mission/save", args)
+    assert room.asked() == []
+
+
+def exchange(code: str, *requests: dict[str, Any]) -> list[tuple[Any, str]]:
+    async def ask() -> list[tuple[Any, str]]:
+        process = EditorProcess("robot", (sys.executable, "-c", code), patience=2.0)
+        try:
+            return await asyncio.gather(*(process.ask(request) for request in requests))
+        finally:
+            process.close()
+
+    return asyncio.run(ask())
+
+
+def test_one_process_answers_all_each_what_it_asked() -> None:
+    requests = [{"number": number} for number in range(5)]
+    assert exchange(ECHO, *requests) == [(request, "") for request in requests]
+
+
+@pytest.mark.parametrize("code", [DIES, SLEEPS])
+def test_a_process_that_fails_is_told_and_started_again(code: str) -> None:
+    (first, second) = exchange(code, {}, {})
+    assert first == second == (None, "the editor did not answer, and starts again: what runs is unharmed")
+
+
+def test_too_many_at_once_are_refused() -> None:
+    answers = exchange(ECHO, *[{}] * (MOST_WAITING + 3))
+    assert [refused for _, refused in answers].count("the editor is busy: try again") == 3

@@ -1,0 +1,55 @@
+"""Dry runs: the text as it is typed, on the simulated robot, without a trace on the one that is up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.base.requests import Refused
+from rbxcompose.tools.mission_editor.editor import MissionEditor
+from tests.mission_editor.test_editor import FETCH, ROBOT, ask, editor, project
+
+__all__ = ["editor", "project"]
+
+
+def test_a_text_runs_on_the_simulated_robot_and_tells_its_story(editor: MissionEditor) -> None:
+    told = ask(editor, "try", text=FETCH.replace("wait: 2 s", "log: there"))
+    assert (told["outcome"], told["why"]) == ("success", "")
+    assert any("there" in line["text"] for line in told["story"])
+    assert told["statuses"] == [{"path": ["do", index], "status": "success"} for index in (0, 1)]
+
+
+def test_a_step_that_fails_and_one_that_is_not_reached_are_told_apart(editor: MissionEditor) -> None:
+    told = ask(editor, "try", text=FETCH.replace("wait: 2 s", "check: 1 > 2") + "  - wait: 1 s\n")
+    assert told["outcome"] == "failure"
+    assert [one["status"] for one in told["statuses"]] == ["success", "failure"]
+
+
+def test_a_mission_that_does_not_end_is_ended(editor: MissionEditor) -> None:
+    told = ask(editor, "try", text=FETCH.replace("wait: 2 s", "wait: 2 h"))
+    assert (told["outcome"], told["why"]) == ("", "it has not ended after 600 s of robot time")
+    assert told["statuses"][-1] == {"path": ["do", 1], "status": "running"}
+
+
+def test_a_mission_with_errors_does_not_run(editor: MissionEditor) -> None:
+    with pytest.raises(Refused, match="there is no place 'tabel'"):
+        ask(editor, "try", text=FETCH.replace("table ", "tabel "))
+
+
+def test_a_robot_that_starts_programs_is_not_tried(editor: MissionEditor, project: Path) -> None:
+    robot = project / "robots/fetcher/robot.yaml"
+    robot.write_text(f"{ROBOT}components:\n  other: {{type: program, command: [sleep, '1']}}\n", encoding="utf-8")
+    with pytest.raises(Refused, match="'other' would start a program"):
+        ask(editor, "try", text=FETCH)
+
+
+def test_the_tests_of_a_mission_run_with_coverage(editor: MissionEditor, project: Path) -> None:
+    with pytest.raises(Refused, match="there are no tests of 'fetch'"):
+        ask(editor, "test")
+    test = "rbx: 1\nkind: Test\nname: it_fetches\nrobot: ../robots/fetcher/robot.yaml\nmission: fetch\n"
+    test += "expect:\n  outcome: success\n"
+    (project / "missions/fetch.test.yaml").write_text(test, encoding="utf-8")
+    told = ask(editor, "test")
+    assert [(one["passed"], one["problems"]) for one in told["tests"]] == [(True, [])]
+    assert told["coverage"]["ways"] > told["coverage"]["taken"] > 0

@@ -1,0 +1,66 @@
+"""New missions from templates: each can run as it is, and a refused one leaves nothing behind."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from types import MappingProxyType
+
+import pytest
+
+from rbxcompose.base.requests import Refused
+from rbxcompose.compiler.compile import compile_robot, look_at_mission
+from rbxcompose.tools.mission_editor.editor import MissionEditor
+from rbxcompose.tools.mission_editor.new_mission import filled, templates
+from tests.conftest import ROOT
+from tests.mission_editor.test_editor import FETCH, ROBOT, editor, project
+
+__all__ = ["editor", "project"]
+
+NAMES = [one["name"] for one in templates()]
+PATROLLER = ROOT / "robots/patroller/robot.yaml"
+
+
+@pytest.mark.parametrize("template", NAMES)
+def test_each_template_is_a_mission_without_findings(template: str) -> None:
+    robot = compile_robot(str(PATROLLER), environment=os.environ, tries_profiles=False).robot
+    assert robot is not None
+    path = robot.manifest.missions["patrol"].path
+    text = filled(template, "patrol", robot)
+    report, _ = look_at_mission(robot, "patrol", os.environ, MappingProxyType({path: text}))
+    assert [str(finding) for finding in report] == []
+
+
+def test_each_template_says_what_it_does() -> None:
+    assert NAMES == ["clean_house", "deliver", "dock_when_low", "patrol"]
+    assert all(one["about"].endswith(".") for one in templates())
+
+
+def test_a_new_mission_gets_its_file_and_its_entry(editor: MissionEditor, project: Path) -> None:
+    made = editor.answer({"do": "new", "mission": "rounds", "template": "patrol"})
+    assert made == {"file": "missions/rounds.yaml"}
+    read = editor.answer({"do": "read", "mission": "rounds"})
+    assert "in: [dock, table]" in read["text"]
+    assert read["findings"] == []
+    robot = (project / "robots/fetcher/robot.yaml").read_text(encoding="utf-8")
+    assert robot == ROBOT.replace("missions:\n", "missions:\n  rounds: ../../missions/rounds.yaml\n")
+
+
+@pytest.mark.parametrize(
+    ("name", "template", "why"),
+    [
+        ("fetch", "patrol", "it is taken"),
+        ("No Name", "patrol", "cannot be the name"),
+        ("../x", "patrol", "cannot be the name"),
+        ("rounds", "../templates/patrol", "there is no template"),
+        ("low", "dock_when_low", "this robot cannot do that"),
+    ],
+)
+def test_a_refused_one_leaves_nothing_behind(
+    editor: MissionEditor, project: Path, name: str, template: str, why: str
+) -> None:
+    with pytest.raises(Refused, match=why):
+        editor.answer({"do": "new", "mission": name, "template": template})
+    assert [path.name for path in (project / "missions").iterdir()] == ["fetch.yaml"]
+    assert (project / "missions/fetch.yaml").read_text(encoding="utf-8") == FETCH
+    assert (project / "robots/fetcher/robot.yaml").read_text(encoding="utf-8") == ROBOT

@@ -1,0 +1,91 @@
+"""What can be added to a mission, and the forms of its blocks: all of it as the grammar declares it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rbxcompose.base.requests import Refused
+from rbxcompose.missions.program.registry import kinds
+from rbxcompose.tools.mission_editor.editor import MissionEditor
+from rbxcompose.tools.mission_editor.outline import kind_of
+from rbxcompose.tools.mission_editor.yaml_places import placed
+from tests.mission_editor.test_editor import FETCH, ask, editor, project
+
+__all__ = ["editor", "project"]
+
+TEXT = """rbx: 1
+kind: Mission
+name: fetch
+data:
+  seen: 0
+interrupts:
+  low:
+    when: $seen > 3
+    do: {wait: 1 s}
+do:
+  - go_to: table
+    timeout: 3 s
+  - log: done
+    level: warn
+  - log: |
+      more
+      lines
+  - [{wait: 2 s}]
+"""
+
+
+def fields(editor: MissionEditor, *path: str | int, text: str = TEXT) -> dict[str, Any]:
+    form = ask(editor, "form", text=text, path=list(path))
+    return {field["key"]: field for field in form["fields"]}
+
+
+def test_all_kinds_and_the_skills_of_the_robot_can_be_added_each_as_itself(editor: MissionEditor) -> None:
+    offered = ask(editor, "palette")
+    assert {one["word"] for one in offered if one["sort"] == "kind"} == set(kinds())
+    assert {one["word"]: one["yaml"] for one in offered if one["sort"] == "skill"} == {"go_to": "go_to: dock"}
+    for one in offered:
+        node = placed(one["yaml"])
+        assert node is not None
+        assert kind_of(node) == one["word"]
+        assert one["about"]
+
+
+def test_whatever_can_be_added_makes_a_mission_that_can_be_read(editor: MissionEditor) -> None:
+    for one in ask(editor, "palette"):
+        operation = {"op": "insert", "path": ["do"], "index": 1, "yaml": one["yaml"]}
+        (edit,) = ask(editor, "edit", text=FETCH, operation=operation)["edits"]
+        text = FETCH[: edit["from"]] + edit["text"] + FETCH[edit["to"] :]
+        told = ask(editor, "look", text=text)
+        assert len(told["outline"]["blocks"]) == 3
+        assert not any("unknown key" in found["message"] for found in told["findings"])
+
+
+def test_a_step_has_the_options_of_its_kind_with_values_units_and_names(editor: MissionEditor) -> None:
+    found = fields(editor, "do", 0)
+    assert list(found)[:2] == ["go_to", "timeout"]
+    assert (found["go_to"]["value"], found["go_to"]["choices"]) == ("table", ["dock", "table"])
+    assert (found["timeout"]["value"], found["timeout"]["units"][0]) == ("3 s", "s")
+    assert "$seen" in found["only_if"]["choices"]
+    assert "wait" not in found
+    log = fields(editor, "do", 1)
+    assert (log["level"]["value"], log["level"]["only"]) == ("warn", True)
+    assert fields(editor, "do", 2)["log"]["is_fixed"]
+
+
+def test_an_interrupt_has_a_form(editor: MissionEditor) -> None:
+    assert list(fields(editor, "interrupts", "low")) == ["when", "afterwards"]
+
+
+def test_a_step_that_is_only_a_word_has_the_options_of_that(editor: MissionEditor) -> None:
+    found = fields(editor, "do", 0, text=TEXT.replace("go_to: table\n    timeout: 3 s", "go_to"))
+    assert found["timeout"]["value"] == ""
+
+
+def test_what_has_no_options_is_refused(editor: MissionEditor, project: Path) -> None:
+    paths: tuple[list[Any], ...] = (["do"], ["do", 3], ["do", 9], ["nothing"], [[]])
+    for path in paths:
+        with pytest.raises(Refused):
+            ask(editor, "form", text=TEXT, path=path)
