@@ -13,6 +13,7 @@ from rbxcompose.base.files import NotRegularError, TooLargeError, open_regular, 
 PACKAGE = Path(rbxcompose.__file__).parent
 # What these open is no file that a user names: the package's own data, what the system tells, files of a running robot.
 MAY_OPEN = {
+    "base/fenced_answers.py",
     "base/files.py",
     "base/plugins.py",
     "base/processes.py",
@@ -23,12 +24,14 @@ MAY_OPEN = {
     "commands/verbs.py",
     "domains/arms/motion/linker.py",
     "domains/arms/motion/numba_cache.py",
-    "domains/body/xacro_child.py",
     "domains/console/access.py",
     "domains/console/components/gateway.py",
     "domains/console/log_tail.py",
     "missions/view/tested.py",
     "domains/devices/serial_ports.py",
+    "domains/programs/child.py",
+    "domains/programs/keeper.py",
+    "missions/execution/snapshots.py",
     "msgs/definitions.py",
     "msgs/registry.py",
     "runtime/control.py",
@@ -43,6 +46,8 @@ MAY_OPEN = {
     "testing/clocks.py",
     "testing/golden.py",
     "tools/doctor.py",
+    "tools/mission_editor/dry_run.py",
+    "tools/mission_editor/new_mission.py",
 }
 
 

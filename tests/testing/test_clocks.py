@@ -18,6 +18,11 @@ OWN_TIME = {  # drivers of hardware, simulated hardware, processes and commands,
     "servo_port.py",
     "servo_twin.py",
     "planning_processes.py",
+    "child.py",
+    "editor_process.py",
+    "keeper.py",
+    "ros_bridge.py",
+    "ros_side.py",
 }
 
 

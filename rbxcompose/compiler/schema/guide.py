@@ -37,7 +37,7 @@ class Guide:
             for name, schema in shape["properties"].items()
             if schema is not True
         }
-        return {name: self._whole(described[name]) for name in names}
+        return {name: self._whole(described.get(name, {})) for name in names}
 
     def _whole(self, schema: Schema) -> Schema:
         """Return a schema merged with those it refers to; its own statements take precedence."""

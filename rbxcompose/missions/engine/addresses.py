@@ -16,7 +16,7 @@ _NUMBER = re.compile(r"[0-9]{1,9}")
 _MOST = 3  # lines that are offered instead of one where nothing begins
 
 
-class Spot(NamedTuple):
+class NodeAddress(NamedTuple):
     """A node, and the outcome by which a state is left, if the transition is meant and not the start."""
 
     node: int
@@ -34,7 +34,7 @@ def is_number(where: str) -> bool:
     return _NUMBER.fullmatch(where) is not None
 
 
-def find(program: Program, where: str) -> tuple[Spot, ...]:
+def find(program: Program, where: str) -> tuple[NodeAddress, ...]:
     """Return what a person means in a linked mission: several if a mission that it uses several times has it.
 
     Raises:
@@ -45,7 +45,7 @@ def find(program: Program, where: str) -> tuple[Spot, ...]:
     if is_number(where):
         if int(where) >= len(program.nodes):
             raise NotPossible(f"there is no node {where}; the last one is {len(program.nodes) - 1}")
-        return (Spot(int(where), None, program.nodes[int(where)].span),)
+        return (NodeAddress(int(where), None, program.nodes[int(where)].span),)
     if ARROW in where:
         return _transition(program, *(part.strip() for part in where.split(ARROW, 1)))
     names = {node.name: None for node in program.nodes if node.name}
@@ -54,11 +54,11 @@ def find(program: Program, where: str) -> tuple[Spot, ...]:
     )
 
 
-def _start(node: MissionNode) -> Spot:
-    return Spot(node.number, None, node.span)
+def _start(node: MissionNode) -> NodeAddress:
+    return NodeAddress(node.number, None, node.span)
 
 
-def _only(where: str, found: list[Spot], what: str, valid: dict[str, None]) -> tuple[Spot, ...]:
+def _only(where: str, found: list[NodeAddress], what: str, valid: dict[str, None]) -> tuple[NodeAddress, ...]:
     """Return what was found if it is one place in the text."""
     places = dict.fromkeys(spot.span.place for spot in found)
     if not places:
@@ -68,7 +68,7 @@ def _only(where: str, found: list[Spot], what: str, valid: dict[str, None]) -> t
     return tuple(found)
 
 
-def _transition(program: Program, state: str, to: str) -> tuple[Spot, ...]:
+def _transition(program: Program, state: str, to: str) -> tuple[NodeAddress, ...]:
     every = [
         (f"{node.name}{ARROW}{target}", node.name == state and target == to, _leaving(node, outcome))
         for node in program.nodes
@@ -82,12 +82,12 @@ def _transition(program: Program, state: str, to: str) -> tuple[Spot, ...]:
     return tuple(found)
 
 
-def _leaving(node: MissionNode, outcome: str) -> Spot:
+def _leaving(node: MissionNode, outcome: str) -> NodeAddress:
     keys = node.step.leads_to.keys if node.step.leads_to else {}
-    return Spot(node.number, outcome, keys.get(outcome, node.span))
+    return NodeAddress(node.number, outcome, keys.get(outcome, node.span))
 
 
-def _on_line(program: Program, file: str, line: int) -> tuple[Spot, ...]:
+def _on_line(program: Program, file: str, line: int) -> tuple[NodeAddress, ...]:
     spots = [spot for spot in _spots(program) if _is_file(spot.span.file, file)]
     if not spots:
         files = dict.fromkeys(str(node.span.file) for node in program.nodes)
@@ -106,7 +106,7 @@ def _listed(lines: list[int]) -> str:
     return ", ".join(map(str, lines))
 
 
-def _spots(program: Program) -> Iterator[Spot]:
+def _spots(program: Program) -> Iterator[NodeAddress]:
     """Yield the start of each node and each transition; the line of a list's first item means the item."""
     for node in program.nodes:
         lines = [program.nodes[child].span.line for child in node.children] if isinstance(node.step, InTurn) else []

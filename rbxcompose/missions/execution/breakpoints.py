@@ -8,7 +8,7 @@ from rbxcompose.base.requests import Refused
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import NOWHERE, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions.analysis.examined import Ending
-from rbxcompose.missions.engine.addresses import ARROW, Spot, find, is_line, is_number
+from rbxcompose.missions.engine.addresses import ARROW, NodeAddress, find, is_line, is_number
 from rbxcompose.missions.engine.debugger import named
 from rbxcompose.missions.engine.interventions import ChangeData, ForceResult, JumpToState, NotPossible, SetBreakpoints
 from rbxcompose.missions.execution.errands import Equipment
@@ -28,7 +28,7 @@ class Breakpoints:
 
     def __init__(self, equipment: Equipment) -> None:
         self._equipment = equipment
-        self._set: dict[str, dict[str, tuple[Spot, ...]]] = {}
+        self._set: dict[str, dict[str, tuple[NodeAddress, ...]]] = {}
 
     def of(self, mission: str) -> SetBreakpoints:
         """Return where a mission stops."""
@@ -62,7 +62,7 @@ class Breakpoints:
             if len(active) != 1:
                 raise Refused(f"node {where} of which mission? Add '--mission NAME'")
             mission = active[0]
-        found: dict[str, tuple[Spot, ...]] = {}
+        found: dict[str, tuple[NodeAddress, ...]] = {}
         reasons: dict[str, str] = {}
         for name in [mission] if mission else programs:
             try:
@@ -103,7 +103,7 @@ class Breakpoints:
         """Return a mission with those that it uses."""
         return link(self._equipment.programs[mission], self._equipment.names.missions)
 
-    def _text(self, mission: str, spot: Spot) -> str:
+    def _text(self, mission: str, spot: NodeAddress) -> str:
         node = self.linked(mission).nodes[spot.node]
         leads = node.step.leads_to
         return named(node) if spot.outcome is None or not leads else f"{node.name}{ARROW}{leads.to[spot.outcome]}"
