@@ -138,5 +138,5 @@ def rows() -> list[Row]:
             most=15,
         ),
         Row("bridge: share of a core while nothing passes", "%", "", idle * 100),
-        Row("bridge: images", "MB/s", "640 x 480, 33 a second", rate, least=30),
+        Row("bridge: images", "MB/s", "640 x 480, 40 a second are sent", rate, least=30),
     ]
