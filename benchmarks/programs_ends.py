@@ -13,7 +13,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image
 
 TRIPS, PAUSE = 300, 0.01  # round trips by each way, and [s] between two
-RATE, IMAGES = 1000.0, 40.0  # [Hz]
+RATE, IMAGES = 1000.0, 20.0  # [Hz]
 
 
 def _ping(node: Any) -> None:
