@@ -106,12 +106,15 @@ export class StepForm {
   show(form: Form, mayChange: boolean): void {
     const key = JSON.stringify([form, mayChange]);
     if (key === this.#shown) return;
-    const focused = (document.activeElement as HTMLElement | null)?.id ?? "";
+    const focused = document.activeElement;
     this.#shown = key;
     setText(this.#title, `Options of ${form.kind}`);
     setText(this.#about, said(form.about));
     this.#fields.replaceChildren(...form.fields.map((field) => this.#row(field, mayChange)));
-    if (focused.startsWith("option-")) document.getElementById(focused)?.focus();
+    const again = focused?.id.startsWith("option-") ? document.getElementById(focused.id) : null;
+    const isTyped = focused instanceof HTMLInputElement && focused.value !== focused.defaultValue;
+    if (isTyped && again instanceof HTMLInputElement) again.value = focused.value;
+    again?.focus();
   }
 
   #row(field: FormField, mayChange: boolean): HTMLElement {
@@ -130,10 +133,20 @@ export class StepForm {
       control = h("input", { id, type: "text", autocomplete: "off", list: `${id}-choices`, placeholder: field.default });
       more.push(h("datalist", { id: `${id}-choices` }, ...field.choices.map((choice) => h("option", { value: choice }))));
     }
+    if (control instanceof HTMLInputElement) control.defaultValue = field.value;
     control.value = field.value;
     control.disabled = !mayChange;
-    control.onchange = () => {
-      if (control.value.trim() !== field.value) this.#set(field.key, control.value.trim());
+    let written = field.value;
+    const write = (): void => {
+      const value = control.value.trim();
+      if (!control.isConnected || value === written) return; // else what is drawn anew would be written twice
+      written = value;
+      this.#set(field.key, value);
+    };
+    control.onchange = write;
+    control.onblur = write; // a text that was carried over does not count as a change
+    control.onkeydown = (event) => {
+      if ((event as KeyboardEvent).key === "Enter") write();
     };
     return h("div", { class: "field" }, label, control, ...more, ...unit);
   }

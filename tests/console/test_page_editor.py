@@ -291,6 +291,19 @@ def test_the_form_of_a_step_has_what_it_can_be_given_and_writes_it(
         page.screenshot(path=f"{shots}/form.png", full_page=True)
 
 
+def test_what_is_typed_in_a_form_outlives_a_change_of_the_text(
+    open_page: Callable[..., Page], project: Project
+) -> None:
+    page = edits(open_page(page_name="mission"))
+    page.locator(".editor-text .cm-line", has_text="table").click()
+    page.locator("#option-go_to").evaluate("one => { one.focus(); one.value = 'dock'; }")
+    page.locator("#option-timeout").evaluate("one => { one.value = '1 min'; one.dispatchEvent(new Event('change')); }")
+    expect(block(page, "go_to table")).to_contain_text("timeout 1 min")
+    expect(page.locator("#option-go_to")).to_have_value("dock")
+    page.locator("#option-go_to").press("Enter")
+    expect(block(page, "go_to dock")).to_contain_text("timeout 1 min")
+
+
 def test_a_dry_run_tells_the_story_and_colours_the_outline(open_page: Callable[..., Page], project: Project) -> None:
     page = edits(open_page(page_name="mission"))
     types(page, "wait: 2 s", "check: 1 > 2")
