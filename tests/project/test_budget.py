@@ -51,7 +51,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/muxes": Cost(code=2023, files=15, small=1, imports=122),
     "domains/navigation": Cost(code=3952, files=30, small=2, imports=384),
     "domains/power": Cost(code=461, files=6, small=0, imports=37),
-    "domains/programs": Cost(code=3759, files=30, small=1, imports=372),
+    "domains/programs": Cost(code=3781, files=30, small=1, imports=373),
     "domains/servos": Cost(code=7907, files=52, small=1, imports=583),
     "domains/vision": Cost(code=2602, files=31, small=1, imports=354),
     "domains/worlds": Cost(code=4629, files=41, small=4, imports=561),
@@ -66,10 +66,10 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 107877,
+    "lines of code": 107899,
     "files": 890,
     "files of 1 to 30 lines of code": 74,
-    "lines of imports": 10426,
+    "lines of imports": 10427,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 368,

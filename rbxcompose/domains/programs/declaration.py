@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
@@ -24,7 +24,7 @@ from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.capabilities import Capability, CommandsMotion, Drains, Drives, Setting, WritesFrame
 from rbxcompose.sdk.messages import ActionName, MessageName, ServiceName
-from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Qos, Serves, ServesAction
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Serves, ServesAction
 
 QosName = Literal["command", "state", "latched", "event", "bulk"]
 _LARGE = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/PointCloud2")
@@ -270,8 +270,3 @@ def published(topic: str, publishes: Mapping[str, PublishedTopic]) -> str:
 def port_name(topic: str) -> str:
     """Return the name of the port of a topic: `wheels_odom` for `wheels/odom`."""
     return topic.strip("/").replace("/", "_")
-
-
-def qos_of(port: Port[Any]) -> Qos:
-    """Return the class of the topic of a port."""
-    return cast(Out[Any] | In[Any], port).qos

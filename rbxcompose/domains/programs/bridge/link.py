@@ -71,8 +71,10 @@ class Link:
             while len(header := _read(stream, _HEADER.size)) == _HEADER.size:
                 size, channel, kind, number = _HEADER.unpack(header)
                 if size > LARGEST or len(payload := _read(stream, size)) < size:
-                    return
+                    break
                 yield Frame(channel, kind, number, payload)
+        self.close()
+        self._socket.close()
 
     def close(self) -> None:
         """Close the socket; both sides stop receiving."""

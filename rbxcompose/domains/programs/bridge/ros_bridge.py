@@ -20,18 +20,21 @@ from rbxcompose.bus.names import Attachment, data_key, dds_type
 from rbxcompose.bus.tokens import EntityKind, NodeToken, gid
 from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, Closable, Question, RemotePublisher, TransportReply
 from rbxcompose.bus.wire import SERVICE_QOS, WireProfile, ros_qos
+from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
 from rbxcompose.domains.programs.bridge import link
 from rbxcompose.domains.programs.bridge.ends import BridgedEnd
 from rbxcompose.domains.programs.bridge.installation import RosInstallation
 from rbxcompose.domains.programs.child import Child, ProgramEnd, StartOrder, WrittenLine
-from rbxcompose.msgs.cdr import decode, encode
+from rbxcompose.msgs.cdr import CdrError, decode, encode
 from rbxcompose.runtime.processes import describe_exit
 from rbxcompose.sdk.component import BusAddress
 
 ROS_SIDE = Path(__file__).with_name("ros_side.py")
 STARTS_WITHIN = 20.0  # [s] until ROS is there
+_MADE_WITHIN = 5.0  # [s] until ROS has what is to pass
+_LAST_WORDS = 1.0  # [s] for its process to end, which says more than a closed socket
 _ANSWER_WITHIN = 30.0  # [s] for a service; results of goals take as long as they take
 _TOKENS = {
     ("topic", "from_ros"): EntityKind.PUBLISHER,
@@ -49,7 +52,6 @@ class _Lane:
         self.sequence = count(1)
         self.publisher: RemotePublisher | None = None
         self.declared: list[Closable] = []
-        self.passed = 0
 
     def origin(self) -> bytes:
         return Attachment(next(self.sequence), time.time_ns(), self.gid).encode()
@@ -74,6 +76,11 @@ class RosBridge:
         self._done: set[int] = set()
         self._heard: deque[str] = deque(maxlen=100)
         self.middleware = self.end = ""
+        self._silent_since: float | None = None  # [s] since when nothing can come any more
+        try:
+            self._guest = Guest(BusPlace(address.router, address.domain), stays=True)
+        except NotDoneError as error:
+            raise OutsideError(f"the bridge does not reach the robot's bus: {error}") from error
         ours, theirs = socket.socketpair()
         for one in (ours, theirs):
             for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
@@ -83,7 +90,6 @@ class RosBridge:
             self._child = Child(
                 StartOrder(command, os.getcwd(), installation.environment, 15, 1.0, descriptors=(theirs.fileno(),))
             )
-        self._guest = Guest(BusPlace(address.router, address.domain), stays=True)
         self._link = link.Link(ours)
         threading.Thread(target=self._receive, name="bridge", daemon=True).start()
         if not self._until(lambda: bool(self.middleware), STARTS_WITHIN):
@@ -103,7 +109,9 @@ class RosBridge:
                 added.append(channel)
                 orders.append(end.for_ros(channel))
         self._link.event(add=orders)
-        self._until(lambda: {*added} <= self._done, 5.0)
+        if not self._until(lambda: {*added} <= self._done, _MADE_WITHIN):
+            for channel in added:
+                self._problems[channel].append(f"ROS 2 has not made it within {_MADE_WITHIN:g} s")
         return added
 
     def remove(self, channels: Iterable[int]) -> None:
@@ -112,12 +120,9 @@ class RosBridge:
         self._link.event(remove=gone)
         with self._lock:
             for channel in gone:
+                del self._problems[channel]
                 for declared in self._lanes.pop(channel).declared:
                     declared.close()
-
-    def count(self, channel: int) -> int:
-        """Return how many messages have passed."""
-        return self._lanes[channel].passed if channel in self._lanes else 0
 
     def problems(self, channels: Iterable[int]) -> Iterator[str]:
         """Yield what did not work since the last look, for these channels."""
@@ -136,6 +141,9 @@ class RosBridge:
                     case ProgramEnd(status):
                         last = f": {self._heard[-1]}" if self._heard else ""
                         self.end = f"the process in ROS's Python {describe_exit(status)}{last}"
+            since = self._silent_since
+            if not self.end and since is not None and time.monotonic() - since > _LAST_WORDS:
+                self.end = "the process in ROS's Python has closed the bridge"
         return self.end
 
     def close(self) -> None:
@@ -177,7 +185,6 @@ class RosBridge:
         return lane
 
     def _arrived(self, lane: _Lane, arrival: Arrival) -> None:
-        lane.passed += 1
         self._link.send(lane.channel, link.DATA, arrival.payload, depth=lane.end.qos.depth)
 
     def _asked(self, lane: _Lane, question: Question) -> None:
@@ -196,11 +203,23 @@ class RosBridge:
             if frame.kind == link.EVENT:
                 self._take_event(json.loads(frame.payload))
             elif (lane := self._lanes.get(frame.channel)) is not None:
-                self._take(lane, frame)
+                try:
+                    self._take(lane, frame)
+                except CdrError as error:  # ROS has another definition of a service
+                    self._refuse(lane, frame, str(error))
+        self._silent_since = time.monotonic()
+
+    def _refuse(self, lane: _Lane, frame: link.Frame, why: str) -> None:
+        """Answer a request or a response that cannot be read."""
+        if (waiting := self._problems.get(lane.channel)) is not None:
+            waiting.append(why)
+        if frame.kind == link.REQUEST:
+            self._link.send(lane.channel, link.ERROR, why.encode(), frame.number)
+        elif (question := self._questions.pop(frame.number, None)) is not None:
+            question.fail(why)
 
     def _take(self, lane: _Lane, frame: link.Frame) -> None:
         if frame.kind == link.DATA:
-            lane.passed += 1
             if lane.publisher is not None:
                 lane.publisher.put(frame.payload, lane.origin())
         elif frame.kind == link.REQUEST:
@@ -208,11 +227,12 @@ class RosBridge:
             answered = partial(self._answered, lane.channel, frame.number)
             payload = _exact(lane.end.interface.Request, frame.payload)
             self._guest.transport.ask(lane.key, payload, lane.origin(), answered, of_all=False, within=within)
-        elif (question := self._questions.pop(frame.number, None)) is not None:
+        elif (question := self._questions.get(frame.number)) is not None:
             if frame.kind == link.RESPONSE:
                 question.reply(_exact(lane.end.interface.Response, frame.payload), question.attachment)
             else:
                 question.fail(frame.payload.decode())
+            del self._questions[frame.number]
 
     def _take_event(self, event: Mapping[str, Any]) -> None:
         match event:
@@ -230,7 +250,7 @@ def _exact(message: Any, payload: bytes) -> bytes:
     return encode(decode(message, payload))
 
 
-_bridges: dict[tuple[str, str], tuple[RosBridge, set[str]]] = {}
+_bridges: dict[tuple[str, str, str], tuple[RosBridge, set[str]]] = {}
 _sharing = threading.Lock()
 
 
@@ -240,7 +260,7 @@ def joined(installation: RosInstallation, address: BusAddress, component: str) -
     Raises:
         OutsideError: if it does not start.
     """
-    key = installation.python, str(installation.domain)
+    key = installation.python, str(installation.domain), installation.environment.get("AMENT_PREFIX_PATH", "")
     with _sharing:
         bridge, users = _bridges.get(key, (None, set[str]()))
         if bridge is None or bridge.hear():

@@ -55,6 +55,7 @@ from rbxcompose.sdk.updater import FrequencyTask, TaskStatus
 
 LOOKS = 1.0  # [s] between two looks at what its session declares, and at its memory
 _ANSWERS = 0.3  # [s] for its admin space to answer
+_STARTS = 10.0  # [s] for a program to run that has nothing else to wait for
 _LINKS = 2.0  # [s] for it to be linked with the robot's processes
 _STRANGER = 0.5  # [s] after which it does not seem to use the configuration that it was given
 _PAUSE = 0.05  # [s] between two looks at a program that is not ready yet
@@ -242,7 +243,7 @@ class Runner(Component[R]):
         self.child: Child | None = None
         self.guest: Guest | None = None
         self.is_over = True
-        self.is_ending = self.has_left = False
+        self.is_ending = False
         self.ends_at: float | None = None
         self.looked = -LOOKS
         self.tokens: dict[KeyOnBus, Closable] = {}
@@ -409,11 +410,12 @@ class Runner(Component[R]):
 
     def _wait_until_ready(self, guest: Guest) -> None:
         ready = self.config.ready
-        deadline = self.real_time.now() + (ready.within if ready is not None else 10.0)
+        within = ready.within if ready is not None else _STARTS
+        deadline = self.real_time.now() + within
         self.is_ready = False
         while not self._is_ready(ready, guest):
             if self.real_time.now() >= deadline:
-                raise OutsideError(f"is not ready after {ready.within if ready is not None else 10.0:g} s")
+                raise OutsideError(f"is not ready after {within:g} s")
             if self.context.is_over:
                 raise OutsideError("is not ready yet, and the robot goes down")
             if self.child is not None:
