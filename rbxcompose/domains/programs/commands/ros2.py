@@ -77,10 +77,9 @@ def _scan(arguments: argparse.Namespace) -> int:
 
 
 def _pin(arguments: argparse.Namespace) -> int:
-    compiled = _compiled(arguments)
-    if compiled is None or compiled.robot is None:
-        if compiled is not None:
-            write_report(compiled.report, compiled.sources)
+    compiled = compile_robot(robot_path(arguments.path), environment=os.environ)
+    if compiled.robot is None:
+        write_report(compiled.report, compiled.sources)
         return FINDINGS
     nodes = {node.name: node for node in _nodes(arguments, compiled)}
     wanted = f"/{arguments.node.lstrip('/')}"

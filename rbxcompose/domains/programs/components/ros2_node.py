@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 from rbxcompose.base.config import COMPONENT, CONTENTS, LocalPath, Name, Refers
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.requests import OutsideError
+from rbxcompose.bus.names import resolve
 from rbxcompose.domains.programs.bridge import ros_bridge
 from rbxcompose.domains.programs.bridge.ends import BridgedEnd, ends_of, parameters_of
 from rbxcompose.domains.programs.bridge.installation import RosInstallation, RosModel, installation_of
@@ -153,7 +154,7 @@ class Ros2Node(Runner[Ros2NodeConfig]):
             yield from ends_of(port, str(self.bound[name]))
         yield from parameters_of(self.node_name, "to_ros")
         for other in self.config.configures:
-            yield from parameters_of(f"/{other}", "from_ros")
+            yield from parameters_of(resolve(other, self.context.address.namespace), "from_ros")
 
     def attend(self) -> None:
         """Report what the bridge cannot do, and restart with it."""
