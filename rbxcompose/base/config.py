@@ -227,6 +227,8 @@ def with_values(config: C, values: Mapping[str, object]) -> C:
         head, _, below = name.partition(".")
         inner = with_values(getattr(config, head), {below: value}) if below else value
         config = config.model_copy(update={head: inner})
+    for name in config.__dict__.keys() - type(config).model_fields.keys():
+        del config.__dict__[name]  # computed from the values before
     return config
 
 

@@ -12,7 +12,7 @@ from rbxcompose.missions.analysis.facts import is_simple, is_sure, takes_time
 from rbxcompose.missions.engine.events import Logged, Reported, SkillEnded, SkillStarted, Transition
 from rbxcompose.missions.engine.instant_actions import act, act_safely, fields_of
 from rbxcompose.missions.engine.leaf import Leaf
-from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.engine.task import MovedChildren, Site, Task
 from rbxcompose.missions.engine.world import Watched
 from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.language.fields import (

@@ -209,6 +209,14 @@ class Ask:
 
 
 @dataclass(frozen=True, slots=True)
+class Consider:
+    """Ask the components of this plan, as text, how they would take it; `Considered` carries the same number."""
+
+    number: int
+    plan: str
+
+
+@dataclass(frozen=True, slots=True)
 class Adopt:
     """Before `Configure`: this plan, as text, replaces the one that the process was forked with."""
 
@@ -341,6 +349,15 @@ class Reconfigured:
 
 
 @dataclass(frozen=True, slots=True)
+class Considered:
+    """What components say about a plan, and why some cannot take it."""
+
+    number: int
+    said: list[str]
+    refused: list[str]
+
+
+@dataclass(frozen=True, slots=True)
 class Alive:
     """The loop of the process runs; its robot time [s], what moves the robot, and what its components are doing."""
 
@@ -365,6 +382,7 @@ ChannelOrder = (
     | Brake
     | Lost
     | Ask
+    | Consider
     | Adopt
     | Retire
     | Prepare
@@ -390,6 +408,7 @@ ChannelWord = (
     | Summary
     | Retired
     | Reconfigured
+    | Considered
     | SettingWord
     | FromHost
     | Alive

@@ -35,15 +35,16 @@ class PlanComparison:
     generation: int
     why_not: str
     shares_change: bool = False  # what is known of other hosts, or carried to other robots
+    said: tuple[str, ...] = ()  # by components, of their work that is under way
 
     @classmethod
-    def of(cls, found: Changes, generation: int, why_not: str) -> PlanComparison:
+    def of(cls, found: Changes, generation: int, why_not: str, said: tuple[str, ...] = ()) -> PlanComparison:
         """Return changes in a form for people and programs."""
         components = tuple(
             ComponentChange(one.instance.name, one.instance.type, one.instance.process, one.fate, one.reasons)
             for one in found.fated
         )
-        return cls(found.before.robot, components, found.impossible, generation, why_not, found.shares_change)
+        return cls(found.before.robot, components, found.impossible, generation, why_not, found.shares_change, said)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """The contract of a component: configuration, ports, lifecycle, one step at a time."""
 
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, get_args
 
@@ -207,6 +207,14 @@ class Component(Generic[C]):
         Raises:
             Refused: if this cannot be done now, with the reason; `config` is then `old` again.
         """
+
+    def consider(self, new: C) -> Iterable[str]:
+        """Say what `new` would do to the work that is under way; called before it is applied, or replaces this one.
+
+        Raises:
+            Refused: if that work could not go on, with the reason; nothing is changed then.
+        """
+        return ()
 
     def take_over(self, old: Self) -> None:
         """Replace `old`, which had other settings and has been retired; called after `configure`."""

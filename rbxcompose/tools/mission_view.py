@@ -79,6 +79,8 @@ def watch(folder: RobotFolder, name: str, period: float) -> int:
             screen.wait(period)
             if screen.is_over:
                 return 0
-            seen = joined(seen, answer_of(folder, LookAtMission(name, seen["version"])))
+            before, seen = seen, joined(seen, answer_of(folder, LookAtMission(name, seen["version"])))
+            if seen["edition"] != before["edition"]:
+                picture = picture_from_data(answer_of(folder, ShowPicture(name)))
     emit("\n".join(lines_of(picture, seen, _WIDTH, colour=colour)))
     return 0

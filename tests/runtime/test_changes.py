@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from rbxcompose.base.config import Restart
+from rbxcompose.base.config import Restart, with_values
 from rbxcompose.compiler.plan.dump import dump, load
 from rbxcompose.compiler.plan.model import BusPlan, Plan
 from rbxcompose.runtime.supervision.changes import Changes, Fate, changes
 from rbxcompose.testing.bench import instance
 from tests.conftest import ROOT
 from tests.manifests import turtlebot
+from tests.missions.simulated import program_of
 
 MOVES = ["'base' moves"]
 RUNS = {"mission": "mission patrol runs"}
@@ -97,8 +98,15 @@ def test_who_leaves_the_path_of_commands_is_on_it_too() -> None:
     assert changes(before, after).unsafe(MOVES, {}) != ""
 
 
-def test_a_mission_that_runs_is_not_started_again() -> None:
+def test_a_mission_that_runs_is_changed_live_unless_it_needs_other_ports() -> None:
     found = between("missions.patrol.with.rounds=3")
+    assert fates(found) == {"mission": Fate.LIVE}
+    assert found.unsafe(MOVES, RUNS) == ""
+    before, quiet = turtlebot(), program_of("do: {wait: 1 s}")
+    mission = next(instance for instance in before.instances if instance.name == "mission")
+    other = replace(mission, config=with_values(mission.config, {"programs": {"patrol": quiet}}))
+    instances = tuple(other if instance is mission else instance for instance in before.instances)
+    found = changes(before, replace(before, instances=instances))
     assert fates(found) == {"mission": Fate.RESTARTED}
     assert found.unsafe([], RUNS).startswith(
         "mission patrol runs, and 'mission' would restart: run 'rbxcompose mission"

@@ -109,9 +109,12 @@ class Desk:
         _, answer, is_refused = self.replies.pop()
         return answer, is_refused
 
-    def compare(self, plan: str) -> PlanComparison:
-        """Return what a plan would change, as it comes to who asked."""
-        answer, is_refused = self.ask(ComparePlan(plan))
+    def compare(self, plan: str, considered: say.Considered | None = None) -> PlanComparison:
+        """Return what a plan would change, as it comes to who asked; the components have `considered` it."""
+        self.handler.handle(as_data(ComparePlan(plan)), 1)
+        if considered is not None:
+            self.handler.considering.receive("mission", considered)
+        _, answer, is_refused = self.replies.pop()
         assert not is_refused
         found: PlanComparison = from_data(ComparePlan.answer_type(), json.loads(json.dumps(answer)))
         return found
@@ -227,11 +230,33 @@ def test_another_plan_is_compared_first_and_taken_only_if_nobody_was_faster() ->
     desk = Desk()
     desk.conductor._is_running = True
     text = dump(replace(PLAN, instances=(replace(PLAN.instances[0], restart=Restart(when="never")),)))
-    found = desk.compare(text)
+    found = desk.compare(text, say.Considered(1, ["goes on"], []))
+    assert found.said == ("goes on",)
     assert (found.generation, found.why_not) == (0, "")
     assert [change.fate for change in found.components] == [Fate.LIVE]
     assert str(desk.ask(ApplyPlan(text, 7))[0]).startswith("it was changed by someone else meanwhile")
-    assert desk.sent == []
+    assert [type(message) for _, message in desk.sent] == [say.Consider]
+
+
+def test_a_change_that_a_component_refuses_touches_nothing() -> None:
+    desk = Desk()
+    desk.conductor._is_running = True
+    text = dump(replace(PLAN, instances=(replace(PLAN.instances[0], restart=Restart(when="never")),)))
+    assert desk.compare(text, say.Considered(1, [], ["it runs"])).why_not == "it runs"
+    desk.handler.handle(as_data(ApplyPlan(text, 0)), 1)
+    assert desk.replies == []  # it waits
+    desk.handler.considering.receive("mission", say.Considered(2, [], ["it runs"]))
+    assert desk.replies == [(1, "it runs", True)]
+    assert [type(message) for _, message in desk.sent] == [say.Consider, say.Consider]
+
+
+def test_a_process_that_ends_has_nothing_to_say_about_a_change() -> None:
+    desk = Desk()
+    desk.conductor._is_running = True
+    text = dump(replace(PLAN, instances=(replace(PLAN.instances[0], restart=Restart(when="never")),)))
+    desk.handler.handle(as_data(ComparePlan(text)), 1)
+    desk.handler.considering.gone("mission")
+    assert [is_refused for _, _, is_refused in desk.replies] == [False]
 
 
 def test_a_text_that_is_no_plan_is_refused() -> None:

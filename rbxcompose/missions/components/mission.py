@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -29,6 +29,7 @@ from rbxcompose.sdk import (
     Component,
     Config,
     Level,
+    Live,
     Place,
     Port,
     Refused,
@@ -42,7 +43,7 @@ from rbxcompose.sdk.robot_events import MissionOver, MissionWaits
 if TYPE_CHECKING:  # a check needs no engine: it is imported when the component is configured
     from rbxcompose.missions.engine.interventions import Intervention
     from rbxcompose.missions.engine.logbook import LogRecord
-    from rbxcompose.missions.execution.mission_run import MissionRun
+    from rbxcompose.missions.execution.mission_run import LeftMission, MissionRun
     from rbxcompose.missions.execution.world import RobotWorld
 
 RUN = "run_mission"
@@ -58,17 +59,17 @@ Made = Annotated[InstanceOf[T], WithJsonSchema({"type": "object"})]  # made by t
 class MissionConfig(Config):
     """The robot's missions as the compiler has prepared them."""
 
-    programs: dict[str, Made[Program]] = {}
+    programs: Annotated[dict[str, Made[Program]], Live()] = {}
     """Missions by name."""
-    start: str | None = None
+    start: Annotated[str | None, Live()] = None
     """The mission that starts by itself."""
-    inputs: dict[str, dict[str, Any]] = {}
+    inputs: Annotated[dict[str, dict[str, Any]], Live()] = {}
     """Values of the inputs, by mission and name."""
-    after_crash: dict[str, str] = {}
+    after_crash: Annotated[dict[str, str], Live()] = {}
     """What missions do after a crash, by mission: `restart`, `ask` or `continue`."""
     values: dict[str, Made[ValueSource]] = {}
     """Where the robot's values come from."""
-    places: dict[str, Made[Place]] = {}
+    places: Annotated[dict[str, Made[Place]], Live()] = {}
     """The robot's places."""
     skills: dict[str, Made[SkillSource]] = {}
     """The robot's skills."""
@@ -160,15 +161,17 @@ class Mission(Component[MissionConfig]):
         address = self.context.address
         self.snapshots = SnapshotStore(address.robot, is_kept=bool(address.router))
         self.broadcast = Broadcast(self.config.programs, self.context.window)
-        programs = self.config.programs
         self.ordered = OrderedMission(
-            lambda name: programs[name].inputs if name in programs else (), self.begin, self.end
+            lambda name: programs[name].inputs if name in (programs := self.config.programs) else (),
+            self.begin,
+            self.end,
         )
         seen = RobotWorld(self, self.arrivals, self.desks, lambda leaf, result: None, lambda event: None)
         self.triggering = Triggering(self.config.triggers, self.config.names, seen, self)
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
         self.kept: dict[str, requests.RunMission] = {}  # requests by people that began missions that still run
         self.repeated: tuple[Command, ...] = ()  # those, and the breakpoints
+        self.left: list[LeftMission] = []  # those that were paused when another executive took over
         self.trouble = ""  # with snapshots
         self.shown = ""  # the last reported status
         self.planned: float | None = None  # the last requested wake [s]
@@ -192,6 +195,8 @@ class Mission(Component[MissionConfig]):
         """Begin the start mission, if there is one."""
         if (name := self.config.start) is None:
             self.show(Level.OK, "no mission to start")
+            return
+        if name in self.missions.names:  # taken over
             return
         try:
             run = self.recovered(name) or self.begin(name)
@@ -333,9 +338,35 @@ class Mission(Component[MissionConfig]):
         """Return whether a mission uses a skill that claims a part of the robot."""
         return any(mission.claims for mission in self.missions)
 
+    # Another configuration
+
+    def consider(self, new: MissionConfig) -> Iterator[str]:
+        """Say how the missions that run go on with what has changed."""
+        for run, _, exchanged in self.missions.followed(new):
+            yield f"mission {run.name} goes on where it is"
+            yield from exchanged.notes
+
+    def reconfigure(self, old: MissionConfig) -> None:
+        """Exchange the missions that have changed, also while they run."""
+        gone = self.missions.follow(self.config, self.missions.followed(self.config), self.now)
+        for breakpoint_ in gone:
+            self.warn(f"the breakpoint at '{breakpoint_}' is gone")
+        self.keep()
+        self.triggering.follow(self.config.names)
+        self.broadcast.follow(self.config.programs)
+        self.look_soon()
+
     def take_over(self, old: Mission) -> None:
-        """Stay held if the missions were."""
+        """Stay held if the missions were; those that were paused stay where they are."""
         self.is_held = old.is_held  # as the start mission was held
+        self.missions.breakpoints.take_over(old.missions.breakpoints)
+        for left in old.left:
+            try:
+                run = self.missions.taken_over(left, self.now)
+            except Refused as refusal:
+                self.warn(f"{refusal}; it starts again")
+            else:
+                self.announce(f"mission {run.name} is where it was, and still paused")
 
     def finish(self, name: str, end: MissionEnded) -> None:
         """Report that a mission has ended; after the start mission, the robot may go down."""
@@ -358,6 +389,7 @@ class Mission(Component[MissionConfig]):
     def brake(self) -> None:
         """End all missions: the robot is going down, or another executive takes over."""
         self.is_held = self.is_held or any(run.is_paused for run in self.missions)
+        self.left = [run.left for run in self.missions if run.is_paused and run.began is not None]
         for mission in self.missions:
             mission.abort(self.now)
             self.snapshots.drop(mission.name)

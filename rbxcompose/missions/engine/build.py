@@ -1,13 +1,14 @@
 """Builds the tasks of a program: one per node, with a task around it for each of its modifiers and observers."""
 
 from collections.abc import Iterator
+from typing import Any
 
 from rbxcompose.missions.engine.engine_base import EngineBase
 from rbxcompose.missions.engine.events import BranchEnded, NodeEnded, NodeStarted
 from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.run import Run, since_scope
 from rbxcompose.missions.engine.scopes import ItemScope, MissionScope, SinceScope
-from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.engine.task import MovedChildren, Site, Task
 from rbxcompose.missions.engine.world import Observer
 from rbxcompose.missions.modifiers.registry import Decorator, decorator_of
 from rbxcompose.missions.program.answers import Form
@@ -35,6 +36,11 @@ class Since(Decorator):
     @seen.setter
     def seen(self, seen: dict[str, int]) -> None:
         self.view.seen = seen
+
+    def adapted(self, state: dict[str, Any], children: MovedChildren) -> dict[str, Any]:
+        """Count on; what is newly counted counts from now on."""
+        self.view.mark()
+        return {"seen": {name: state["seen"].get(name, count) for name, count in self.seen.items()}}
 
     def begin(self) -> int:
         """Count from now on."""

@@ -36,7 +36,7 @@ class Engine(EngineBase):
         self.main = builder.run(self.program)
         self.tasks, self.runs, self._leaves = builder.tasks, builder.runs, builder.leaves
         self._indexes = {task: index for index, task in enumerate(self.tasks)}
-        self._inputs = dict(inputs)
+        self.inputs = dict(inputs)
         self.debugger = Debugger(self, self.tasks, self.runs, self._take_results)
         self.instant = -1.0
         self.ticks = 0  # at this instant
@@ -61,7 +61,7 @@ class Engine(EngineBase):
             return self.status
         if self.status == IDLE:
             self.status = RUNNING
-            self.main.begin(self._inputs)
+            self.main.begin(self.inputs)
         if now > self.instant:
             self.instant, self.ticks = now, 0
         while self.status == RUNNING:
@@ -110,6 +110,12 @@ class Engine(EngineBase):
             self.main.halt()
             self.status = FAILURE
             self.world.say(MissionEnded("halted"))
+
+    def stop_request(self, leaf: int, because: str, now: float) -> None:
+        """Stop the request of a leaf, for good; whoever reads the story learns why."""
+        self.now, self.because = now, because
+        self._leaves[leaf].stop()
+        self.because = ""
 
     def forget_requests(self) -> None:
         """Take the results that have arrived; all other requests are lost, with the process that made them."""

@@ -188,6 +188,8 @@ def _again(engine: Engine, call: LoggedCall, index: int) -> None:
                 engine.abort(call.at)
             case "restore":
                 raise OtherInterventionError("it goes on from a snapshot, which the log does not hold", index)
+            case "exchange":
+                raise OtherInterventionError("the mission was changed while it ran", index)
             case "intervene" if call.did:
                 engine.intervene(call.did, call.at)
     except NotPossible as error:

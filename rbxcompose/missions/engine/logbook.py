@@ -20,7 +20,8 @@ from rbxcompose.missions.program.outcomes import Result
 
 BEGIN, TICK, PAUSE, RESUME, ABORT, INTERVENE = "begin", "tick", "pause", "resume", "abort", "intervene"
 RESTORE = "restore"  # from a snapshot, which the log does not hold
-INPUTS = frozenset({BEGIN, TICK, PAUSE, RESUME, ABORT, INTERVENE, RESTORE})
+EXCHANGE = "exchange"  # for a changed mission, which the log does not hold either
+INPUTS = frozenset({BEGIN, TICK, PAUSE, RESUME, ABORT, INTERVENE, RESTORE, EXCHANGE})
 
 V = TypeVar("V")
 LogRecord = dict[str, Any]

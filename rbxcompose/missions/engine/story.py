@@ -1,6 +1,7 @@
 """The story of a mission: one line of text per event, and how often each skill ended with each result."""
 
 from collections import Counter
+from collections.abc import Mapping
 from typing import assert_never
 
 from rbxcompose.base.levels import Level
@@ -20,6 +21,10 @@ class MissionStory:
         self._mission = mission
         self._labels: dict[int, str] = {}  # what each leaf did last: `go_to corner_1`
         self._results: dict[str, Counter[str]] = {}
+
+    def renumber(self, nodes: Mapping[int, int]) -> None:
+        """Take other numbers for leaves, since the mission has changed."""
+        self._labels = {nodes[leaf]: label for leaf, label in self._labels.items() if leaf in nodes}
 
     def line(self, event: events.MissionEvent) -> tuple[Level, str]:
         """Return how bad an event is, and its line, which is empty if other events say the same."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from collections.abc import Iterable, Mapping
+from typing import Any, ClassVar
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.evaluate import evaluate
@@ -30,6 +31,32 @@ class Site:
     children: tuple[Task, ...] = ()
     item: ItemScope | None = None
     inner: RunBase | None = None
+
+
+class MovedChildren:
+    """Where the children of a node are after a change of the mission that runs.
+
+    `count` is how many there are now, `restarted` are the indexes now of those that run and begin again.
+    """
+
+    def __init__(self, moved: Mapping[int, int], before: int, count: int, restarted: frozenset[int]) -> None:
+        """Take the index now of each child that is still there, and how many there were `before`."""
+        self.count, self.restarted = count, restarted
+        self._before = before
+        self.is_astray = False
+        """Whether a place was looked for that is gone."""
+        self._moved = moved
+
+    def to(self, index: int) -> int:
+        """Return the index now of a child that had this index; what was no child stays none."""
+        if not 0 <= index < self._before:
+            return index
+        self.is_astray = self.is_astray or index not in self._moved
+        return self._moved.get(index, 0)
+
+    def kept(self, indexes: Iterable[int]) -> list[int]:
+        """Return the indexes now of those children that are still there."""
+        return [self._moved[index] for index in indexes if index in self._moved]
 
 
 class Task(ABC):
@@ -117,6 +144,10 @@ class Task(ABC):
     def jump(self, state: str) -> None:
         """Leave the state that runs, and enter this one at the next tick; only a machine can."""
         raise NotImplementedError(f"{type(self).__name__} has no states")
+
+    def adapted(self, state: dict[str, Any], children: MovedChildren) -> dict[str, Any]:
+        """Return the state that this task takes over from the same node before a change: its `saved` attributes."""
+        return {**state, "index": children.to(state["index"])} if "index" in state else state
 
     def restored(self) -> None:  # noqa: B027 - most kinds have nothing to do
         """Recompute what follows from the state, after it was restored."""

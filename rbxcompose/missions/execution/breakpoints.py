@@ -1,6 +1,8 @@
 """What people ask for while they debug missions, with the names they use, as interventions in a run."""
 
-from collections.abc import Mapping
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
 
 from rbxcompose.base.expressions.types import TypeKind
 from rbxcompose.base.findings import clauses, suggest
@@ -18,6 +20,7 @@ from rbxcompose.missions.language.literals import WrongValue, typed
 from rbxcompose.missions.program.answers import Form
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.outcomes import SUCCEEDS
+from rbxcompose.missions.program.pairing import Pairing
 from rbxcompose.missions.program.program import MissionNode, Program
 
 _PLACED = (TypeKind.PLACE, TypeKind.POSE)
@@ -99,6 +102,27 @@ class Breakpoints:
             del self._set[name][written]
         return tuple(dict.fromkeys(name for name, _ in had))
 
+    def take_over(self, old: Breakpoints) -> tuple[str, ...]:
+        """Have those of another executive, which this one replaces; return those that are gone."""
+        equipment, self._equipment, self._set = self._equipment, old._equipment, old._set
+        return self.follow(equipment)
+
+    def follow(self, equipment: Equipment) -> tuple[str, ...]:
+        """Stay at the same nodes of changed missions; return those that are gone, as they were written."""
+        gone = []
+        before, self._equipment = {mission: self.linked(mission) for mission in self._set}, equipment
+        for mission, old in before.items():
+            found, self._set[mission] = self._set[mission], {}
+            new = self.linked(mission) if mission in equipment.programs else None
+            after = Pairing(old, new).after if new else {}
+            for where, spots in found.items():
+                moved = tuple(_moved(spots, new, after)) if new else ()
+                if new and moved:
+                    self._set[mission][_written(where, new, moved)] = moved
+                else:
+                    gone.append(f"{mission}: {where}")
+        return tuple(gone)
+
     def linked(self, mission: str) -> Program:
         """Return a mission with those that it uses."""
         return link(self._equipment.programs[mission], self._equipment.names.missions)
@@ -145,6 +169,30 @@ def jump(run: MissionRun, where: str) -> JumpToState:
     parents = [nodes[state.parent] for state in states if state.parent is not None]
     machine = _one(run, parents, f"the machine of '{where}' does not run now")
     return JumpToState(machine.number, next(state.name for state in states if state.parent == machine.number))
+
+
+def _moved(spots: Iterable[NodeAddress], program: Program, after: Mapping[int, int]) -> Iterator[NodeAddress]:
+    """Yield those spots that are still there in a changed mission."""
+    for spot in spots:
+        if spot.node not in after:
+            continue
+        node = program.nodes[after[spot.node]]
+        transitions = node.step.leads_to.keys if node.step.leads_to else {}
+        if spot.outcome is None:
+            yield NodeAddress(node.number, None, node.span)
+        elif spot.outcome in transitions:
+            yield NodeAddress(node.number, spot.outcome, transitions[spot.outcome])
+
+
+def _written(where: str, program: Program, spots: tuple[NodeAddress, ...]) -> str:
+    """Return how spots are written in a changed mission: as before, if that still means them."""
+    if is_number(where):
+        return str(spots[0].node)
+    try:
+        is_meant = find(program, where) == spots
+    except NotPossible:
+        is_meant = False
+    return where if is_meant else spots[0].span.place
 
 
 def _one(run: MissionRun, nodes: list[MissionNode], otherwise: str) -> MissionNode:

@@ -1,5 +1,7 @@
 """One mission that runs: its engine with its world, its story, its log, and what viewers see."""
 
+from __future__ import annotations
+
 import json
 import zlib
 from collections import deque
@@ -7,15 +9,17 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.values import NOT_ARRIVED, Value
 from rbxcompose.base.levels import Level
 from rbxcompose.missions.engine import logbook
 from rbxcompose.missions.engine.debugger import named
 from rbxcompose.missions.engine.engine import Engine
-from rbxcompose.missions.engine.events import MissionEnded, MissionEvent, Transition
+from rbxcompose.missions.engine.events import Intervened, MissionEnded, MissionEvent, Transition
+from rbxcompose.missions.engine.exchange import Exchanged, exchange
 from rbxcompose.missions.engine.interventions import Intervention, SetBreakpoints
 from rbxcompose.missions.engine.logbook import LoggedWorld, LogRecord
-from rbxcompose.missions.engine.snapshot import carry_on, restore
+from rbxcompose.missions.engine.snapshot import carry_on, restore, save
 from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.world import PLAIN, POSE, Settings, World
 from rbxcompose.missions.execution.world import RobotWorld
@@ -64,6 +68,28 @@ MakeWorld = Callable[[Callable[[int, Result], None], Callable[[MissionEvent], No
 OnLine = Callable[[Level, str], None]
 
 
+@dataclass(frozen=True, slots=True)
+class LeftMission:
+    """Where a mission was when its executive was replaced; `began` is in robot time [s]."""
+
+    name: str
+    program: Program
+    names: RobotNames
+    inputs: Mapping[str, Value]
+    began: float
+    state: Mapping[str, Any]
+
+    def inputs_for(self, program: Program) -> Mapping[str, Value]:
+        """Return those of its inputs that a changed mission has as well."""
+        return common_inputs(self.inputs, self.program, program)
+
+
+def common_inputs(inputs: Mapping[str, Value], old: Program, new: Program) -> Mapping[str, Value]:
+    """Return the inputs that two versions of a mission have with the same type."""
+    same = {name for name, declared in new.inputs.items() if name in old.inputs and old.inputs[name].type == declared.type}
+    return {name: value for name, value in inputs.items() if name in same}
+
+
 class MissionRun:
     """Runs a mission, with time as an argument; `on_line` takes the lines of its story, `write` its log's records."""
 
@@ -87,6 +113,7 @@ class MissionRun:
         self.story = MissionStory(name)
         self.transitions: deque[dict[str, Any]] = deque(maxlen=LAST)
         self.breakpoints = SetBreakpoints()
+        self.edition = 0  # how often it was changed while it ran
         self.goes_on = False  # it was restored, and is resumed when every value that it reads has arrived
         self._on_line, self._now = on_line, 0.0
         world, self.robot = make(self._ended, self._said)
@@ -169,6 +196,62 @@ class MissionRun:
         if self.breakpoints != SetBreakpoints():
             self.intervene(self.breakpoints, now)
 
+    def exchanged(self, program: Program, names: RobotNames, inputs: Mapping[str, Value]) -> tuple[Engine, Exchanged]:
+        """Return an engine that goes on with a changed mission where this one is, and what comes of that.
+
+        The robot notices nothing so far.
+
+        Raises:
+            NotPossible: if something that runs cannot go on.
+        """
+        engine = Engine(program, names, inputs, self.log, self._settings)
+        return engine, Exchanged() if self.engine.status == IDLE else exchange(self.engine, engine)
+
+    def inputs_for(self, program: Program) -> Mapping[str, Value]:
+        """Return those of its inputs that a changed mission has as well."""
+        return common_inputs(self._inputs, self.engine.program, program)
+
+    @property
+    def left(self) -> LeftMission:
+        """Return what another executive needs to go on with it."""
+        began = self._now if self.began is None else self.began
+        return LeftMission(self.name, self.engine.program, self.engine.robot, self._inputs, began, save(self.engine))
+
+    def take_up(self, left: LeftMission, now: float) -> None:
+        """Be where another executive has left this mission, paused; what it requested is requested again.
+
+        Raises:
+            NotPossible: if something that ran cannot go on.
+        """
+        self._now, self.began, self.is_paused = now, left.began, True
+        before = Engine(left.program, left.names, left.inputs, self.log, self._settings)
+        restore(before, left.state)
+        carry_on(before)
+        found = exchange(before, self.engine)
+        self.log.begin(self._inputs, self._settings)
+        self._changed(found, self.breakpoints, now)
+
+    def go_on_as(self, engine: Engine, found: Exchanged, breakpoints: SetBreakpoints, now: float) -> None:
+        """Go on with what `exchanged` returned; requests of leaves that begin again are stopped."""
+        self._now = now
+        for leaf in found.halted:
+            self.engine.stop_request(leaf, "the mission was changed", now)
+        self.robot.renumber(found.requests)
+        self.story.renumber(found.nodes)
+        self.engine, self._inputs = engine, engine.inputs
+        self.claims = claims_of(engine.program, engine.robot.skills)
+        self.mirror = Mirror(engine, self.mirror.version)
+        self._states = (engine.robot.values.keys() | {POSE}) - engine.robot.events
+        self.__dict__.pop("_sentences", None)
+        self.edition += 1
+        if self.began is not None:
+            self._changed(found, breakpoints, now)
+
+    def _changed(self, found: Exchanged, breakpoints: SetBreakpoints, now: float) -> None:
+        self.log.did(logbook.EXCHANGE)
+        self.log.say(Intervened("; ".join(("the robot's missions were changed", *found.notes))))
+        self.stop_at(breakpoints, now)
+
     def next_wake(self) -> float | None:
         """Return when to tick it next [s]."""
         if self.is_over:
@@ -218,7 +301,7 @@ class MissionRun:
 
     def seen(self, since: int = 0) -> dict[str, Any]:
         """Return what has changed since the version that a viewer has; 0 gives the full state."""
-        more = {"state": self.state, "began": self.began, "transitions": list(self.transitions)}
+        more = {"state": self.state, "began": self.began, "edition": self.edition, "transitions": list(self.transitions)}
         return {"mission": self.name, **self.mirror.look(since), **more, "stopped_at": self.stopped_at}
 
     def _do(self, what: str, call: Callable[[], object], now: float, intervention: Intervention | None = None) -> None:

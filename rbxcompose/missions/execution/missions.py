@@ -1,7 +1,10 @@
 """All missions of a robot: which run, which may start beside them, and what viewers see."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any
+from itertools import combinations
+from typing import Any, NamedTuple
 
 from rbxcompose.base.expressions.text import show_value
 from rbxcompose.base.expressions.types import FLAG
@@ -10,13 +13,16 @@ from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Query, Refused
 from rbxcompose.base.units import format_quantity
+from rbxcompose.missions.engine.engine import Engine
+from rbxcompose.missions.engine.exchange import Exchanged
 from rbxcompose.missions.engine.inputs import NoSuchState, bind_texts, start_at
+from rbxcompose.missions.engine.interventions import NotPossible
 from rbxcompose.missions.engine.logbook import LogRecord
 from rbxcompose.missions.engine.snapshot import from_plain
 from rbxcompose.missions.engine.world import PLAIN, Observer, Settings
 from rbxcompose.missions.execution.breakpoints import Breakpoints
 from rbxcompose.missions.execution.errands import Equipment
-from rbxcompose.missions.execution.mission_run import LogStore, MakeWorld, MissionRun, claims_of
+from rbxcompose.missions.execution.mission_run import LeftMission, LogStore, MakeWorld, MissionRun, claims_of
 from rbxcompose.missions.execution.requests import (
     ListedInput,
     ListedMission,
@@ -35,6 +41,14 @@ from rbxcompose.missions.view.picture import picture_of, picture_to_data
 from rbxcompose.sdk.bound import Window
 
 OnLine = Callable[[str, Level, str], None]  # mission, level, line of its story
+
+
+class Followed(NamedTuple):
+    """How a mission that runs would go on with what has changed."""
+
+    run: MissionRun
+    engine: Engine
+    exchanged: Exchanged
 
 
 class RunningMissions:
@@ -100,6 +114,65 @@ class RunningMissions:
         run.restore(snapshot["state"], now)
         return run
 
+    # Other missions and places
+
+    def followed(self, equipment: Equipment) -> list[Followed]:
+        """Return how the missions that run would go on with what has changed; nothing is done so far.
+
+        Raises:
+            Refused: if one of them cannot go on, with the reason.
+        """
+        found = [followed for run in self if (followed := self._followed(run, equipment)) is not None]
+        claims = {run.name: run.claims for run in self}
+        now = {**claims, **{one.run.name: claims_of(one.engine.program, equipment.names.skills) for one in found}}
+        for name, other in combinations(claims, 2):
+            if common := sorted((now[name] & now[other]) - (claims[name] & claims[other])):
+                raise Refused(f"missions {name} and {other} run, and both would use {' and '.join(common)}")
+        return found
+
+    def _followed(self, run: MissionRun, equipment: Equipment) -> Followed | None:
+        """Return how a mission would go on; None if nothing changes for it."""
+        program = equipment.names.missions.get(run.name)
+        if program is None:
+            raise Refused(f"mission {run.name} runs, and would be gone: cancel it first")
+        linked = link(program, equipment.names.missions)
+        if linked == run.engine.program and equipment.names == run.engine.robot:
+            return None
+        known = {**equipment.inputs.get(run.name, {}), **run.inputs_for(program)}
+        inputs, findings = bind_texts(program, {}, known, equipment.names.places)
+        if findings:
+            raise Refused(f"mission {run.name} runs: {findings[0].message}")
+        try:
+            return Followed(run, *run.exchanged(linked, equipment.names, inputs))
+        except NotPossible as error:
+            raise Refused(f"mission {run.name} cannot go on: {error}") from error
+
+    def follow(self, equipment: Equipment, found: Iterable[Followed], now: float) -> tuple[str, ...]:
+        """Go on as `followed` has found; return the breakpoints that are gone."""
+        gone = self.breakpoints.follow(equipment)
+        self._equipment = equipment
+        for run, engine, exchanged in found:
+            run.go_on_as(engine, exchanged, self.breakpoints.of(run.name), now)
+        return gone
+
+    def taken_over(self, left: LeftMission, now: float) -> MissionRun:
+        """Return a mission that another executive has left, which was paused; it still is.
+
+        Raises:
+            Refused: if it cannot go on with what has changed.
+        """
+        program, name = self._equipment.names.missions.get(left.name), left.name
+        if program is None:
+            raise Refused(f"mission {name} is gone")
+        inputs = bind_texts(program, {}, self._equipment.inputs.get(name, {}), self._equipment.names.places)[0]
+        run = self._made(name, program, {**inputs, **left.inputs_for(program)}, PLAIN)
+        try:
+            run.take_up(left, now)
+        except NotPossible as error:
+            del self.runs[name]
+            raise Refused(f"mission {name} cannot go on: {error}") from error
+        return run
+
     def _made(self, name: str, program: Program, inputs: Mapping[str, Value], settings: Settings) -> MissionRun:
         self._counts[name] = self._counts.get(name, 0) + 1
         number = self._counts[name]
@@ -131,8 +204,7 @@ class RunningMissions:
         Raises:
             Refused: if it has not been running.
         """
-        engine = self._begun(name).engine
-        return picture_to_data(picture_of(engine.program, engine.robot))
+        return _picture(self._begun(name).engine)
 
     def running(
         self, name: str, what: Callable[[MissionRun], bool] = lambda one: True, word: str = "running"
@@ -229,7 +301,14 @@ class Broadcast:
 
     def __init__(self, names: Iterable[str], open_window: Open) -> None:
         self._list = open_window(PATH, ListMissions())
-        self._feeds = {name: MissionFeed(open_window(f"{PATH}/{name}", LookAtAll(name))) for name in names}
+        self._open, self._feeds = open_window, dict[str, MissionFeed]()
+        self.follow(names)
+
+    def follow(self, names: Iterable[str]) -> None:
+        """Open windows for missions that have none yet."""
+        for name in names:
+            if name not in self._feeds:
+                self._feeds[name] = MissionFeed(self._open(f"{PATH}/{name}", LookAtAll(name)))
 
     def publish(self, missions: RunningMissions) -> None:
         """Publish what has changed; nothing is prepared without a viewer."""
@@ -242,22 +321,29 @@ class MissionFeed:
 
     def __init__(self, window: Window) -> None:
         self._window = window
-        self._run: MissionRun | None = None
+        self._run: tuple[MissionRun, int] | None = None  # with its edition
+        self._program: Program | None = None  # of which viewers have the picture
         self._published: dict[str, Any] = {}
 
     def publish(self, run: MissionRun) -> None:
         """Send what is new, if there is a subscriber and something new."""
         if not self._window.is_watched:
             return
-        if run is not self._run:
-            self._run, self._published = run, {}
+        if (run, run.edition) != self._run:
+            self._run, self._published = (run, run.edition), {}
         seen = run.seen(self._published.get("version", 0))
+        if run.engine.program is not self._program:  # a viewer that stays has the picture of another one
+            self._program, seen = run.engine.program, {**seen, "picture": _picture(run.engine)}
         fresh = {key: value for key, value in seen.items() if key in _ALWAYS or self._published.get(key) != value}
         fresh |= {"statuses": seen["statuses"], "data": seen["data"]}
         if all(self._published.get(key) == seen[key] for key in _TOLD):
             return
         self._published = seen
         self._window.put(fresh)
+
+
+def _picture(engine: Engine) -> PictureData:
+    return picture_to_data(picture_of(engine.program, engine.robot))
 
 
 def _listed_input(given: Input) -> ListedInput:

@@ -14,6 +14,7 @@ from typing import Any
 
 from rbxcompose.base.files import TEMPORARY, state_folder
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.snapshot import save, to_plain
 from rbxcompose.missions.execution.mission_run import MissionRun
 from rbxcompose.missions.program.outcomes import RUNNING
@@ -32,7 +33,7 @@ class SnapshotStore:
         self._folder = state_folder() / "snapshots" / robot if is_kept else None
         self._due: dict[str, float] = {}
         self._known: dict[str, Any] = {}  # what the latest snapshot of each mission has
-        self._made_of: dict[str, tuple[MissionRun, Mapping[str, str]]] = {}
+        self._made_of: dict[str, tuple[Engine, Mapping[str, str]]] = {}
         self.trouble = ""  # why the latest one could not be written
 
     def keep(self, run: MissionRun, now: float) -> float | None:
@@ -46,8 +47,8 @@ class SnapshotStore:
         if now < self._due.get(run.name, now) - ROUNDING:
             return self._due[run.name]
         self._due[run.name], self._known[run.name] = now + PERIOD, state
-        if self._made_of.get(run.name, (None,))[0] is not run:
-            self._made_of[run.name] = run, identity_of(engine.program, engine.robot)
+        if self._made_of.get(run.name, (None,))[0] is not engine:
+            self._made_of[run.name] = engine, identity_of(engine.program, engine.robot)
         state_now = {"is_paused": run.is_paused, "state": save(engine)}
         content = {"version": VERSION, "identity": self._made_of[run.name][1], **state_now}
         self._write(self._path(run.name), content)

@@ -68,7 +68,7 @@ class Triggering:
     def __init__(
         self, triggers: Mapping[str, Trigger], names: RobotNames, values: RobotValues, executive: Executive
     ) -> None:
-        self._triggers, self._executive = triggers, executive
+        self._triggers, self._values, self._executive = triggers, values, executive
         self._local = local_time if executive.context.clock.is_real else universal_time
         self.core = Triggers(triggers, self._local)
         self._scopes = {name: _scope(one, names, values) for name, one in triggers.items() if one.when}
@@ -78,6 +78,12 @@ class Triggering:
     @property
     def _wall(self) -> float:
         return self._executive.stamp / NANOSECONDS
+
+    def follow(self, names: RobotNames) -> None:
+        """Let conditions see other places of the robot."""
+        for name, before in self._scopes.items():
+            self._scopes[name] = _scope(self._triggers[name], names, self._values)
+            self._scopes[name].seen = before.seen
 
     def start(self) -> None:
         """Begin: the whole robot is active."""

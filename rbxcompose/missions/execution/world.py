@@ -140,6 +140,12 @@ class RobotWorld:
         """Forward an event."""
         self._say(event)
 
+    def renumber(self, requests: Mapping[int, int]) -> None:
+        """Report to other leaves from now on, by those before: the mission has changed."""
+        self._errands = {requests[leaf]: errand for leaf, errand in self._errands.items()}
+        for leaf, errand in self._errands.items():
+            errand.report_to(self._done(leaf))
+
     # Polling
 
     def next_look(self) -> float | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from rbxcompose.missions import sdk
 from rbxcompose.missions.program.branches import (
     ALL,
@@ -65,6 +67,20 @@ class ParallelTask(sdk.Task):
         else:
             engine.outcome = ""
         return status
+
+    def adapted(self, state: dict[str, Any], children: sdk.MovedChildren) -> dict[str, Any]:
+        """Keep what branches that are still there have come to; new ones start at the next tick."""
+        found: dict[str, list[Any]] = {
+            "results": [IDLE] * children.count,
+            "names": [""] * children.count,
+            "runs": [False] * children.count,
+        }
+        for before in range(len(state["results"])):
+            for now in children.kept([before]):
+                if now not in children.restarted:
+                    for name, entries in found.items():
+                        entries[now] = state[name][before]
+        return {**state, **found}
 
     def halt_below(self) -> None:
         """Stop all branches that run."""

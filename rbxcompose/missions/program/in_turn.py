@@ -1,10 +1,10 @@
 """What kinds share that run nodes one after the other and resume where they were halted."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.missions.engine.resume_points import DEEP, NO_HISTORY
-from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.engine.task import MovedChildren, Site, Task
 from rbxcompose.missions.engine.world import Watched
 from rbxcompose.missions.language.fields import children, choice, flag, history
 from rbxcompose.missions.program import outcomes
@@ -115,7 +115,17 @@ class InTurnTask(WithHistory):
             self.order = list(range(len(self.all)))
             self.engine.chance().shuffle(self.order)
             self.arrange()
+        elif self.order:  # it was random when it last started
+            self.order, self.children = [], self.all
         return self.proceed()
+
+    def adapted(self, state: dict[str, Any], children: MovedChildren) -> dict[str, Any]:
+        """Go on at the same child; new ones come last in an order that was drawn."""
+        if not (order := state["order"]):
+            return super().adapted(state, children)
+        kept, at = children.kept(order), children.to(order[state["index"]])
+        new = [index for index in range(children.count) if index not in kept]
+        return {**state, "order": [*kept, *new], "index": kept.index(at) if at in kept else 0}
 
     def restored(self) -> None:
         """Put the children back in the order that was drawn."""

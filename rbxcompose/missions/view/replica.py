@@ -13,9 +13,10 @@ ACTIVE = frozenset({"running", "paused", "waiting"})  # states of a mission that
 class Mirror:
     """The statuses and data of an engine, each with the version in which it last changed."""
 
-    def __init__(self, engine: Engine) -> None:
+    def __init__(self, engine: Engine, version: int = 0) -> None:
+        """Count on from the `version` of another engine that this one replaces."""
         self._engine = engine
-        self._version = 0
+        self._version = self._first = version
         self._statuses: list[int] = []
         self._changed: list[int] = []  # the version of each status
         self._data: dict[str, Any] = {}
@@ -28,11 +29,16 @@ class Mirror:
         the viewer knew before.
         """
         self._take()
-        if not 0 < since <= self._version:
+        if not self._first < since <= self._version:
             since = 0
         statuses = {number: self._statuses[number] for number, version in enumerate(self._changed) if version > since}
         data = {name: value for name, value in self._data.items() if self._data_changed[name] > since}
         return {"version": self._version, "whole": since == 0, "statuses": statuses, "data": data}
+
+    @property
+    def version(self) -> int:
+        """Return the newest version."""
+        return self._version
 
     def _take(self) -> None:
         """Note what has changed since the last look."""

@@ -255,6 +255,8 @@ class ProcessGroup:
                 self._made_host().lost(names, cause)
             case messages.Ask():
                 self._channel.send(self._answer(self._made_host(), message))
+            case messages.Consider(number, plan):
+                self._channel.send(messages.Considered(number, *self._made_host().consider(load(plan).instances)))
             case messages.Adopt(plan):
                 self._plan = load(plan)
             case messages.Retire() | messages.Prepare() | messages.Reconfigure():

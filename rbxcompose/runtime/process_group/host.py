@@ -298,6 +298,20 @@ class Host:
         self._retired.clear()
         self.statuses.publish()
 
+    def consider(self, instances: Sequence[Instance]) -> tuple[list[str], list[str]]:
+        """Return what components say about other settings, and why some refuse them."""
+        said: list[str] = []
+        refused: list[str] = []
+        for instance in instances:
+            hosted = self.hosted.get(instance.name)
+            if hosted is None or hosted.component is None or hosted.state is not Lifecycle.ACTIVE:
+                continue
+            try:
+                said += hosted.component.consider(instance.config)
+            except Refused as refusal:
+                refused.append(str(refusal))
+        return said, refused
+
     def follow(self, instances: Sequence[Instance], keys: Mapping[str, Sequence[str]]) -> dict[str, str]:
         """Apply the settings of `keys` to components; return the reasons of those that refuse, by name."""
         refused: dict[str, str] = {}

@@ -9,6 +9,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.compiler.plan.diff import BOUNDS, WHOLE, Change, difference
 from rbxcompose.compiler.plan.model import Instance, OtherHost, Plan
 from rbxcompose.runtime.supervision.members import is_commanding
+from rbxcompose.sdk.registry import component_type
 
 WORLD = "world"  # the process group of simulated truth, whose state a restart would lose
 DOWN_AND_UP = "needs 'down' and 'up'"
@@ -152,8 +153,15 @@ def _fated(before: Instance | None, after: Instance, reasons: tuple[Change, ...]
         return Fated(after, Fate.RESTARTED, (*reasons, Change("state", "failed", "active")))
     if not reasons:
         return Fated(after, Fate.KEPT)
-    is_live = all(_is_live(after, change.key) for change in reasons)
+    is_live = all(_is_live(after, change.key) for change in reasons) and _has_same_ports(before, after)
     return Fated(after, Fate.LIVE if is_live else Fate.RESTARTED, reasons)
+
+
+def _has_same_ports(before: Instance, after: Instance) -> bool:
+    """Return whether a component has the same ends on the bus; what it runs may need others."""
+    each = [component_type(instance.type).ports(instance.config) for instance in (before, after)]
+    first, second = ({name: (type(port), vars(port)) for name, port in ports.items()} for ports in each)
+    return first == second
 
 
 def _is_live(instance: Instance, key: str) -> bool:

@@ -333,6 +333,12 @@ class Conductor:
 
     # Another plan
 
+    @property
+    def reached(self) -> list[str]:
+        """Return the processes that take orders; none if the robot goes down."""
+        groups = () if self.is_going_down else self.plan.groups
+        return [name for name in groups if self.members[name].is_configured]
+
     def why_not(self, changes: Changes) -> str:
         """Return why changes cannot be made now, or nothing if they can."""
         if self._options.is_stepped:

@@ -1,5 +1,6 @@
 """Carries out the requests from the control socket, or passes them on to the component that takes them."""
 
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 from rbxcompose.base.levels import Level
@@ -12,6 +13,7 @@ from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanCompari
 from rbxcompose.runtime.requests import ROBOT, BringDown, DescribeRobot, ReleaseRobot, RobotStatus, StopRobot
 from rbxcompose.runtime.supervision.changes import Changes, changes
 from rbxcompose.runtime.supervision.conductor import FINE, Conductor
+from rbxcompose.runtime.supervision.considering import Considering
 from rbxcompose.runtime.supervision.descriptions import described
 from rbxcompose.runtime.supervision.setting_changes import SettingChanges
 from rbxcompose.sdk.registry import component_type
@@ -51,6 +53,7 @@ class RequestHandler:
     def __init__(self, supervisor: Supervised, settings: SettingChanges, *, is_stepped: bool) -> None:
         """On a stepped clock the process group logs what came from outside, at its own time."""
         self._supervisor, self._settings, self._is_stepped = supervisor, settings, is_stepped
+        self.considering = Considering(supervisor.send)
         self._before: tuple[Plan, ChosenLayers, int] | None = None  # what the last change can be reverted to
 
     def handle(self, data: object, number: int) -> None:
@@ -75,6 +78,8 @@ class RequestHandler:
                 self._apply(request, number)
             case RevertPlan():
                 self._revert(request, number)
+            case ComparePlan(plan):
+                self._compare(plan, number)
             case _:
                 self._supervisor.answer(number, to_data(self._answer(request)))
 
@@ -88,8 +93,6 @@ class RequestHandler:
                 return self._stop()
             case ReleaseRobot():
                 return self._release()
-            case ComparePlan(plan):
-                return self._compare(plan)
             case BringDown():
                 return self._bring_down()
         raise TypeError(f"{request} is not answered here")
@@ -147,11 +150,16 @@ class RequestHandler:
 
     # Another plan
 
-    def _compare(self, plan: str) -> PlanComparison:
+    def _compare(self, plan: str, number: int) -> None:
         """Report what another plan would change, and what prevents it now; change nothing."""
         found, conductor = self._changes(_loaded(plan)), self._supervisor.conductor
         why_not = "" if found.is_empty else conductor.why_not(found)
-        return PlanComparison.of(found, conductor.generation, why_not)
+
+        def considered(said: Sequence[str], refused: str) -> None:
+            compared = PlanComparison.of(found, conductor.generation, why_not or refused, tuple(said))
+            self._supervisor.answer(number, to_data(compared))
+
+        self.considering.ask(found, () if why_not else conductor.reached, considered)
 
     def _apply(self, request: ApplyPlan, number: int) -> None:
         found, conductor = self._changes(_loaded(request.plan)), self._supervisor.conductor
@@ -168,6 +176,21 @@ class RequestHandler:
     def _change(self, found: Changes, layers: ChosenLayers, number: int) -> None:
         conductor = self._supervisor.conductor
         if why_not := conductor.why_not(found):
+            raise Refused(why_not)
+
+        def considered(said: Sequence[str], refused: str) -> None:
+            try:
+                self._carry_out_change(found, layers, number, refused)
+            except Refused as refusal:
+                self._supervisor.refuse(number, str(refusal))
+
+        self.considering.ask(found, conductor.reached, considered)
+
+    def _carry_out_change(self, found: Changes, layers: ChosenLayers, number: int, refused: str) -> None:
+        conductor = self._supervisor.conductor
+        if found.before is not conductor.plan:
+            raise Refused("it was changed by someone else meanwhile: look at the difference again")
+        if why_not := refused or conductor.why_not(found):
             raise Refused(why_not)
         if self._settings.is_busy:
             raise Refused("settings of the robot are just being changed: try again")

@@ -126,9 +126,7 @@ class SettingLine:
 
     def reached(self) -> Collection[str]:
         """Return the processes that take orders; none if the robot goes down."""
-        conductor = self._supervisor.conductor
-        groups = () if conductor.is_going_down else conductor.plan.groups
-        return [name for name in groups if conductor.members[name].is_configured]
+        return self._supervisor.conductor.reached
 
     def send(self, process: str, message: messages.ChannelOrder) -> None:
         """Send a message to a process."""
@@ -198,6 +196,7 @@ class Supervisor:
         self.conductor = Conductor(launch.plan, launch.options, self._scheduler, self, router=router)
         judge = Judge(launch.rules, launch.title("rules"), self._selector, self._scheduler)
         self.settings = SettingLine(self, judge)
+        self._requests = RequestHandler(self, self.settings.changes, is_stepped=launch.options.is_stepped)
         self._wake, self._wakened = socket.socketpair()
         for end in (self._wake, self._wakened):
             end.setblocking(False)
@@ -216,8 +215,7 @@ class Supervisor:
         self._selector.register(self._parent, selectors.EVENT_READ, self._receive_from_parent)
         self._selector.register(self._wakened, selectors.EVENT_READ, self._on_signals)
         self._control = ControlServer(self._folder, self._selector)
-        is_stepped = self._launch.options.is_stepped
-        self._control.handle = RequestHandler(self, self.settings.changes, is_stepped=is_stepped).handle
+        self._control.handle = self._requests.handle
         self._write_messages()
         self._write_state()
         try:
@@ -353,6 +351,7 @@ class Supervisor:
         for message in received:
             self.conductor.receive(name, message)  # type: ignore[arg-type]
             self.settings.changes.receive(name, message)  # type: ignore[arg-type]
+            self._requests.considering.receive(name, message)  # type: ignore[arg-type]
 
     def _receive_from_parent(self) -> None:
         try:
@@ -390,6 +389,7 @@ class Supervisor:
             self.log(Level.OK, f"process '{name}' {how}; what it had printed is in the log file", printed)
         self.conductor.exited(name, how, printed)
         self.settings.changes.gone(name)
+        self._requests.considering.gone(name)
 
     def _printed(self, name: str) -> str:
         try:

@@ -122,6 +122,7 @@ def _change_lines(found: Mapping[str, Any]) -> Iterator[str]:
         yield from (f"      {_reason(each)}" for each in shown)
         if len(shown) < len(component["reasons"]):
             yield f"      and {len(component['reasons']) - len(shown)} more"
+    yield from (plain(text, _TEXT) for text in found["said"])
 
 
 def _reason(each: Mapping[str, str]) -> str:
