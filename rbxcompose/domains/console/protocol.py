@@ -214,7 +214,7 @@ class SaveSettings:
 
 @dataclass(frozen=True, slots=True)
 class EditMission:
-    """Pass a request to the editor of missions, and its answer to `Bridge.robot_answered`."""
+    """Pass a request to the editor of missions and of the robot, and its answer to `Bridge.robot_answered`."""
 
     number: int
     request: Mapping[str, Any]
@@ -1283,6 +1283,19 @@ class Bridge:
             self._note(client, f"{_WRITES[name]} the mission {_short(request['mission'])}")
         self._requests.append(EditMission(number, request))
 
+    def _robot_service(self, client: _Client, given: Mapping[str, Any], number: int, name: str) -> None:
+        request: dict[str, Any] = {"do": f"robot/{name}"}
+        for key, (kind, otherwise) in ROBOT_TEXTS[name].items():
+            value = given.get(key, otherwise)
+            if not isinstance(value, kind):
+                raise WrongMessageError(f"'{key}' is missing, or of another type")
+            request[key] = value
+        if given.get("dry_run") is True:
+            request["dry_run"] = True
+        elif name == "save":
+            self._note(client, f"saves {_short(request['subject'])} of the robot")
+        self._requests.append(EditMission(number, request))
+
     def _rosapi(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
         """Return the answer of `/rosapi/NAME`."""
         found = rosapi.answer(name, given, self._graph, self._stamp)
@@ -1440,6 +1453,11 @@ MISSION_TEXTS: Mapping[str, tuple[str, ...]] = {
 _WRITES = {"new": "makes", "save": "saves"}
 _EDITED: Mapping[str, type] = {"operation": dict, "path": list}
 """The types of those arguments that are no texts."""
+ROBOT_TEXTS: Mapping[str, Mapping[str, tuple[type, object]]] = {
+    "look": {"subject": (str, None), "changes": (list, None), "hashes": (dict, {})},
+    "save": {"subject": (str, None), "changes": (list, None), "hashes": (dict, None)},
+}
+"""What can be asked about what the robot is: the type of each argument, and what stands for it if it is missing."""
 _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str, Any] | None]] = {
     "/console/ask": Bridge._ask_service,
     "/console/drive": Bridge._drive_service,
@@ -1449,6 +1467,7 @@ _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str,
     "/console/stop": Bridge._stop_service,
     "/console/tested": Bridge._tested_service,
     **{f"/console/mission/{name}": partial(Bridge._mission_service, name=name) for name in MISSION_TEXTS},
+    **{f"/console/robot/{name}": partial(Bridge._robot_service, name=name) for name in ROBOT_TEXTS},
 }
 """Services of the gateway: what answers, or None if the answer comes later."""
 _PARAMETERS: Mapping[str, tuple[Callable[[Bridge, Mapping[str, Any], int], None], tuple[str, ...]]] = {
