@@ -159,6 +159,8 @@ class RobotEditor:
         if why := self._why_shared():
             raise Refused(why)
         subject, path, texts = SUBJECTS[change["subject"]], tuple(change["path"]), dict(state.texts)
+        if change["op"] not in subject.operations:
+            raise Refused(f"of {subject.what}, only values can be changed here: change it in the file")
         for file, patched in self._patches(state, subject, path, change):
             text = self._text(state, file) if file not in texts else texts[file]
             texts[file] = patched(text).applied(text)

@@ -1,4 +1,4 @@
-"""What can be edited of a robot: its places.
+"""What can be edited of a robot: its places, and who goes first at its muxes.
 
 A subject tells what a page is shown, how what it sends is written, and that nothing else has changed by it.
 """
@@ -7,18 +7,20 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
 from rbxcompose.base.requests import Refused
-from rbxcompose.base.units import ANGLE, LENGTH, Dimension, UnitError, format_quantity, to_si
+from rbxcompose.base.units import ANGLE, LENGTH, TIME, Dimension, UnitError, format_quantity, to_si
 from rbxcompose.commands.new_files import AnswerError, read_name
 from rbxcompose.compiler.composition.value_edits import is_same, value_text
 from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.domains.muxes.sections.muxes import muxes
 from rbxcompose.manifest.tree import KeyPath, ScalarNode
 
 FARTHEST = 1e6  # [m] from the origin of `map`; no view shows what is farther away
+HIGHEST = 1_000_000  # priority
 _LONGEST = 60  # characters of a text
 Where = Callable[[KeyPath], dict[str, Any]]
 
@@ -29,6 +31,8 @@ class Subject:
     section = ""
     what = ""
     """What one of its entries is called."""
+    operations: Sequence[str] = ("add", "set", "rename", "remove")
+    """What can be done to an entry."""
 
     def entries(self, robot: Robot, where: Where) -> list[dict[str, Any]]:
         """Return what a page shows of it."""
@@ -44,7 +48,7 @@ class Subject:
         Raises:
             Refused: if there can be none.
         """
-        raise Refused(f"no {self.what} can be added here")
+        raise NotImplementedError
 
     def new_name(self, robot: Robot, path: KeyPath, written: str, change: Mapping[str, Any]) -> str:
         """Return how a new name is written in the file of an entry that is called `written` there.
@@ -52,7 +56,7 @@ class Subject:
         Raises:
             Refused: if it is none.
         """
-        raise Refused(f"no {self.what} can get another name here")
+        raise NotImplementedError
 
     def written(self, robot: Robot, path: KeyPath, change: Mapping[str, Any]) -> dict[tuple[str, ...], str]:
         """Return the texts of values by their keys below the entry.
@@ -60,7 +64,7 @@ class Subject:
         Raises:
             Refused: if one of them is none.
         """
-        raise Refused(f"no {self.what} can be changed here")
+        raise NotImplementedError
 
     def require_meant(self, before: Robot, after: Robot, path: KeyPath, change: Mapping[str, Any]) -> None:
         """Refuse a change that has another effect than the one that was meant.
@@ -149,6 +153,76 @@ class Places(Subject):
         return written if written and "${" not in written else format_quantity(value, self.fields[key])
 
 
+class Muxes(Subject):
+    """Priorities and timeouts of the inputs and locks of muxes; a value is named `inputs.teleop.priority`."""
+
+    section, what = "muxes", "a mux"
+    operations = ("set",)
+    groups = ("inputs", "locks")
+
+    def entries(self, robot: Robot, where: Where) -> list[dict[str, Any]]:
+        """Return each mux with what has a rank there, as it is written."""
+        found = []
+        for name, mux in robot.manifest.contents.of(muxes).items():
+            rows = [self._row(robot, name, group, key, where) for group in self.groups for key in getattr(mux, group)]
+            file = next((row["file"] for row in rows if row["file"]), "")
+            plain = {"name": name, "has_priorities": mux.has_priorities, "file": file, "why_not": ""}
+            found.append({**plain, "rows": rows})
+        return found
+
+    def state(self, robot: Robot) -> Mapping[str, Any]:
+        """Return the muxes."""
+        return robot.manifest.contents.of(muxes)
+
+    def written(self, robot: Robot, path: KeyPath, change: Mapping[str, Any]) -> dict[tuple[str, ...], str]:
+        """Return the texts of priorities and timeouts."""
+        mux, given = self.state(robot).get(str(path[1])), change.get("values")
+        if mux is None:
+            raise Refused(f"there is no mux '{str(path[1])[:_LONGEST]}'")
+        if not isinstance(given, dict) or not given:
+            raise Refused("a mux has priorities and timeouts")
+        found: dict[tuple[str, ...], str] = {}
+        for key, value in given.items():
+            group, _, rest = key.partition(".")
+            name, _, field = rest.rpartition(".")
+            entries = getattr(mux, group) if group in self.groups else {}
+            if name not in entries or field not in ("priority", "timeout"):
+                raise Refused(f"the mux '{path[1]}' has no '{key[:_LONGEST]}'")
+            if field == "priority":
+                found[group, name, field] = priority_text(value)
+            else:
+                number, text = quantity_text(field, value, TIME, written_text(robot, (*path, group, name, field)))
+                if number < 0:
+                    raise Refused("'timeout' must not be negative")
+                found[group, name, field] = text
+        return found
+
+    def _row(self, robot: Robot, mux: str, group: str, name: str, where: Where) -> dict[str, Any]:
+        one = getattr(self.state(robot)[mux], group)[name]
+        path = (self.section, mux, group, name)
+        timeout = written_text(robot, (*path, "timeout"))
+        if "${" in timeout or (not timeout and one.timeout is not None):
+            timeout = format_quantity(one.timeout, TIME)
+        source = getattr(one, "source", None) or ""
+        rest = {"group": group, "name": name, "source": source, "priority": one.priority, "timeout": timeout}
+        return {**rest, **where(path)}
+
+
+def priority_text(value: Any) -> str:
+    """Return a priority as it is written.
+
+    Raises:
+        Refused: if it is no whole number.
+    """
+    try:
+        number = int(value) if isinstance(value, str) else value
+    except ValueError:
+        number = None
+    if not isinstance(number, int) or isinstance(number, bool) or abs(number) > HIGHEST:
+        raise Refused(f"'priority' must be a whole number up to {HIGHEST:,}")
+    return str(number)
+
+
 def valid_name(name: Any, what: str, taken: Mapping[str, Any]) -> str:
     """Return a name that nothing has.
 
@@ -200,4 +274,4 @@ def colour_text(value: Any) -> str:
     return value if value.isalpha() and value not in ("true", "false", "null") else json.dumps(value)
 
 
-SUBJECTS: Mapping[str, Subject] = MappingProxyType({subject.section: subject for subject in (Places(),)})
+SUBJECTS: Mapping[str, Subject] = MappingProxyType({subject.section: subject for subject in (Places(), Muxes())})
