@@ -87,7 +87,7 @@ function findingRows(findings: readonly RobotFound[], left: number): HTMLElement
 }
 
 /** Shows what would change in the files, and returns whether a person wants that. */
-async function confirmed(host: HTMLElement, trial: SaveTrial): Promise<boolean> {
+export async function confirmed(host: HTMLElement, trial: SaveTrial): Promise<boolean> {
   const names = { old: "removed", new: "added", place: "", same: "" };
   const lines = trial.diff.map((line) => {
     const kind = kindOf(line);

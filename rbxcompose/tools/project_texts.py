@@ -50,9 +50,7 @@ class ReadText:
 
     def difference(self, text: str) -> list[str]:
         """Return the lines that another text changes, with some around them."""
-        lines = list(unified_diff(self.text.split("\n"), text.split("\n"), "on disk", "here", n=_AROUND, lineterm=""))
-        left = len(lines[2:]) - _MOST_LINES
-        return lines[2:] if left <= 0 else [*lines[2 : _MOST_LINES + 2], f"@@ and {left} more lines @@"]
+        return difference(self.text, text)
 
 
 class ProjectTexts:
@@ -121,6 +119,13 @@ class ProjectTexts:
             replace_file(path, data)
         except OSError as error:
             raise Refused(f"'{self.shown(path)}' was not saved: {error.strerror}") from error
+
+
+def difference(old: str, new: str) -> list[str]:
+    """Return the lines that differ between a text on disk and a new one, with some around them."""
+    lines = list(unified_diff(old.split("\n"), new.split("\n"), "on disk", "here", n=_AROUND, lineterm=""))[2:]
+    left = len(lines) - _MOST_LINES
+    return lines if left <= 0 else [*lines[:_MOST_LINES], f"@@ and {left} more lines @@"]
 
 
 def words_of(finding: Finding) -> dict[str, Any]:

@@ -62,6 +62,7 @@ _QUERY = re.compile(r"(?P<about>\w+)/(?P<name>\w+)(?P<values>(/\w+/\w+)*)", re.A
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"\w+(/(msg|srv|action))?/\w+", re.ASCII)
 _SETTING = re.compile(r"[A-Za-z_]\w*(\.\w+)*", re.ASCII)
+_HASH = re.compile(r"[0-9a-f]{0,64}", re.ASCII)
 _LONGEST_ROS_NAME = 247
 _CANCELS = "/_action/cancel_goal"  # the end of the name of the service that cancels goals of an action
 _SHOWN = 60  # characters of what a client sent, in a status
@@ -210,6 +211,8 @@ class SaveSettings:
     number: int
     names: tuple[str, ...]
     is_trial: bool
+    seen: str = ""
+    """The hash that a trial told: only what was shown then is written."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -1268,7 +1271,10 @@ class Bridge:
         names = given.get("names", [])
         if not isinstance(names, list) or not all(isinstance(one, str) and _SETTING.fullmatch(one) for one in names):
             raise WrongMessageError("'names' are components, or their parameters: 'battery', 'battery.runtime'")
-        self._requests.append(SaveSettings(number, tuple(names), given.get("dry_run") is True))
+        seen = given.get("hash", "")
+        if not isinstance(seen, str) or not _HASH.fullmatch(seen):
+            raise WrongMessageError("'hash' is what a dry run told")
+        self._requests.append(SaveSettings(number, tuple(names), given.get("dry_run") is True, seen))
 
     def _mission_service(self, client: _Client, given: Mapping[str, Any], number: int, name: str) -> None:
         request: dict[str, Any] = {"do": name}

@@ -1034,7 +1034,7 @@ class GatewaySession:
 
     async def _save(self, request: SaveSettings) -> None:
         """Save as the command line does, in a process of its own: it needs the whole compiler."""
-        trial = ("--dry-run",) if request.is_trial else ()
+        trial = ("--dry-run",) if request.is_trial else ("--only-as", request.seen) if request.seen else ()
         robot = ("--robot", self._folder.path.name)
         command = (sys.executable, "-m", "rbxcompose", "param", "save", "--json", *robot, *trial, *request.names)
         async with self._saving:
