@@ -46,7 +46,7 @@ export interface SaveTrial {
 const PATIENCE = 35_000; // [ms]
 const NONE: readonly RobotChange[] = [];
 
-async function askRobotEditor<T>(link: Rosbridge, what: string, given: Message): Promise<T> {
+export async function askRobotEditor<T>(link: Rosbridge, what: string, given: Message): Promise<T> {
   const values = await link.call(`/console/robot/${what}`, given, PATIENCE);
   if (!isMessage(values) || values.success !== true) {
     throw new RefusedError(isMessage(values) ? String(values.message) : "the robot gave no answer");

@@ -8,6 +8,7 @@ from typing import Any
 
 from rbxcompose.base.requests import Refused
 from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.domains.console.models import CandidateModels
 from rbxcompose.tools.robot_editor.editor import ROBOT_REQUESTS, RobotEditor
 from tests.console.fake_gateway import CONFIG, FakeGateway
 
@@ -21,6 +22,7 @@ class EditedProject:
             (folder / file).parent.mkdir(parents=True, exist_ok=True)
             (folder / file).write_text(text, encoding="utf-8")
         self.editor = RobotEditor(self.compiled, self.robot)
+        self.models = CandidateModels()
         self.loses_saves = False  # the connection breaks after a save was done
         gateway.config = {**CONFIG, **gateway.config, "role": "configure"}
         for name in ROBOT_REQUESTS:
@@ -35,7 +37,10 @@ class EditedProject:
     def _answering(self, name: str) -> Any:
         def answer(given: dict[str, Any]) -> dict[str, Any]:
             try:
-                told = {"success": True, "message": "", "answer": self.editor.answer({"do": f"robot/{name}", **given})}
+                found = self.editor.answer({"do": f"robot/{name}", **given})
+                if isinstance(found, dict) and "model" in found:
+                    found["model"] = self.models.add(found["model"]["urdf"], found["model"]["meshes"])
+                told = {"success": True, "message": "", "answer": found}
             except Refused as refusal:
                 told = {"success": False, "message": str(refusal), "answer": None}
             if self.loses_saves and name == "save" and "dry_run" not in given:

@@ -556,6 +556,10 @@ def test_a_place_is_moved_in_the_file_of_the_robot_that_runs(robot: Robot) -> No
         assert (await browser.calls("/console/robot/save", **given))["success"]
         refused = await browser.calls("/console/robot/save", **given)
         assert "has changed on disk" in refused["message"]
+        built = (await browser.calls("/console/robot/look", subject="include", changes=[]))["answer"]
+        assert "<robot" in built["model"]
+        offered = (await browser.calls("/console/robot/palette"))["answer"]
+        assert "rbx:parts/xtion.yaml" in [part["file"] for part in offered]
 
     try:
         browse(edit)

@@ -1460,6 +1460,7 @@ _WRITES = {"new": "makes", "save": "saves"}
 _EDITED: Mapping[str, type] = {"operation": dict, "path": list}
 """The types of those arguments that are no texts."""
 ROBOT_TEXTS: Mapping[str, Mapping[str, tuple[type, object]]] = {
+    "palette": {},
     "look": {"subject": (str, None), "changes": (list, None), "hashes": (dict, {})},
     "save": {"subject": (str, None), "changes": (list, None), "hashes": (dict, None)},
 }

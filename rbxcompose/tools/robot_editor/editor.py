@@ -26,7 +26,8 @@ from rbxcompose.tools.mission_editor.patches import TextPatch
 from rbxcompose.tools.mission_editor.yaml_places import Path as TextPath
 from rbxcompose.tools.project_texts import ProjectTexts, ReadText, words_of
 from rbxcompose.tools.robot_editor.map_patches import with_entry, with_name, with_values, without_entry
-from rbxcompose.tools.robot_editor.subjects import SUBJECTS, Subject
+from rbxcompose.tools.robot_editor.parts import OfferedPart, Parts, offered_parts
+from rbxcompose.tools.robot_editor.subjects import Muxes, Places, Subject
 from rbxcompose.tools.robot_editor.written_at import entry_at, file_of, value_at
 
 MOST_CHANGES = 200
@@ -87,8 +88,13 @@ class RobotEditor:
             "why_not": self._why_not(self._file),
             "file": self._texts.shown(self._file),
             "entries": subject.entries(after.robot, lambda path: self._where(after, path)),
+            **subject.surroundings(before.robot, after.robot),
             **self._told(before, after),
         }
+
+    def _palette(self, request: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Return the parts that can be included."""
+        return [{key: getattr(one, key) for key in OfferedPart.__slots__} for one in offered_parts(self._file)]
 
     def _save(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Write the changes into their files, or with `dry_run` only show the difference."""
@@ -165,7 +171,7 @@ class RobotEditor:
             text = self._text(state, file) if file not in texts else texts[file]
             texts[file] = patched(text).applied(text)
         made = EditedRobot(texts, self._compiled(texts))
-        subject.require_meant(state.robot, made.robot, path, change)
+        _require_meant(subject, state.robot, made.robot, change)
         return made
 
     def _patches(
@@ -174,7 +180,7 @@ class RobotEditor:
         """Return which files a change changes, and how, one after the other."""
         op, manifest = change["op"], state.robot.manifest
         if op == "add":
-            name, value = subject.new_entry(state.robot, path, change)
+            name, value = subject.new_entry(state.robot, path, {**change, "file": str(self._file)})
             self._require_writable(self._file)
             return [(self._file, partial(with_entry, path=path[:1], key=name, value=value))]
         if op == "set":
@@ -245,8 +251,29 @@ class RobotEditor:
 
 PREFIX = "robot/"
 ROBOT_REQUESTS: Mapping[str, Callable[[RobotEditor, Mapping[str, Any]], Any]] = MappingProxyType(
-    {"look": RobotEditor._look, "save": RobotEditor._save}
+    {"look": RobotEditor._look, "palette": RobotEditor._palette, "save": RobotEditor._save}
 )
+SUBJECTS: Mapping[str, Subject] = MappingProxyType(
+    {subject.section: subject for subject in (Places(), Muxes(), Parts())}
+)
+
+
+def _require_meant(subject: Subject, before: Robot, after: Robot, change: Change) -> None:
+    """Refuse a change that has another effect than the one that was meant.
+
+    Raises:
+        Refused: with what else would change.
+    """
+    name = change["path"][1]
+    wanted = change.get("name", name)
+    for other in SUBJECTS.values() if subject.is_alone else (subject,):
+        old, new = other.state(before), other.state(after)
+        own = {name, wanted} if other is subject else set()
+        also = [key for key in (*old, *new) if old.get(key) != new.get(key) and key not in own]
+        if also:
+            raise Refused(f"this would change '{also[0]}', too: they are written in the same place")
+    if (change["op"] == "remove") == (wanted in subject.state(after)):
+        raise Refused(f"'{wanted}' would not be what was meant: another layer says it, too")
 
 
 def _subject(request: Mapping[str, Any]) -> Subject:

@@ -1,4 +1,4 @@
-"""What can be edited of a robot: its places, and who goes first at its muxes.
+"""What can be edited of a robot: its places, and who goes first at its muxes; its parts are in a module of their own.
 
 A subject tells what a page is shown, how what it sends is written, and that nothing else has changed by it.
 """
@@ -33,6 +33,8 @@ class Subject:
     """What one of its entries is called."""
     operations: Sequence[str] = ("add", "set", "rename", "remove")
     """What can be done to an entry."""
+    is_alone: bool = True
+    """Whether it leaves other subjects as they are; a part brings entries of its own."""
 
     def entries(self, robot: Robot, where: Where) -> list[dict[str, Any]]:
         """Return what a page shows of it."""
@@ -66,23 +68,9 @@ class Subject:
         """
         raise NotImplementedError
 
-    def require_meant(self, before: Robot, after: Robot, path: KeyPath, change: Mapping[str, Any]) -> None:
-        """Refuse a change that has another effect than the one that was meant.
-
-        Raises:
-            Refused: with what else would change.
-        """
-        names = {path[1], change.get("name", path[1])}
-        for subject in SUBJECTS.values():
-            old, new = subject.state(before), subject.state(after)
-            own = names if subject.section == path[0] else set()
-            others = [name for name in (*old, *new) if old.get(name) != new.get(name) and name not in own]
-            if others:
-                raise Refused(f"this would change '{others[0]}', too: they are written in the same place")
-        found = self.state(after)
-        wanted = change.get("name", path[1])
-        if (change["op"] == "remove") == (wanted in found):
-            raise Refused(f"'{wanted}' would not be what was meant: another layer says it, too")
+    def surroundings(self, before: Robot, after: Robot) -> dict[str, Any]:
+        """Return what else a page needs to know of a robot before and after the changes."""
+        return {}
 
 
 class Places(Subject):
@@ -272,6 +260,3 @@ def colour_text(value: Any) -> str:
     if not isinstance(value, str) or len(value) > _LONGEST or not value.isprintable():
         raise Refused("'colour' is a word, or '#' with digits")
     return value if value.isalpha() and value not in ("true", "false", "null") else json.dumps(value)
-
-
-SUBJECTS: Mapping[str, Subject] = MappingProxyType({subject.section: subject for subject in (Places(), Muxes())})

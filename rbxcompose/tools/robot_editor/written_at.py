@@ -76,7 +76,8 @@ def _located(manifest: RobotManifest, node: TreeNode, span: Span, text_of: TextO
     form = "map" if isinstance(node, MappingNode) else "scalar" if isinstance(node, ScalarNode) else "list"
     found = None
     if root is not None and 0 < node.span.line <= len(lines.lines):
-        found = path_to(root, lines.starts[node.span.line - 1] + node.span.column - 1, form)
+        start = lines.starts[node.span.line - 1] + node.span.column - 1
+        found = path_to(root, start, form) or path_to(root, start, "scalar")  # the short form of a map
     if not found:
         raise Refused(f"it is written at {span} in a way that cannot be changed here: {_BY_HAND}")
     return file, found
