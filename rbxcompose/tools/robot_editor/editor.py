@@ -26,7 +26,7 @@ from rbxcompose.tools.mission_editor.patches import TextPatch
 from rbxcompose.tools.mission_editor.yaml_places import Path as TextPath
 from rbxcompose.tools.project_texts import ProjectTexts, ReadText, words_of
 from rbxcompose.tools.robot_editor.map_patches import with_entry, with_name, with_values, without_entry
-from rbxcompose.tools.robot_editor.parts import OfferedPart, Parts, offered_parts
+from rbxcompose.tools.robot_editor.parts import IncludedParts, OfferedPart, offered_parts
 from rbxcompose.tools.robot_editor.subjects import Muxes, Places, Subject
 from rbxcompose.tools.robot_editor.written_at import entry_at, file_of, value_at
 
@@ -34,7 +34,7 @@ MOST_CHANGES = 200
 MOST_FINDINGS = 200
 
 Compile = Callable[[Mapping[Path, str]], Compilation]
-Change = Mapping[str, Any]
+RobotChange = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +149,7 @@ class RobotEditor:
                 self._read[path] = self._texts.read(path)
         return self._read
 
-    def _changed(self, changes: Sequence[Change]) -> EditedRobot:
+    def _changed(self, changes: Sequence[RobotChange]) -> EditedRobot:
         """Return the robot with changes; what is known of the first of them is not compiled again."""
         keys = ["", *(json.dumps(change, sort_keys=True) for change in changes)]
         same = 0
@@ -160,7 +160,7 @@ class RobotEditor:
             self._states.append((key, self._after(self._states[-1][1], change)))
         return self._states[-1][1]
 
-    def _after(self, state: EditedRobot, change: Change) -> EditedRobot:
+    def _after(self, state: EditedRobot, change: RobotChange) -> EditedRobot:
         """Return the robot after one more change."""
         if why := self._why_shared():
             raise Refused(why)
@@ -175,7 +175,7 @@ class RobotEditor:
         return made
 
     def _patches(
-        self, state: EditedRobot, subject: Subject, path: KeyPath, change: Change
+        self, state: EditedRobot, subject: Subject, path: KeyPath, change: RobotChange
     ) -> list[tuple[Path, Callable[[str], TextPatch]]]:
         """Return which files a change changes, and how, one after the other."""
         op, manifest = change["op"], state.robot.manifest
@@ -254,11 +254,11 @@ ROBOT_REQUESTS: Mapping[str, Callable[[RobotEditor, Mapping[str, Any]], Any]] = 
     {"look": RobotEditor._look, "palette": RobotEditor._palette, "save": RobotEditor._save}
 )
 SUBJECTS: Mapping[str, Subject] = MappingProxyType(
-    {subject.section: subject for subject in (Places(), Muxes(), Parts())}
+    {subject.section: subject for subject in (Places(), Muxes(), IncludedParts())}
 )
 
 
-def _require_meant(subject: Subject, before: Robot, after: Robot, change: Change) -> None:
+def _require_meant(subject: Subject, before: Robot, after: Robot, change: RobotChange) -> None:
     """Refuse a change that has another effect than the one that was meant.
 
     Raises:
@@ -283,7 +283,7 @@ def _subject(request: Mapping[str, Any]) -> Subject:
     return found
 
 
-def _changes(request: Mapping[str, Any]) -> list[Change]:
+def _changes(request: Mapping[str, Any]) -> list[RobotChange]:
     """Return the changes of a request, each with its subject.
 
     Raises:

@@ -71,7 +71,7 @@ def _is_needed(argument: PlacedNode) -> bool:
     return argument.get("default") is None
 
 
-class Parts(Subject):
+class IncludedParts(Subject):
     """Instances of parts, and where each one's piece of the body is attached."""
 
     section, what = "include", "a part"
@@ -187,7 +187,7 @@ def _number_of(text: str, dimension: Dimension) -> float:
 
 def instances(robot: Robot) -> Mapping[str, Entry]:
     """Return the instances of parts that the robot's own files name."""
-    found = at(robot.manifest.include, (Parts.section,))
+    found = at(robot.manifest.include, (IncludedParts.section,))
     return found.entries if isinstance(found, MappingNode) else {}
 
 
