@@ -43,7 +43,7 @@ export interface SaveTrial {
   count: number;
 }
 
-const PATIENCE = 35_000; // [ms]
+const PATIENCE = 95_000; // [ms]: the whole robot is compiled with each change
 const NONE: readonly RobotChange[] = [];
 
 export async function askRobotEditor<T>(link: Rosbridge, what: string, given: Message): Promise<T> {

@@ -14,7 +14,7 @@ from tests.console.browser import CHROMIUM
 from tests.console.edited_robot import EditedProject
 from tests.console.fake_gateway import FakeGateway
 from tests.console.looks import PHONE, WIDE, expect_fit, violations
-from tests.console.test_page_map import at, drag, rolls
+from tests.console.test_page_map import at, drag, move_fingers, rolls
 from tests.robot_editor.test_robot_editor import FETCH
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
@@ -86,6 +86,28 @@ def test_a_place_is_moved_and_turned_by_hand_and_saved_with_all_comments(
         "  dock: {x: 0.5 m, y: -0.25 m, heading: 90 deg}   # below the window"
     ]
     expect(page.get_by_text("rbxcompose apply")).to_be_visible()
+
+
+def test_a_finger_moves_and_adds_places_as_well(open_page: Callable[..., Page], project: EditedProject) -> None:
+    page = open_page(page_name="map", has_touch=True)
+    panel = edits(page)
+    move_fingers(page, [at(page, 0.02, 0.02)], [at(page, 0.52, 0.52)])
+    expect(panel.get_by_label("x", exact=True)).to_have_value("0.5 m")
+    move_fingers(page, [at(page, 0.0, 0.5)], [at(page, 0.0, 1.0)])
+    expect(panel.get_by_label("Heading")).to_have_value("90 deg")
+    expect(panel.get_by_role("button", name="Place 1")).to_have_attribute("aria-pressed", "true")
+
+
+def test_without_a_way_to_the_map_no_drag_moves_a_place(
+    open_page: Callable[..., Page], project: EditedProject, gateway: FakeGateway
+) -> None:
+    gateway.latched = {}
+    page = open_page(page_name="map")
+    expect(page.get_by_text("in odom")).to_be_visible()
+    panel = edits(page)
+    drag(page, at(page, 0.0, 0.0), at(page, 0.5, 0.0))
+    expect(page.get_by_text("write their numbers instead")).to_be_visible()
+    expect(panel.get_by_role("button", name="Undo")).to_be_disabled()
 
 
 def test_a_place_is_added_by_a_drag_and_gets_a_name(open_page: Callable[..., Page], project: EditedProject) -> None:

@@ -197,7 +197,10 @@ class MapView {
     goal.append(this.#state, this.#note, this.#cancel);
     this.element = h("div", { class: "map" }, goal, this.#chart(), this.#side());
     this.#canvas.onDrag = (drag) => this.#dragged(drag);
-    this.#canvas.onGesture = (gesture) => this.#editor?.take(gesture);
+    this.#canvas.onGesture = (gesture) => {
+      if (this.#placesAreOnMap()) this.#editor?.take(gesture);
+      else this.#robot.notify("Places are poses in map, and no transform leads there: write their numbers instead.");
+    };
     this.#canvas.onPress = (event) => this.#editor?.press(event) ?? false;
     this.element.onkeydown = ({ key }) => {
       if (key === "Escape") this.#choose("move");

@@ -30,7 +30,7 @@ from rbxcompose.tools.robot_editor.parts import IncludedParts, OfferedPart, offe
 from rbxcompose.tools.robot_editor.subjects import Muxes, Places, Subject
 from rbxcompose.tools.robot_editor.written_at import entry_at, file_of, value_at
 
-MOST_CHANGES = 200
+MOST_CHANGES = 100
 MOST_FINDINGS = 200
 
 Compile = Callable[[Mapping[Path, str]], Compilation]

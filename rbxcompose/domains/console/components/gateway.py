@@ -111,7 +111,7 @@ _STOPPED = 1.0  # [s] for all processes to answer to a stop over the bus
 _SHY = 5.0  # [s] for a client to say who it is
 _SAVING = 30.0  # [s] for a save
 _TRYING = 90.0  # [s] for a dry run, and for the tests of a mission
-_LONG = ("test", "try")
+_LONG = ("test", "try", "robot/")
 _LONGEST_LOGIN = 4096  # [bytes]
 _COOKIE_AGE = 365 * 24 * 3600  # [s]
 _POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; object-src 'none'"
@@ -1052,7 +1052,7 @@ class GatewaySession:
         self._pump()
 
     async def _edit_mission(self, number: int, request: Mapping[str, Any]) -> None:
-        process = self._trier if request["do"] in _LONG else self._editor
+        process = self._trier if request["do"].startswith(_LONG) else self._editor
         answer, refusal = await process.ask(request)
         if isinstance(answer, dict) and isinstance(model := answer.get("model"), dict):
             answer["model"] = await asyncio.to_thread(self._candidates.add, model["urdf"], model["meshes"])
