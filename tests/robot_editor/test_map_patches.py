@@ -160,6 +160,11 @@ def test_a_section_is_made_if_there_is_none(text: str) -> None:
     assert tree(after) == {"rbx": 1, "places": {"dock": {"x": "1 m", "y": "2 m"}}}
 
 
+def test_a_new_section_stands_apart_if_the_others_do() -> None:
+    text = "rbx: 1\n\nname: x\n"
+    assert with_entry(text, ("places",), "a", "{x: 1 m}").applied(text) == f"{text}\nplaces:\n  a: {{x: 1 m}}\n"
+
+
 @pytest.mark.parametrize(
     ("text", "why"),
     [

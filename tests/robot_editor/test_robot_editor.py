@@ -254,6 +254,20 @@ def test_a_part_that_is_there_twice_does_not_change_twice(project: Path) -> None
         save(editor_of(project), place("left_hall", x=1))
 
 
+def test_a_place_of_a_world_is_told_to_be_there(project: Path) -> None:
+    world = "rbx: 1\nkind: World\nname: flat\nplaces:\n  sofa: {x: 1 m, y: 2 m}\n"
+    (project / "robots/fetcher/flat.yaml").write_text(world, encoding="utf-8")
+    file = project / "robots/fetcher/robot.yaml"
+    file.write_text(f"{ROBOT}world: flat.yaml\n", encoding="utf-8")
+    why = r"'sofa' comes from the world 'flat.yaml', named at .*robot.yaml:15:8"
+    (sofa,) = [one for one in ask(editor_of(project), "look")["entries"] if one["name"] == "sofa"]
+    assert "comes from the world 'flat.yaml'" in sofa["why_not"]
+    renamed = {"op": "rename", "path": ["places", "sofa"], "name": "couch"}
+    for change in (place("sofa", "remove"), place("sofa", x=3), renamed):
+        with pytest.raises(Refused, match=why):
+            save(editor_of(project), change)
+
+
 def test_a_place_of_the_command_line_is_in_no_file(project: Path) -> None:
     with pytest.raises(Refused, match="--set"):
         save(editor_of(project, sets=["places.dock.x=3 m"]), place("dock", x=1))

@@ -110,7 +110,8 @@ class _MapPatch:
             return
         if node.is_flow:
             raise Refused(f"there is no '{top}', and what is around it is written within a line: {_BY_HAND}")
-        self.append(node, [f"{top}:", *inner])
+        apart = [""] if not known and "\n\n" in self.text else []  # as the other sections are
+        self.append(node, [*apart, f"{top}:", *inner])
         above[1].append([("scalar", top, _SCALAR), ["map", tree, _BLOCK]])
 
     def rename(self, path: Path, name: str) -> None:

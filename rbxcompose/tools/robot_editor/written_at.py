@@ -12,7 +12,7 @@ from rbxcompose.base.findings import Span
 from rbxcompose.base.requests import Refused
 from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
-from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode
+from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode, at
 from rbxcompose.tools.mission_editor.yaml_places import Path as TextPath
 from rbxcompose.tools.mission_editor.yaml_places import TextLines, placed
 from rbxcompose.tools.robot_editor.map_patches import path_to
@@ -35,7 +35,10 @@ def entry_at(manifest: RobotManifest, path: KeyPath, text_of: TextOf) -> tuple[P
     """
     steps = manifest.history.of(path)
     if not steps or steps[-1].node is None:
-        raise Refused(f"'{path[-1]}' stands in no file of the robot: what it belongs to brings it")
+        world = at(manifest.root, ("world",))
+        if path[0] == "places" and isinstance(world, ScalarNode):
+            raise Refused(f"'{path[-1]}' comes from the world '{world.text}', named at {world.span}: {_BY_HAND}")
+        raise Refused(f"'{path[-1]}' stands in no file of the robot")
     pieces = {step.span: step for step in steps if step.node is not None}
     if len({span.file for span in pieces}) > 1:
         names = " and ".join(sorted({span.file for span in pieces}))
@@ -60,6 +63,7 @@ def value_at(manifest: RobotManifest, path: KeyPath, text_of: TextOf) -> tuple[P
         return file, place[:-1], str(place[-1])
     above = manifest.history.of(path[:-1])
     if not above or not isinstance(above[-1].node, MappingNode):
+        entry_at(manifest, path[:2], text_of)  # it may know why
         raise Refused(f"'{path[-2]}' is no map in a file of the robot")
     file, place = _located(manifest, above[-1].node, above[-1].span, text_of)
     return file, place, str(path[-1])
