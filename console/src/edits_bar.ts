@@ -14,7 +14,7 @@ export class EditsBar<E extends Entry> {
   readonly #edits: RobotEdits<E>;
   readonly #says = h("p", { class: "editor-says", role: "status" });
   readonly #verdict = h("span", { class: "chip", role: "status" });
-  readonly #list = h("ul", { class: "findings", "aria-label": "Mistakes" });
+  readonly #list = h("ul", { class: "findings", tabindex: "0", "aria-label": "Mistakes" });
   readonly #undo = barButton("undo", "Undo", () => void this.#edits.undo());
   readonly #redo = barButton("redo", "Redo", () => void this.#edits.redo());
   readonly #save = barButton("check", "Save", () => void this.#offer());
@@ -100,7 +100,7 @@ export async function confirmed(host: HTMLElement, trial: SaveTrial): Promise<bo
     trial.errors > 0
       ? [h("p", { class: "finding" }, icon("warning"), `It has ${verdict(trial)}: the robot does not come up with it.`)]
       : [];
-  const list = fresh.length > 0 ? [h("ul", { class: "findings" }, ...findingRows(fresh, 0))] : [];
+  const list = fresh.length > 0 ? [h("ul", { class: "findings", tabindex: "0", "aria-label": "What is wrong then" }, ...findingRows(fresh, 0))] : [];
   const yes = h("button", { type: "submit", value: "yes" }, icon("check"), "Write it");
   const no = h("button", { type: "submit", value: "no" }, icon("cross"), "Not now");
   const shown = h("ol", { class: "difference", tabindex: "0", "aria-label": "What changes" }, ...lines);

@@ -159,6 +159,21 @@ def test_a_mission_that_uses_a_deleted_place_is_named(open_page: Callable[..., P
     expect(page.get_by_text("No mistakes")).to_be_visible()
 
 
+def test_many_mistakes_can_be_read_by_keys(open_page: Callable[..., Page], project: EditedProject) -> None:
+    mission = project.folder / "missions/fetch.yaml"
+    mission.write_text(project.text("missions/fetch.yaml") + "  - go_to: window_seat\n" * 20, encoding="utf-8")
+    page = open_page(page_name="map", viewport=PHONE)
+    panel = edits(page)
+    panel.get_by_role("button", name="Window seat").click()
+    panel.get_by_role("button", name="Delete this place").click()
+    expect(page.get_by_label("Mistakes", exact=True).get_by_role("listitem").first).to_be_visible()
+    expect_fit(page)
+    page.get_by_role("button", name="Save").click()
+    expect(page.get_by_role("dialog")).to_contain_text("the robot does not come up with it")
+    expect_fit(page)
+    shows(page, "places_many")
+
+
 @pytest.mark.parametrize(
     ("label", "text", "why"),
     [
