@@ -98,7 +98,7 @@ export async function confirmed(host: HTMLElement, trial: SaveTrial): Promise<bo
   const fresh = trial.findings.filter(({ is_new }) => is_new);
   const warning =
     trial.errors > 0
-      ? [h("p", { class: "finding" }, icon("warning"), `It has ${verdict(trial)}: the robot does not come up with it.`)]
+      ? [h("p", { class: "finding" }, icon("warning"), h("span", { class: "finding-words" }, `It has ${verdict(trial)}: the robot does not come up with it.`))]
       : [];
   const list = fresh.length > 0 ? [h("ul", { class: "findings", tabindex: "0", "aria-label": "What is wrong then" }, ...findingRows(fresh, 0))] : [];
   const yes = h("button", { type: "submit", value: "yes" }, icon("check"), "Write it");

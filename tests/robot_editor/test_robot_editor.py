@@ -188,6 +188,7 @@ def test_if_one_of_two_files_cannot_be_written_neither_is(
         (place("dock", x=1e9), "farther away than"),
         (place("dock", x=True), "'x' must be a finite number"),
         (place("dock", x=10**400), "'x'"),
+        (place("dock", x=f"1.{'0' * 1000} m"), "at most 60 characters"),
         (place("dock", x="1 kg"), "'x' must be a length"),
         (place("dock", x="1 m, y: 3 m"), "'x' must be a length"),
         (place("dock", heading="90"), "the unit is missing"),

@@ -239,6 +239,8 @@ def quantity_text(key: str, value: Any, dimension: Dimension, old: str) -> tuple
     """
     try:
         if isinstance(value, str):
+            if len(value) > _LONGEST:
+                raise UnitError(f"must have at most {_LONGEST} characters")
             return to_si(value, dimension), " ".join(value.split())
         if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
             raise UnitError("must be a finite number")
