@@ -32,6 +32,7 @@ const ICONS = {
   cross: "M6 6l12 12M18 6 6 18",
   skip: "M6 12h12",
   dot: "M12 11.900v.200",
+  up: "M6 14.500l6-6 6 6",
   down: "M6 9.500l6 6 6-6",
   alarm: "M8 3h8l5 5v8l-5 5H8l-5-5V8zM12 8v5M12 16h.010",
   check: "M4.500 12.500l5 5 10-11",

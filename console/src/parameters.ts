@@ -88,10 +88,11 @@ export function parsed(setting: Setting, text: string): { value: Value } | { why
 }
 
 /** Returns the limits of a number in words, empty if it has none. */
-export function limitsOf({ least, most, unit }: Setting): string {
+export function limitsOf({ least, most, step, unit }: Setting): string {
   const shown = (value: number) => `${tidy(value)} ${unit}`.trim();
-  if (least !== null && most !== null) return `${shown(least)} to ${shown(most)}`;
-  return least !== null ? `from ${shown(least)}` : most !== null ? `up to ${shown(most)}` : "";
+  const both = least !== null && most !== null ? `${shown(least)} to ${shown(most)}` : "";
+  const limits = both || (least !== null ? `from ${shown(least)}` : most !== null ? `up to ${shown(most)}` : "");
+  return [limits, step > 0 ? `in steps of ${shown(step)}` : ""].filter(Boolean).join(", ");
 }
 
 export interface Slide {

@@ -211,6 +211,24 @@ def test_live_values_are_saved_at_their_places_reset_and_compared(do: Do, base: 
     assert file.read_text() == before
 
 
+def test_only_what_a_dry_run_showed_is_saved_if_that_is_wanted(do: Do, base: Path) -> None:
+    file = base / "robot.yaml"
+    before = file.read_text()
+    do("param", "set", "battery.runtime=33 s")
+    told = json.loads(do("param", "save", "--dry-run", "--json").stdout)
+    removed, added = (line for line in told["difference"] if line[0] in "+-")
+    assert added == removed.replace("-", "+", 1).replace("45 s", "33 s")
+    file.write_text(f"{before}# edited meanwhile\n")
+    done = do("param", "save", "--only-as", told["hash"])
+    assert (done.returncode, "have changed since they were shown" in done.stderr) == (1, True), done.stderr
+    assert file.read_text() == f"{before}# edited meanwhile\n"
+    file.write_text(before)
+    assert do("param", "save", "--only-as", told["hash"]).returncode == 0
+    assert file.read_text() == before.replace("45 s", "33 s")
+    file.write_text(before)
+    assert do("param", "reset").returncode == 0
+
+
 def test_a_setting_in_a_group_is_treated_as_any_other(do: Do, base: Path, tmp_path: Path) -> None:
     file = base / "robot.yaml"
     before = file.read_text()

@@ -539,3 +539,34 @@ def test_bad_frames_close_at_most_their_own_connection(robot: Robot) -> None:
 
     browse(talk)
     assert get("/console/config")[0] == 200
+
+
+def test_a_place_is_moved_in_the_file_of_the_robot_that_runs(robot: Robot) -> None:
+    before = robot.file.read_text(encoding="utf-8")
+
+    async def edit(browser: Browser) -> None:
+        told = (await browser.calls("/console/robot/look", subject="places", changes=[]))["answer"]
+        first = told["entries"][0]
+        path = ["places", first["name"]]
+        changes = [{"op": "set", "path": path, "values": {"x": 1.25}}]
+        given = {"subject": "places", "changes": changes, "hashes": told["hashes"]}
+        trial = (await browser.calls("/console/robot/save", dry_run=True, **given))["answer"]
+        assert [line[0] for line in trial["diff"]].count("+") == 1
+        assert robot.file.read_text(encoding="utf-8") == before
+        assert (await browser.calls("/console/robot/save", **given))["success"]
+        refused = await browser.calls("/console/robot/save", **given)
+        assert "has changed on disk" in refused["message"]
+        built = (await browser.calls("/console/robot/look", subject="include", changes=[]))["answer"]
+        assert "<robot" in built["model"]
+        offered = (await browser.calls("/console/robot/palette"))["answer"]
+        assert "rbx:parts/xtion.yaml" in [part["file"] for part in offered]
+
+    try:
+        browse(edit)
+        after = robot.file.read_text(encoding="utf-8")
+        changed = [line for line in after.splitlines() if line not in before.splitlines()]
+        assert len(changed) == 1
+        assert "1.25 m" in changed[0]
+        assert len(after.splitlines()) == len(before.splitlines())
+    finally:
+        robot.file.write_text(before, encoding="utf-8")

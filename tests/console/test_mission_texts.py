@@ -10,8 +10,9 @@ import pytest
 
 from rbxcompose.domains.console.access import Role, needed
 from rbxcompose.domains.console.editor_process import MOST_WAITING, EditorProcess
-from rbxcompose.domains.console.protocol import MISSION_TEXTS, EditMission
+from rbxcompose.domains.console.protocol import MISSION_TEXTS, ROBOT_TEXTS, EditMission
 from rbxcompose.tools.mission_editor.editor import REQUESTS
+from rbxcompose.tools.robot_editor.editor import ROBOT_REQUESTS
 from tests.console.clients import Room
 
 READ = {"mission": "patrol"}
@@ -90,3 +91,35 @@ def test_a_process_that_fails_is_told_and_started_again(code: str) -> None:
 def test_too_many_at_once_are_refused() -> None:
     answers = exchange(ECHO, *[{}] * (MOST_WAITING + 3))
     assert [refused for _, refused in answers].count("the editor is busy: try again") == 3
+
+
+MOVED = {"subject": "places", "changes": [{"op": "remove", "path": ["places", "dock"]}], "hashes": {}}
+
+
+def test_what_the_robot_is_is_edited_by_the_same_process() -> None:
+    room = Room()
+    client = room.client(who="10.0.0.7")
+    assert set(ROBOT_TEXTS) == set(ROBOT_REQUESTS)
+    assert client.does("call_service", service="/console/robot/look", args=MOVED) == []
+    (asked,) = room.asked()
+    assert isinstance(asked, EditMission)
+    assert asked.request == {"do": "robot/look", **MOVED}
+    client.does("call_service", service="/console/robot/save", args={**MOVED, "dry_run": True})
+    assert not any("saves" in note for note in room.bridge.notes)
+    client.does("call_service", service="/console/robot/save", args=MOVED)
+    assert room.bridge.notes[-1] == "10.0.0.7 (configure): saves places of the robot"
+
+
+def test_only_who_configures_may_change_what_the_robot_is() -> None:
+    room = Room()
+    for role in (Role.VIEW, Role.OPERATE):
+        client = room.client(role)
+        assert client.does("call_service", service="/console/robot/look", args=MOVED) == []
+        assert "needs the role 'configure'" in client.calls("/console/robot/save", MOVED)
+
+
+@pytest.mark.parametrize("args", [None, {}, {"subject": 7, "changes": [], "hashes": {}}, {"subject": "places"}])
+def test_changes_without_what_they_need_are_refused(args: Any) -> None:
+    room = Room()
+    assert "is missing" in room.client().calls("/console/robot/save", args)
+    assert room.asked() == []

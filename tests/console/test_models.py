@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.domains.console.models import MESHES, ServedModel
+from rbxcompose.domains.console.models import MESHES, CandidateModels, ServedModel
 
 URDF = """<robot name="cart">
   <link name="base"><visual><geometry><mesh filename="meshes/base.STL"/></geometry></visual></link>
@@ -74,3 +74,19 @@ def test_a_mesh_that_was_never_there_or_is_gone_is_not_served(model: ServedModel
 
 def test_a_robot_without_a_body_has_no_urdf() -> None:
     assert ServedModel("", {}).urdf is None
+
+
+def test_bodies_that_nobody_has_saved_have_addresses_of_their_own(mesh: Path) -> None:
+    models = CandidateModels()
+    text = models.add(URDF, {"meshes/base.STL": str(mesh)})
+    address = text.partition(f'"{MESHES}')[2].partition('"')[0]
+    found = models.mesh(address)
+    assert found is not None
+    assert found.content == b"solid base"
+    assert models.add(URDF, {"meshes/base.STL": str(mesh)}) == text
+    for wrong in ("0/base.STL", "candidates/", "candidates/x/0/base.STL", address.replace("base.STL", "../secret")):
+        assert models.mesh(wrong) is None
+    for number in range(20):
+        models.add(URDF.replace("cart", f"cart_{number}"), {"meshes/base.STL": str(mesh)})
+    assert models.mesh(address) is None
+    assert models.add("", {}) == ""

@@ -49,6 +49,7 @@ class Battery:
         }
         self.manifest = dict(self.values)
         self.refusal = ""
+        self.seen: str | None = None  # the hash that is right, if the files are others than those of the dry run
         descriptors = [RUNTIME, WARN, MODE, LAMP, FIXED]
         gateway.answers |= {
             "/rosapi/services": lambda _: {"services": ["/battery/describe_parameters", "/lamp"]},
@@ -71,10 +72,19 @@ class Battery:
             {"component": "battery", "name": name, "old": next(reversed(self.manifest[name].values())), "new": 0}
             for name in changed
         ]
+        told = str(len(saved)) if self.seen is None else self.seen
         if not request["dry_run"]:
+            if request["hash"] != told:
+                message = "nothing is saved: the files or the values have changed since they were shown"
+                return {"success": False, "message": message, "answer": None}
             self.manifest = dict(self.values)
         places = [f"robot.yaml:{30 + turn}:14" for turn in range(len(saved))]
-        return {"success": True, "message": "", "answer": {"saved": saved, "places": places}}
+        lines = ["@@ robot.yaml @@", *(line for name in changed for line in (f"-  {name}: old", f"+  {name}: new"))]
+        return {
+            "success": True,
+            "message": "",
+            "answer": {"saved": saved, "places": places, "difference": lines, "hash": str(len(saved))},
+        }
 
 
 @pytest.fixture
@@ -92,11 +102,36 @@ def test_a_slider_changes_a_parameter_and_save_keeps_it(open_page: Callable[...,
         page.keyboard.press("ArrowRight")
     expect(runtime).to_have_value("50")
     expect(page.get_by_text("not saved; the manifest has 45 s")).to_be_visible()
+    expect(page.get_by_text("as in the manifest").first).to_be_visible()
     page.get_by_role("button", name="Save 1").click()
+    dialog = page.get_by_role("dialog")
+    expect(dialog.get_by_label("added")).to_have_text("+  runtime: new")
+    assert violations(page) == []
+    dialog.get_by_role("button", name="Not now").click()
+    expect(page.get_by_text("Not saved.")).to_be_visible()
+    assert battery.manifest["runtime"] == number(45.0)
+    page.get_by_role("button", name="Save 1").click()
+    page.get_by_role("dialog").get_by_role("button", name="Write it").click()
     expect(page.get_by_text("battery runtime: robot.yaml:30:14")).to_be_visible()
     expect(page.get_by_role("button", name="Saved")).to_be_disabled()
     assert battery.manifest["runtime"] == number(50)
     assert len(battery.gateway.calls("/battery/set_parameters")) <= 5
+
+
+def test_what_changed_after_it_was_shown_is_not_written(open_page: Callable[..., Page], battery: Battery) -> None:
+    page = open_page(page_name="parameters")
+    page.get_by_label("Runtime", exact=True).fill("60")
+    page.keyboard.press("Enter")
+    page.get_by_role("button", name="Save 1").click()
+    battery.seen = "another one"
+    page.get_by_role("dialog").get_by_role("button", name="Write it").click()
+    expect(page.get_by_text("have changed since they were shown")).to_be_visible()
+    assert battery.manifest["runtime"] == number(45.0)
+
+
+def test_limits_stand_beside_the_field(open_page: Callable[..., Page], battery: Battery) -> None:
+    page = open_page(page_name="parameters")
+    expect(page.get_by_text("Time from full to empty. 0 s to 100 s")).to_be_visible()
 
 
 def test_each_kind_has_its_control_and_what_is_fixed_has_none(open_page: Callable[..., Page], battery: Battery) -> None:

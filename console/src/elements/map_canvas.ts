@@ -24,9 +24,12 @@ import {
 } from "../map";
 
 export interface ShownPlace extends Pose {
+  name: string;
   label: string;
   colour: string;
   isDock: boolean;
+  /** Whether it is being edited: it has a handle by which it is turned. */
+  isChosen?: boolean;
 }
 
 /** A grid, and the transform from its frame to that of the map. */
@@ -56,13 +59,20 @@ export interface Scene {
 }
 
 /** What a drag does: it moves the view, or it is a pose or a distance. */
-export type Tool = "move" | "go" | "initial" | "measure";
+export type Tool = "move" | "go" | "initial" | "measure" | "places";
 
 /** What a finished drag meant. */
 export interface Drag {
-  tool: Exclude<Tool, "move">;
+  tool: Exclude<Tool, "move" | "places">;
   pose: Pose;
   end: Point;
+}
+
+/** What a finished drag means while places are edited; `pose` is where the place is then. */
+export interface MapGesture {
+  is: "add" | "move" | "turn" | "choose";
+  name: string;
+  pose: Pose;
 }
 
 const ZOOM = 1.3; // by a key or a button
@@ -70,6 +80,8 @@ const STEP = 60; // [px] by an arrow key
 const ROBOT = 13; // [px] from the middle of the robot to its nose
 const PLACE = 9; // [px] half the size of a place
 const ARROW = 36; // [px]
+const HANDLE = 52; // [px] from the middle of a place to what turns it
+const REACH = 22; // [px] around what a finger takes hold of
 const HATCH = 10; // [px] between two lines
 const FONT = "13px system-ui, sans-serif";
 const KEYS: Record<string, readonly [right: number, down: number]> = {
@@ -82,6 +94,10 @@ const KEYS: Record<string, readonly [right: number, down: number]> = {
 export class MapCanvas extends HTMLElement {
   /** Called when a drag with a tool has ended. */
   onDrag: (drag: Drag) => void = () => undefined;
+  /** Called when a drag has ended while places are edited. */
+  onGesture: (gesture: MapGesture) => void = () => undefined;
+  /** Called for keys while places are edited; returns whether they mean something there. */
+  onPress: (event: KeyboardEvent) => boolean = () => false;
 
   #scene: Scene = {
     robot: null,
@@ -100,7 +116,7 @@ export class MapCanvas extends HTMLElement {
   #isMovedByHand = false;
   #tool: Tool = "move";
   readonly #pointers = new Map<number, Point>();
-  #drag: { pointer: number; from: Point; to: Point } | null = null;
+  #drag: { pointer: number; from: Point; to: Point; held: Held | null } | null = null;
   #measured: { from: Point; to: Point } | null = null;
   #frame = 0;
   readonly #canvas = h("canvas", {
@@ -219,7 +235,8 @@ export class MapCanvas extends HTMLElement {
       this.#drag = null; // a second finger: the view is meant
     } else if (this.#tool !== "move" && event.button === 0) {
       const at = { x: event.offsetX, y: event.offsetY };
-      this.#drag = { pointer: event.pointerId, from: at, to: at };
+      const held = this.#tool === "places" ? heldAt(this.#view, this.#scene.places, at) : null;
+      this.#drag = { pointer: event.pointerId, from: at, to: at, held };
       this.#measure();
     }
     this.#schedule();
@@ -252,8 +269,9 @@ export class MapCanvas extends HTMLElement {
     if (drag?.pointer !== event.pointerId) return;
     this.#drag = null;
     this.#schedule();
-    if (this.#tool === "move") return;
-    if (isMeant) this.onDrag({ tool: this.#tool, pose: this.#posed(drag), end: toWorld(this.#view, drag.to) });
+    if (this.#tool === "move" || !isMeant) return;
+    if (this.#tool === "places") this.onGesture(this.#gesture(drag));
+    else this.onDrag({ tool: this.#tool, pose: this.#posed(drag), end: toWorld(this.#view, drag.to) });
   }
 
   /** Returns the pose of a drag; a tap looks away from the robot, which comes from there. */
@@ -261,7 +279,16 @@ export class MapCanvas extends HTMLElement {
     const { robot } = this.#scene;
     const at = toWorld(this.#view, from);
     const ahead = robot ? Math.atan2(at.y - robot.y, at.x - robot.x) : 0;
-    return draggedPose(this.#view, from, to, this.#tool === "initial" ? (robot?.heading ?? 0) : ahead);
+    const otherwise = { initial: robot?.heading ?? 0, places: 0 }[this.#tool as string] ?? ahead;
+    return draggedPose(this.#view, from, to, otherwise);
+  }
+
+  /** Returns what a drag means: a place is moved or turned by its hold, and made where there is none. */
+  #gesture({ from, to, held }: { from: Point; to: Point; held: Held | null }): MapGesture {
+    if (!held) return { is: "add", name: "", pose: draggedPose(this.#view, from, to, 0) };
+    const { place, is } = held;
+    if (distance(from, to) < STILL) return { is: "choose", name: place.name, pose: place };
+    return { is, name: place.name, pose: heldPose(this.#view, held, from, to) };
   }
 
   #measure(): void {
@@ -272,7 +299,8 @@ export class MapCanvas extends HTMLElement {
   #key(event: KeyboardEvent): void {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const step = KEYS[event.key];
-    if (step) this.#look(panned(this.#view, ...step));
+    if (this.#tool === "places" && this.onPress(event)) event.stopPropagation();
+    else if (step) this.#look(panned(this.#view, ...step));
     else if (event.key === "+" || event.key === "=") this.zoom(ZOOM);
     else if (event.key === "-") this.zoom(1 / ZOOM);
     else if (event.key === "0" || event.key === "Home") this.fit();
@@ -316,14 +344,22 @@ export class MapCanvas extends HTMLElement {
     pen.stroke(scene.trail, "faint", 2, [2, 4]);
     for (const path of scene.paths) pen.stroke(path, "good", 3);
     for (const scan of scene.scans) pen.dots(scan);
-    for (const place of scene.places) pen.place(place);
+    const places = scene.places.map((place) => this.#asHeld(place));
+    for (const place of places) pen.place(place);
     if (scene.goal) pen.arrow(scene.goal, "good", [6, 4]);
     if (scene.robot) pen.robot(scene.robot, scene.isOld);
-    for (const { label, ...at } of scene.places) pen.label(at, label, 2.6 * PLACE);
+    for (const { label, ...at } of places) pen.label(at, label, 2.6 * PLACE);
     for (const { text, ...at } of scene.labels) pen.label(at, text, 0);
     if (this.#measured) pen.measure(this.#measured.from, this.#measured.to);
-    if (this.#drag && this.#tool !== "measure") pen.arrow(this.#posed(this.#drag), "good");
+    if (this.#drag && this.#tool !== "measure" && !this.#drag.held) pen.arrow(this.#posed(this.#drag), "good");
     pen.scaleBar();
+  }
+
+  /** Returns a place as it is while it is dragged. */
+  #asHeld(place: ShownPlace): ShownPlace {
+    const held = this.#drag?.held;
+    if (!this.#drag || held?.place.name !== place.name) return place;
+    return { ...place, ...heldPose(this.#view, held, this.#drag.from, this.#drag.to) };
   }
 
   #pictureOf({ grid, isCost }: ShownGrid, colour: (name: string) => string): HTMLCanvasElement {
@@ -339,6 +375,36 @@ export class MapCanvas extends HTMLElement {
     }
     return picture;
   }
+}
+
+/** A place that is held by a drag, at itself or at the handle that turns it. */
+interface Held {
+  place: ShownPlace;
+  is: "move" | "turn";
+}
+
+const STILL = 6; // [px] that a hand moves without meaning it
+
+/** Returns what is held at a pixel: the handle of the chosen place goes before places, and the nearest place before others. */
+function heldAt(view: View, places: readonly ShownPlace[], at: Point): Held | null {
+  const chosen = places.find(({ isChosen }) => isChosen);
+  if (chosen && distance(handleOf(view, chosen), at) <= REACH) return { place: chosen, is: "turn" };
+  const away = (place: ShownPlace) => distance(toScreen(view, place), at);
+  const [nearest] = [...places].sort((one, other) => away(one) - away(other));
+  return nearest && away(nearest) <= REACH ? { place: nearest, is: "move" } : null;
+}
+
+function handleOf(view: View, { heading, ...at }: Pose): Point {
+  const { x, y } = toScreen(view, at);
+  return { x: x + HANDLE * Math.cos(heading), y: y - HANDLE * Math.sin(heading) };
+}
+
+/** Returns where a place is while it is dragged. */
+function heldPose(view: View, { place, is }: Held, from: Point, to: Point): Pose {
+  const at = toScreen(view, place);
+  const pose = { x: place.x, y: place.y, heading: place.heading };
+  if (is === "turn") return { ...pose, heading: Math.atan2(at.y - to.y, to.x - at.x) };
+  return { ...pose, ...toWorld(view, { x: at.x + to.x - from.x, y: at.y + to.y - from.y }) };
 }
 
 /** Returns the parts of a colour, however it is written: a context knows them all. */
@@ -464,8 +530,9 @@ class Pen {
     }
   }
 
-  /** A place is a square, the dock a ring; a line shows the heading. */
-  place({ colour, isDock, ...pose }: ShownPlace): void {
+  /** A place is a square, the dock a ring; a line shows the heading. One that is chosen has a handle to turn it by. */
+  place({ colour, isDock, isChosen, ...pose }: ShownPlace): void {
+    if (isChosen) this.handle(pose);
     const context = this.#at(pose, pose.heading);
     context.lineWidth = 2;
     context.strokeStyle = this.#colour("ink");
@@ -485,6 +552,24 @@ class Pen {
     context.beginPath();
     context.moveTo(isDock ? 1.4 * PLACE : PLACE, 0);
     context.lineTo(2.6 * PLACE, 0);
+    context.stroke();
+  }
+
+  handle(pose: Pose): void {
+    const context = this.#at(pose, pose.heading);
+    context.lineWidth = 2;
+    context.strokeStyle = this.#colour("accent");
+    context.fillStyle = this.#colour("card");
+    context.moveTo(0, 0);
+    context.lineTo(HANDLE, 0);
+    context.stroke();
+    context.beginPath();
+    context.arc(HANDLE, 0, 8, 0, 2 * Math.PI);
+    context.fill();
+    context.stroke();
+    context.beginPath();
+    context.setLineDash([4, 4]);
+    context.arc(0, 0, REACH, 0, 2 * Math.PI);
     context.stroke();
   }
 

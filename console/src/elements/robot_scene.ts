@@ -35,6 +35,7 @@ const VEILED = { transparent: true, opacity: 0.75 }; // so that the robot is see
 const TALL = 0.6; // [m] of walls: a map does not say how high they are
 const AROUND = 2.5; // [m] the least distance from which a robot is seen in its world
 const FAR = 100; // [m]
+const FADED = 0.2; // of links that a changed robot has no more
 const SAME = 1e-3; // [rad, m]
 const SQUARE = 0.5; // [m] of the lines on the ground
 const VIEWS = { Front: [1, 0, 0.25], Side: [0, 1, 0.25], Top: [0.001, 0, 1], Corner: [1, 1, 0.7], All: [-0.3, -0.8, 1] } as const;
@@ -42,7 +43,7 @@ export type View = keyof typeof VIEWS;
 
 export class RobotScene {
   readonly element = document.createElement("div");
-  /** Called when the handle was let go, with where it is in the frame of the robot's root. */
+  /** Called when the handle was let go, with where it is in the frame that it was shown in. */
   onDrag: (pose: Pose) => void = () => undefined;
   /** Names of meshes that could not be read. */
   readonly missing: string[] = [];
@@ -56,6 +57,9 @@ export class RobotScene {
   readonly #observer = new ResizeObserver(() => this.#resize());
   #robot: URDFRobot | null = null;
   #ghost: URDFRobot | null = null;
+  #draft: URDFRobot | null = null; // the robot with changes that nobody has saved
+  #draftLinks: ReadonlySet<string> = new Set();
+  #gone: readonly string[] = [];
   #things: three.Mesh[] = [];
   readonly #ground = new three.GridHelper(20 * SQUARE, 20, 0x808890, 0x808890);
   readonly #scans = new Map<string, three.Points>();
@@ -91,24 +95,7 @@ export class RobotScene {
 
   /** Shows a body; meshes that cannot be read are left out and named in `missing`. */
   load(urdf: string, changed: () => void): JointLimits[] {
-    const parse = () => {
-      const loader = new URDFLoader();
-      loader.loadMeshCb = (path, _manager, _material, done) => {
-        void readMesh(path).then(
-          (mesh) => {
-            done(mesh);
-            this.#style();
-            changed();
-          },
-          () => {
-            if (!this.missing.includes(path)) this.missing.push(path);
-            done(new three.Group());
-            changed();
-          },
-        );
-      };
-      return loader.parse(urdf);
-    };
+    const parse = () => this.#parse(urdf, changed);
     this.#robot = parse();
     this.#ghost = parse();
     this.#ghost.visible = false;
@@ -118,6 +105,48 @@ export class RobotScene {
     return Object.values(this.#robot.joints)
       .filter((joint) => ["revolute", "continuous", "prismatic"].includes(joint.jointType) && !("mimicJoint" in joint && joint.mimicJoint))
       .map(({ urdfName, jointType, limit }) => ({ name: urdfName, kind: jointType as JointLimits["kind"], lower: limit.lower, upper: limit.upper }));
+  }
+
+  #parse(urdf: string, changed: () => void): URDFRobot {
+    const loader = new URDFLoader();
+    loader.loadMeshCb = (path, _manager, _material, done) => {
+      void readMesh(path).then(
+        (mesh) => {
+          done(mesh);
+          this.#style();
+          changed();
+        },
+        () => {
+          if (!this.missing.includes(path)) this.missing.push(path);
+          done(new three.Group());
+          changed();
+        },
+      );
+    };
+    return loader.parse(urdf);
+  }
+
+  /** Shows links of a changed body as a ghost on the robot, and fades those that it has no more; or nothing of it. */
+  preview(urdf: string, ghosts: ReadonlySet<string>, gone: readonly string[], changed: () => void): void {
+    this.#draft?.removeFromParent();
+    this.#draft = null;
+    for (const link of this.#gone) this.setAlpha(link, 1);
+    this.#gone = gone;
+    for (const link of gone) this.setAlpha(link, FADED);
+    this.#draftLinks = ghosts;
+    if (urdf && ghosts.size > 0 && this.#robot) {
+      this.#draft = this.#parse(urdf, changed);
+      this.#draft.position.copy(this.#robot.position);
+      this.#draft.quaternion.copy(this.#robot.quaternion);
+      this.#draft.setJointValues(this.#angles());
+      this.#scene.add(this.#draft);
+      this.#style();
+    }
+    this.#draw();
+  }
+
+  #angles(): Record<string, number> {
+    return Object.fromEntries(Object.values(this.#robot!.joints).map((joint) => [joint.urdfName, Number(joint.angle)]));
   }
 
   /** Names of the links that can be seen, sorted. */
@@ -135,6 +164,7 @@ export class RobotScene {
 
   setJoints(positions: Record<string, number>): void {
     this.#robot?.setJointValues(positions);
+    this.#draft?.setJointValues(positions);
     this.#draw();
   }
 
@@ -143,7 +173,7 @@ export class RobotScene {
     if (!this.#ghost || !this.#robot) return;
     this.#ghost.visible = positions !== null;
     if (positions) {
-      const now = Object.fromEntries(Object.values(this.#robot.joints).map((joint) => [joint.urdfName, Number(joint.angle)]));
+      const now = this.#angles();
       this.#ghost.setJointValues({ ...now, ...positions });
       const moved = new Set(Object.keys(positions).filter((name) => Math.abs(positions[name]! - (now[name] ?? 0)) > SAME));
       showBelow(this.#ghost, moved, false);
@@ -162,7 +192,7 @@ export class RobotScene {
     const way = new three.Vector3(translation.x, translation.y, translation.z).sub(this.#robot.position);
     const turn = new three.Quaternion(rotation.x, rotation.y, rotation.z, rotation.w);
     if (way.lengthSq() === 0 && turn.equals(this.#robot.quaternion)) return; // it stands: there is nothing to draw
-    for (const body of [this.#robot, this.#ghost!]) {
+    for (const body of [this.#robot, this.#ghost!, ...(this.#draft ? [this.#draft] : [])]) {
       body.position.add(way);
       body.quaternion.copy(turn);
     }
@@ -289,13 +319,14 @@ export class RobotScene {
     this.#draw();
   }
 
-  /** Shows a handle at a pose in the frame of the robot's root, or none. */
-  setHandle(pose: Pose | null): void {
-    if (!pose || !this.#robot) {
+  /** Shows a handle at a pose in the frame of the robot's root, or of a link, or none. */
+  setHandle(pose: Pose | null, link = ""): void {
+    const frame = link ? (this.#robot?.links[link] ?? this.#draft?.links[link]) : this.#robot;
+    if (!pose || !frame) {
       this.#gizmo.detach();
       this.#scene.remove(this.#gizmo.getHelper());
     } else {
-      this.#robot.add(this.#handle);
+      frame.add(this.#handle);
       this.#handle.position.set(pose.x, pose.y, pose.z);
       this.#handle.rotation.set(pose.roll, pose.pitch, pose.yaw, "ZYX");
       this.#gizmo.attach(this.#handle);
@@ -375,9 +406,14 @@ export class RobotScene {
       object.userData.styled = true;
       object.material = Array.isArray(object.material) ? object.material.map((one: three.Material) => one.clone()) : (object.material as three.Material).clone();
     });
-    this.#ghost?.traverse((object) => {
-      if (object instanceof three.Mesh) object.material = GHOST;
-    });
+    for (const ghost of [this.#ghost, this.#draft]) {
+      ghost?.traverse((object) => {
+        if (object instanceof three.Mesh) object.material = GHOST;
+      });
+    }
+    for (const [name, link] of Object.entries(this.#draft?.links ?? {})) {
+      for (const mesh of meshesOf(link)) mesh.visible = this.#draftLinks.has(name);
+    }
     this.#draw();
   }
 

@@ -2,7 +2,7 @@
 import type { Place } from "../config";
 import { watchComponents, type Component, type Port } from "../description";
 import { h, icon, setText, type Icon } from "../dom";
-import { MapCanvas, type Drag, type Tool } from "../elements/map_canvas";
+import { MapCanvas, type Drag, type ShownPlace, type Tool } from "../elements/map_canvas";
 import { formatAge, formatName, formatNumber, formatValue } from "../format";
 import {
   applied,
@@ -27,6 +27,7 @@ import {
   type Vector,
 } from "../map";
 import type { Page, Robot } from "../page";
+import { PlacesEditor } from "../places_editor";
 import { remember, wasOn } from "../remembered";
 import { thingMarkers } from "../seen";
 import { isMessage, type Json, type Message, type Rosbridge } from "../rosbridge";
@@ -53,6 +54,10 @@ const TOOLS: Record<Tool, readonly [words: string, hint: string]> = {
   go: ["Go", "Press where the robot is to go, and drag to where it is to look."],
   initial: ["Initial pose", "Press where the robot is, and drag to where it looks."],
   measure: ["Measure", "Drag from one point to another."],
+  places: [
+    "Edit places",
+    "Drag a place, or the handle of the chosen one to turn it; press elsewhere to add one. Arrow keys, Page Up and Page Down move and turn the chosen place, with Shift by 1 cm.",
+  ],
 };
 const ICONS: Record<Exclude<TripState["is"], "none">, Icon> = {
   driving: "play",
@@ -145,6 +150,8 @@ class MapView {
   readonly #cancel = button([icon("cross"), "Cancel"], () => this.#trip.cancel());
   readonly #numbers: HTMLFormElement;
   readonly #places: { place: Place; note: HTMLElement; go: HTMLButtonElement }[];
+  readonly #placesCard = h("section", { class: "card", "aria-label": "Places" });
+  #editor: PlacesEditor | null = null;
   readonly #layers = h("ul", { class: "map-list" });
   readonly #layersCard = h("section", { class: "card", "aria-label": "Layers" }, h("h2", {}, "Layers"), this.#layers);
   readonly #closers: (() => void)[] = [];
@@ -178,6 +185,7 @@ class MapView {
     trips.set(link, this.#trip);
     for (const [tool, [words]] of Object.entries(TOOLS) as [Tool, (typeof TOOLS)[Tool]][]) {
       this.#tools.set(tool, button([words], () => this.#choose(tool)));
+      if (tool === "places") this.#tools.get(tool)!.hidden = config.role !== "configure";
     }
     this.#places = config.places.map((place) => {
       const go = button(["Go"], () => this.#go(place, formatName(place.name), "map"));
@@ -189,6 +197,11 @@ class MapView {
     goal.append(this.#state, this.#note, this.#cancel);
     this.element = h("div", { class: "map" }, goal, this.#chart(), this.#side());
     this.#canvas.onDrag = (drag) => this.#dragged(drag);
+    this.#canvas.onGesture = (gesture) => {
+      if (this.#placesAreOnMap()) this.#editor?.take(gesture);
+      else this.#robot.notify("Places are poses in map, and no transform leads there: write their numbers instead.");
+    };
+    this.#canvas.onPress = (event) => this.#editor?.press(event) ?? false;
     this.element.onkeydown = ({ key }) => {
       if (key === "Escape") this.#choose("move");
     };
@@ -212,6 +225,7 @@ class MapView {
   close(): void {
     this.#isClosed = true;
     clearTimeout(this.#timer);
+    this.#editor?.close();
     for (const close of [...this.#closers, ...this.#followed.values()]) close();
   }
 
@@ -246,10 +260,11 @@ class MapView {
       : h("p", { class: "label" }, "This robot has no places. They are written under `places:` in its manifest.");
     const byNumbers = h("details", {}, h("summary", {}, "Another pose"), this.#numbers);
     this.#layersCard.hidden = true;
+    this.#placesCard.append(h("h2", {}, "Places"), places, byNumbers);
     return h(
       "div",
       { class: "map-side" },
-      h("section", { class: "card", "aria-label": "Places" }, h("h2", {}, "Places"), places, byNumbers),
+      this.#placesCard,
       this.#layersCard,
     );
   }
@@ -454,7 +469,7 @@ class MapView {
       robot: this.#pose,
       isOld: this.#isOld(),
       trail: this.#trail.points,
-      places: this.#placesAreOnMap() ? this.#robot.config.places.map((place) => this.#shownPlace(place)) : [],
+      places: this.#shownPlaces(),
       grids: drawn
         .flatMap(({ each, place }) => (each.is === "grid" ? [{ grid: each.grid, isCost: each.isCost, place }] : []))
         .sort((one, other) => Number(one.isCost) - Number(other.isCost)), // costs lie over the map
@@ -474,6 +489,12 @@ class MapView {
   /** Returns whether places, which are poses in `map`, can be drawn. */
   #placesAreOnMap(): boolean {
     return this.#fixed === "map";
+  }
+
+  #shownPlaces(): ShownPlace[] {
+    if (!this.#placesAreOnMap()) return [];
+    if (!this.#editor) return this.#robot.config.places.map((place) => this.#shownPlace(place));
+    return this.#editor.shown().map((place) => ({ ...place, isDock: this.#docks.has(place.name) }));
   }
 
   #shownPlace(place: Place) {
@@ -550,10 +571,30 @@ class MapView {
 
   #choose(tool: Tool): void {
     this.#tool = tool;
+    if (tool === "places") this.#edit();
     this.#measured = "";
     this.#canvas.tool = tool;
     for (const [name, each] of this.#tools) each.setAttribute("aria-pressed", String(name === tool));
     this.#showHint();
+  }
+
+  /** Opens the editor of places in place of their list; it stays while the view is moved or something is measured. */
+  #edit(): void {
+    if (this.#editor) return;
+    const stands = () => (this.#placesAreOnMap() ? this.#pose : null);
+    this.#editor = new PlacesEditor(this.#robot, () => this.#draw(), () => this.#endEdit(), stands);
+    this.#placesCard.hidden = true;
+    this.#placesCard.before(this.#editor.element);
+  }
+
+  #endEdit(): void {
+    this.#editor?.close();
+    this.#editor?.element.remove();
+    this.#editor = null;
+    this.#placesCard.hidden = false;
+    this.#choose("move");
+    this.#tools.get("places")!.focus();
+    this.#draw();
   }
 
   #dragged(drag: Drag): void {

@@ -5,6 +5,7 @@ import type { RobotScene, Pose, View } from "../elements/robot_scene";
 import { formatName } from "../format";
 import { armsOf, centred, moversOf, onWay, planOf, positionsOf, randomized, sliderOf, thingsOf, wayOf, type Arm, type JointSlider, type Mover, type Waypoint } from "../model";
 import type { Page, Robot } from "../page";
+import { PartsEditor } from "../parts_editor";
 import { Sender, tidy } from "../parameters";
 import { isMessage, type Goal, type Json, type Message } from "../rosbridge";
 import { quaternionOf } from "../forms";
@@ -62,10 +63,13 @@ class ModelView {
   readonly #says = h("p", { class: "says", role: "status" });
   readonly #missing = h("p", { class: "label", role: "status" });
   readonly #arms = h("div", { class: "model-arms" });
+  readonly #parts = h("div", { class: "model-parts" });
+  #editor: PartsEditor | null = null;
   readonly #surroundings: Surroundings;
   readonly #closers: (() => void)[] = [];
   #movers: Mover[] = [];
   #described = "";
+  #known: Arm[] = [];
   #wanted: Record<string, number> = {};
   #dragged: ArmGoal | null = null;
 
@@ -75,7 +79,8 @@ class ModelView {
     this.#sliders = scene.load(urdf, () => this.#showMissing()).map(sliderOf);
     this.#surroundings = new Surroundings(robot.link, scene);
     const stage = h("section", { class: "card stage", "aria-label": "The robot in 3D" }, scene.element, this.#views(), this.#missing);
-    this.element.append(stage, h("div", { class: "model-side" }, this.#arms, this.#joints(), this.#links()));
+    this.element.append(stage, h("div", { class: "model-side" }, this.#parts, this.#arms, this.#joints(), this.#links()));
+    if (robot.config.role === "configure") this.#offerParts();
     this.#closers.push(
       watchComponents(robot.link, (components) => this.#learn(components)),
       robot.link.subscribe("/joint_states", (state) => this.#moved(state), { type: "sensor_msgs/msg/JointState", throttle: LOOK }),
@@ -85,10 +90,34 @@ class ModelView {
   }
 
   close(): void {
+    this.#editor?.close();
     this.#dragged?.close();
     this.#surroundings.close();
     this.#closers.forEach((close) => close());
     this.#scene.close();
+  }
+
+  // Parts
+
+  #offerParts(): HTMLButtonElement {
+    const edit = h("button", { type: "button" }, icon("edit"), "Edit parts");
+    edit.onclick = () => {
+      this.#dragged?.close(); // there is one handle
+      this.#dragged = null;
+      this.#arms.hidden = true;
+      this.#editor = new PartsEditor(this.#robot, this.#scene, () => this.#showMissing(), () => this.#endParts());
+      this.#parts.replaceChildren(this.#editor.element);
+    };
+    this.#parts.replaceChildren(edit);
+    return edit;
+  }
+
+  #endParts(): void {
+    this.#editor?.close();
+    this.#editor = null;
+    this.#arms.hidden = false;
+    this.#showArms();
+    this.#offerParts().focus();
   }
 
   #showMissing(): void {
@@ -114,9 +143,13 @@ class ModelView {
     this.#described = described;
     this.#movers = moversOf(components);
     this.#moves.disabled = this.#movers.length === 0;
-    const arms = armsOf(components).map((arm) => this.#armCard(arm));
-    this.#arms.replaceChildren(...arms);
+    this.#known = armsOf(components);
+    this.#showArms();
     this.#surroundings.learn(components);
+  }
+
+  #showArms(): void {
+    this.#arms.replaceChildren(...this.#known.map((arm) => this.#armCard(arm)));
   }
 
   #moved(state: Message): void {

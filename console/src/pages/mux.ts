@@ -2,6 +2,7 @@
 import { watchComponents } from "../description";
 import { emptyCard, h, icon, setText, type Icon } from "../dom";
 import { formatName } from "../format";
+import { MuxesEditor } from "../muxes_editor";
 import type { Page, Robot } from "../page";
 import { isMessage, type Json, type Message } from "../rosbridge";
 import "./mux.css";
@@ -45,7 +46,8 @@ export const page: Page = {
   order: 70,
   open(host, robot) {
     const box = h("div", { class: "muxes" }, emptyCard("wait", "Asking for the muxes\u2026"));
-    host.append(box);
+    const editing = editorBox(robot);
+    host.append(box, editing.element);
     let closers: (() => void)[] = [];
     let shown = "";
     const close = watchComponents(robot.link, (components, refused) => {
@@ -56,14 +58,38 @@ export const page: Page = {
       const views = names.map((name) => new MuxView(robot, name));
       closers = views.map((view) => () => view.close());
       const help = h("p", {}, "Muxes choose who commands a base or another part; they are written under `muxes:`.");
+      editing.element.hidden = views.length === 0;
       box.replaceChildren(...(views.length > 0 ? views.map(({ element }) => element) : [emptyCard("warning", refused || "This robot has no mux.", ...(refused ? [] : [help]))]));
     });
     return () => {
       close();
+      editing.close();
       closers.forEach((end) => end());
     };
   },
 };
+
+/** The editor of what the manifest says, which is opened by a button. */
+function editorBox(robot: Robot): { element: HTMLElement; close: () => void } {
+  const element = h("div", { class: "muxes" });
+  const edit = h("button", { type: "button", class: "muxes-edit" }, icon("edit"), "Edit priorities and timeouts");
+  let editor: MuxesEditor | null = null;
+  const close = () => {
+    editor?.close();
+    editor = null;
+  };
+  edit.onclick = () => {
+    editor = new MuxesEditor(robot, () => {
+      close();
+      element.replaceChildren(edit);
+      edit.focus();
+    });
+    element.replaceChildren(editor.element);
+  };
+  element.hidden = true;
+  if (robot.config.role === "configure") element.append(edit);
+  return { element, close };
+}
 
 class MuxView {
   readonly element: HTMLElement;

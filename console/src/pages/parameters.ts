@@ -1,5 +1,6 @@
 /** Parameters: what may change while the robot runs, by sliders, boxes and lists; kept in the manifest by Save. */
 import { emptyCard, h, icon, setText } from "../dom";
+import { confirmed } from "../edits_bar";
 import { formatName } from "../format";
 import type { Page, Robot } from "../page";
 import { limitsOf, parameterOf, parsed, Sender, settingOf, slideOf, tidy, valueOf, type Setting, type Value } from "../parameters";
@@ -8,8 +9,18 @@ import "./parameters.css";
 
 const PAUSE = 200; // [ms] between two values of a slider
 const SAVING = 30_000; // [ms]
+const UNSAVABLE = "It cannot be saved now";
 
-/** What `param save` would write: SI. */
+/** What `param save` would write. */
+interface Saving {
+  saved: Unsaved[];
+  places: string[];
+  difference: string[];
+  /** Of what was shown: only that is written. */
+  hash: string;
+}
+
+/** A value that is not as in the manifest, in SI. */
 interface Unsaved {
   component: string;
   name: string;
@@ -166,41 +177,47 @@ class ParametersView {
     do {
       this.#again = false;
       try {
-        this.#mark(await this.#saving(true));
+        this.#mark((await this.#saving(true)).saved);
+        if (this.#says.textContent?.startsWith(UNSAVABLE)) setText(this.#says, "");
       } catch (error) {
-        this.#mark([]);
-        this.#save.disabled = true;
-        this.#save.title = (error as Error).message;
+        this.#mark(null);
+        setText(this.#says, `${UNSAVABLE}: ${(error as Error).message}`);
+        this.#says.dataset.kind = "none";
       }
     } while (this.#again);
     this.#looking = false;
   }
 
-  async #saving(isTry: boolean): Promise<Unsaved[]> {
-    const answer = await this.#robot.link.call("/console/save", { names: [], dry_run: isTry }, SAVING);
+  async #saving(isTry: boolean, hash = ""): Promise<Saving> {
+    const given = { names: [], dry_run: isTry, hash };
+    const answer = await this.#robot.link.call("/console/save", given, SAVING);
     if (!isMessage(answer) || answer.success !== true) throw new Error(isMessage(answer) ? String(answer.message) : "no answer");
-    const { answer: told } = answer;
-    if (isMessage(told ?? null) && !isTry) this.#places = (told as Message).places;
-    return isMessage(told ?? null) && Array.isArray((told as Message).saved) ? ((told as Message).saved as unknown as Unsaved[]) : [];
+    const told = isMessage(answer.answer ?? null) ? (answer.answer as unknown as Partial<Saving>) : {};
+    return { saved: told.saved ?? [], places: told.places ?? [], difference: told.difference ?? [], hash: told.hash ?? "" };
   }
 
-  #places: Json | undefined;
-
-  #mark(unsaved: Unsaved[]): void {
-    const old = new Map(unsaved.map((one) => [`/${one.component}:${one.name}`, one.old]));
-    for (const [key, row] of this.#rows) row.mark(old.get(key));
-    this.#save.disabled = unsaved.length === 0;
-    this.#save.title = unsaved.length === 0 ? "Everything is as in the manifest" : "Write what has changed into the manifest";
-    this.#save.replaceChildren(icon("check"), unsaved.length === 0 ? "Saved" : `Save ${unsaved.length}`);
+  /** Marks what is not as in the manifest; null if that is not known. */
+  #mark(unsaved: Unsaved[] | null): void {
+    const old = new Map((unsaved ?? []).map((one) => [`/${one.component}:${one.name}`, one.old]));
+    for (const [key, row] of this.#rows) row.mark(old.get(key), unsaved !== null);
+    const count = unsaved?.length ?? 0;
+    this.#save.disabled = count === 0;
+    this.#save.replaceChildren(icon("check"), unsaved === null ? "Save" : count === 0 ? "Saved" : `Save ${count}`);
   }
 
   async #keep(): Promise<void> {
     this.#save.disabled = true;
-    setText(this.#says, "Saving\u2026");
+    setText(this.#says, "Comparing with the manifest\u2026");
+    this.#says.dataset.kind = "none";
     try {
       await Promise.all([...this.#rows.values()].map((row) => row.settled));
-      const saved = await this.#saving(false);
-      const places = Array.isArray(this.#places) ? this.#places.map(String) : [];
+      const { difference: diff, hash } = await this.#saving(true);
+      if (!(await confirmed(this.element, { diff, findings: [], errors: 0, count: 0 }))) {
+        setText(this.#says, "Not saved.");
+        return void this.#look();
+      }
+      setText(this.#says, "Saving\u2026");
+      const { saved, places } = await this.#saving(false, hash);
       setText(this.#says, saved.map(({ component, name }, at) => `${component} ${name}: ${places[at] ?? "saved"}`).join(", "));
       this.#says.dataset.kind = "good";
     } catch (error) {
@@ -272,12 +289,15 @@ class Row {
     this.#control.show(value);
   }
 
-  /** Marks it as not being as in the manifest, which has `old` [SI]. */
-  mark(old: Json | undefined): void {
+  /** Marks it as being as in the manifest or not, which then has `old` [SI]. */
+  mark(old: Json | undefined, isKnown: boolean): void {
     const value = typeof old === "number" ? tidy(old / this.setting.scale) : old;
     this.#inManifest = typeof value === "boolean" || typeof value === "string" || typeof value === "number" ? value : null;
     const differs = this.#inManifest !== null;
-    setText(this.#mark, differs ? ` not saved; the manifest has ${String(this.#inManifest)} ${this.setting.unit}`.trimEnd() : "");
+    const written = `${String(this.#inManifest)} ${this.setting.unit}`.trim();
+    const words = differs ? `changed since the start, not saved; the manifest has ${written}` : "as in the manifest";
+    setText(this.#mark, isKnown ? ` ${words}` : "");
+    this.#mark.classList.toggle("differs", differs);
     this.#default.hidden = !differs;
     this.element.classList.toggle("changed", differs);
   }

@@ -67,6 +67,9 @@ _SERVICES = {
     "/console/mission/templates": Role.VIEW,
     "/console/mission/test": Role.OPERATE,
     "/console/mission/try": Role.OPERATE,
+    "/console/robot/look": Role.VIEW,  # of changes that nobody else sees
+    "/console/robot/palette": Role.VIEW,
+    "/console/robot/save": Role.CONFIGURE,
     "/console/tested": Role.VIEW,
     "/console/save": Role.CONFIGURE,
     "/rosapi/set_param": Role.CONFIGURE,

@@ -62,6 +62,7 @@ _QUERY = re.compile(r"(?P<about>\w+)/(?P<name>\w+)(?P<values>(/\w+/\w+)*)", re.A
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"\w+(/(msg|srv|action))?/\w+", re.ASCII)
 _SETTING = re.compile(r"[A-Za-z_]\w*(\.\w+)*", re.ASCII)
+_HASH = re.compile(r"[0-9a-f]{0,64}", re.ASCII)
 _LONGEST_ROS_NAME = 247
 _CANCELS = "/_action/cancel_goal"  # the end of the name of the service that cancels goals of an action
 _SHOWN = 60  # characters of what a client sent, in a status
@@ -210,11 +211,13 @@ class SaveSettings:
     number: int
     names: tuple[str, ...]
     is_trial: bool
+    seen: str = ""
+    """The hash that a trial told: only what was shown then is written."""
 
 
 @dataclass(frozen=True, slots=True)
 class EditMission:
-    """Pass a request to the editor of missions, and its answer to `Bridge.robot_answered`."""
+    """Pass a request to the editor of missions and of the robot, and its answer to `Bridge.robot_answered`."""
 
     number: int
     request: Mapping[str, Any]
@@ -1268,7 +1271,10 @@ class Bridge:
         names = given.get("names", [])
         if not isinstance(names, list) or not all(isinstance(one, str) and _SETTING.fullmatch(one) for one in names):
             raise WrongMessageError("'names' are components, or their parameters: 'battery', 'battery.runtime'")
-        self._requests.append(SaveSettings(number, tuple(names), given.get("dry_run") is True))
+        seen = given.get("hash", "")
+        if not isinstance(seen, str) or not _HASH.fullmatch(seen):
+            raise WrongMessageError("'hash' is what a dry run told")
+        self._requests.append(SaveSettings(number, tuple(names), given.get("dry_run") is True, seen))
 
     def _mission_service(self, client: _Client, given: Mapping[str, Any], number: int, name: str) -> None:
         request: dict[str, Any] = {"do": name}
@@ -1281,6 +1287,19 @@ class Bridge:
             request["dry_run"] = True
         elif name in _WRITES:
             self._note(client, f"{_WRITES[name]} the mission {_short(request['mission'])}")
+        self._requests.append(EditMission(number, request))
+
+    def _robot_service(self, client: _Client, given: Mapping[str, Any], number: int, name: str) -> None:
+        request: dict[str, Any] = {"do": f"robot/{name}"}
+        for key, (kind, otherwise) in ROBOT_TEXTS[name].items():
+            value = given.get(key, otherwise)
+            if not isinstance(value, kind):
+                raise WrongMessageError(f"'{key}' is missing, or of another type")
+            request[key] = value
+        if given.get("dry_run") is True:
+            request["dry_run"] = True
+        elif name == "save":
+            self._note(client, f"saves {_short(request['subject'])} of the robot")
         self._requests.append(EditMission(number, request))
 
     def _rosapi(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -1440,6 +1459,12 @@ MISSION_TEXTS: Mapping[str, tuple[str, ...]] = {
 _WRITES = {"new": "makes", "save": "saves"}
 _EDITED: Mapping[str, type] = {"operation": dict, "path": list}
 """The types of those arguments that are no texts."""
+ROBOT_TEXTS: Mapping[str, Mapping[str, tuple[type, object]]] = {
+    "palette": {},
+    "look": {"subject": (str, None), "changes": (list, None), "hashes": (dict, {})},
+    "save": {"subject": (str, None), "changes": (list, None), "hashes": (dict, None)},
+}
+"""What can be asked about what the robot is: the type of each argument, and what stands for it if it is missing."""
 _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str, Any] | None]] = {
     "/console/ask": Bridge._ask_service,
     "/console/drive": Bridge._drive_service,
@@ -1449,6 +1474,7 @@ _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str,
     "/console/stop": Bridge._stop_service,
     "/console/tested": Bridge._tested_service,
     **{f"/console/mission/{name}": partial(Bridge._mission_service, name=name) for name in MISSION_TEXTS},
+    **{f"/console/robot/{name}": partial(Bridge._robot_service, name=name) for name in ROBOT_TEXTS},
 }
 """Services of the gateway: what answers, or None if the answer comes later."""
 _PARAMETERS: Mapping[str, tuple[Callable[[Bridge, Mapping[str, Any], int], None], tuple[str, ...]]] = {

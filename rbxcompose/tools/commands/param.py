@@ -37,6 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     change = options.argument("--change", metavar="CHANGE", default="", help=words)
     last = options.argument("-n", "--last", metavar="N", type=int, default=0, help="only the last N")
     dry = options.argument("--dry-run", action="store_true", help="only show what would be written")
+    words = "only if a dry run told this hash, so that what is written is what was shown"
+    seen = options.argument("--only-as", metavar="HASH", default="", help=words)
     table: tuple[tuple[str, str, str, tuple[options.Declare, ...]], ...] = (
         ("ls", "nodes", "list parameters with their values", (only,)),
         ("get", "nodes", "print the value of a parameter, or all of a component", (component, any_name)),
@@ -49,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("watch", "history", "follow the changes", (only, options.add_count_options)),
         ("diff", "files", "show what is not as in the manifest", ()),
         ("dump", "files", "write the live parameters as YAML, for `load`", (only,)),
-        ("save", "files", "write changed values into the manifest, each at its place", (names, dry)),
+        ("save", "files", "write changed values into the manifest, each at its place", (names, dry, seen)),
     )
     actions = (
         options.Subcommand(verb, words, options.deferred(f"rbxcompose.tools.parameters.{module}", f"param_{verb}"), own)

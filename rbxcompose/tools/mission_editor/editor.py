@@ -6,17 +6,13 @@ whole or not at all, and only if it is still the file that was read.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from collections.abc import Callable, Mapping
-from difflib import unified_diff
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.files import open_regular, replace_file
 from rbxcompose.base.findings import Finding, Severity, Span
 from rbxcompose.base.fixes import places
 from rbxcompose.base.garbage_collection import paused_collection
@@ -24,45 +20,16 @@ from rbxcompose.base.requests import Refused
 from rbxcompose.compiler.compile import Compilation, look_at_mission
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import project_of, shown_name
-from rbxcompose.manifest.tree import FILE_BYTES
 from rbxcompose.tools.mission_editor.new_mission import make_mission, templates
 from rbxcompose.tools.mission_editor.outline import MissionOutline, told
 from rbxcompose.tools.mission_editor.palette import form, palette
 from rbxcompose.tools.mission_editor.patches import change, path_of
 from rbxcompose.tools.mission_editor.units import Utf16
+from rbxcompose.tools.project_texts import ProjectTexts, ReadText, hash_of, words_of
 
 MOST_FINDINGS = 200
-BYTE_ORDER_MARK = "\ufeff"
-_AROUND = 2  # lines shown around a change
-_MOST_LINES = 2000  # of a difference
 
 Compile = Callable[[Mapping[Path, str]], Compilation]
-
-
-@dataclass(frozen=True, slots=True)
-class ReadText:
-    """A mission's file as it is on disk; `text` has lines that end with a line feed, and no byte order mark."""
-
-    path: Path
-    text: str
-    hash: str
-    line_end: str
-    has_mark: bool
-
-    def encoded(self, text: str) -> bytes:
-        """Return another text as this file has it.
-
-        Raises:
-            Refused: if it cannot be written.
-        """
-        whole = text.replace("\n", self.line_end)
-        try:
-            data = f"{BYTE_ORDER_MARK if self.has_mark else ''}{whole}".encode()
-        except UnicodeEncodeError as error:
-            raise Refused("the text has characters that no file can hold") from error
-        if len(data) > FILE_BYTES:
-            raise Refused(f"the text is larger than {FILE_BYTES:,} bytes")
-        return data
 
 
 class MissionEditor:
@@ -75,6 +42,7 @@ class MissionEditor:
         self._compiled, self._simulated = compiled, simulated or compiled
         self._file = file.resolve()
         self._project = project_of(self._file)
+        self._texts = ProjectTexts(self._project)
         self._robot: Robot | None = None
 
     def answer(self, request: Mapping[str, Any]) -> Any:
@@ -92,8 +60,8 @@ class MissionEditor:
         name = request["mission"]
         self._compile({})
         read = self._read_file(name)
-        shown = {"file": self._shown(read.path), "text": read.text, "hash": read.hash}
-        return {**shown, "why_not": self._why_not(read.path), **self._looked_at(name, read.text)}
+        shown = {"file": self._texts.shown(read.path), "text": read.text, "hash": read.hash}
+        return {**shown, "why_not": self._texts.why_not(read.path), **self._looked_at(name, read.text)}
 
     def _look(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Return what is wrong with a text, as far as that is known at once."""
@@ -126,7 +94,7 @@ class MissionEditor:
         name, template = request["mission"], request["template"]
         path = make_mission(self._known, self._file, self._project, name, template, self._compiled)
         self._compile({})
-        return {"file": self._shown(path)}
+        return {"file": self._texts.shown(path)}
 
     def _try(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Run a text on the simulated robot, and return what came of it."""
@@ -152,21 +120,13 @@ class MissionEditor:
         """Write a text into a mission's file, or with `dry_run` only show the difference."""
         name, text = request["mission"], request["text"]
         read = self._read_file(name)
-        if why := self._why_not(read.path):
-            raise Refused(why)
-        if read.hash != request["hash"]:
-            raise Refused(f"'{self._shown(read.path)}' has changed on disk since it was opened: load it again")
+        self._texts.require_unchanged(read, request["hash"])
         data = read.encoded(text)
         if request.get("dry_run") is True:
-            return {"diff": self._difference(read, text), **self._check(request)}
-        try:
-            if read.path.resolve() != read.path:
-                raise Refused(f"'{self._shown(read.path)}' has become a link")
-            replace_file(read.path, data)
-        except OSError as error:
-            raise Refused(f"'{self._shown(read.path)}' was not saved: {error.strerror}") from error
+            return {"diff": read.difference(text), **self._check(request)}
+        self._texts.replace(read.path, data)
         self._compile({})
-        return {"hash": _hash(data), "file": self._shown(read.path)}
+        return {"hash": hash_of(data), "file": self._texts.shown(read.path)}
 
     # How it is done
 
@@ -192,36 +152,7 @@ class MissionEditor:
         return entry.path
 
     def _read_file(self, mission: str) -> ReadText:
-        path = self._path(mission)
-        shown = self._shown(path)
-        try:
-            with open_regular(path, follow=False) as file:
-                data = file.read(FILE_BYTES + 1)
-        except OSError as error:
-            raise Refused(f"'{shown}' cannot be read: {error.strerror}") from error
-        if len(data) > FILE_BYTES:
-            raise Refused(f"'{shown}' is larger than {FILE_BYTES:,} bytes")
-        try:
-            text = data.decode("utf-8")
-        except UnicodeDecodeError as error:
-            raise Refused(f"'{shown}' is not UTF-8: there is a wrong byte at {error.start}") from error
-        has_mark = text.startswith(BYTE_ORDER_MARK)
-        text = text.removeprefix(BYTE_ORDER_MARK)
-        line_end = "\r\n" if "\r\n" in text else "\n"
-        plain = text.replace("\r\n", "\n")
-        if "\r" in plain or plain.replace("\n", line_end) != text:
-            raise Refused(f"the lines of '{shown}' end in different ways: use another editor")
-        return ReadText(path, plain, _hash(data), line_end, has_mark)
-
-    def _why_not(self, path: Path) -> str:
-        """Return why a file cannot be changed here; empty if it can."""
-        shown = self._shown(path)
-        if not path.is_relative_to(self._project):
-            return f"'{shown}' belongs to the library: copy it into the project to change it"
-        return "" if os.access(path, os.W_OK) else f"'{shown}' is not writable"
-
-    def _shown(self, path: Path) -> str:
-        return str(path.relative_to(self._project)) if path.is_relative_to(self._project) else shown_name(path)
+        return self._texts.read(self._path(mission))
 
     def _looked_at(self, mission: str, text: str) -> dict[str, Any]:
         path = self._path(mission)
@@ -248,19 +179,13 @@ class MissionEditor:
                 ]
                 data["fix"] = {"title": one.fix.title, "edits": moved}
         errors = sum(one.severity is Severity.ERROR for one in own)
-        elsewhere = [{**_words(one), "place": str(one.span or "")} for one in others[:MOST_FINDINGS]]
+        elsewhere = [{**words_of(one), "place": str(one.span or "")} for one in others[:MOST_FINDINGS]]
         return {"findings": findings, "errors": errors, "count": len(own), "elsewhere": elsewhere}
 
     def _finding(self, finding: Finding, units: Utf16) -> dict[str, Any]:
         span = finding.span or Span("", 1, 1, 1, 1)
         start, end = units.place(span.line, span.column), units.place(span.end_line, span.end_column)
-        return {**_words(finding), "from": start, "to": max(start, end), "line": span.line, "fix": None}
-
-    def _difference(self, read: ReadText, text: str) -> list[str]:
-        old, new = read.text.split("\n"), text.split("\n")
-        lines = list(unified_diff(old, new, "on disk", "here", n=_AROUND, lineterm=""))[2:]
-        left = len(lines) - _MOST_LINES
-        return lines if left <= 0 else [*lines[:_MOST_LINES], f"@@ and {left} more lines @@"]
+        return {**words_of(finding), "from": start, "to": max(start, end), "line": span.line, "fix": None}
 
 
 REQUESTS: Mapping[str, Callable[[MissionEditor, Mapping[str, Any]], Any]] = MappingProxyType(
@@ -278,12 +203,3 @@ REQUESTS: Mapping[str, Callable[[MissionEditor, Mapping[str, Any]], Any]] = Mapp
         "try": MissionEditor._try,
     }
 )
-
-
-def _words(finding: Finding) -> dict[str, Any]:
-    message = f"{finding.message} ({finding.label})" if finding.label else finding.message
-    return {"code": finding.code, "severity": str(finding.severity), "message": message, "help": finding.help}
-
-
-def _hash(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()

@@ -15,26 +15,33 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import Refused
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.lookup import find_robot, known_state
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.model.robot import NOTHING
+from rbxcompose.compiler.systems.model import System
 from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.tools.mission_editor.editor import Compile, MissionEditor
+from rbxcompose.tools.robot_editor.editor import PREFIX, RobotEditor
 
 _NOT_UP = {"answer": None, "refused": "the robot is not up any more"}
 
 
-def compile_with(file: str, layers: ChosenLayers) -> tuple[Compile, Compile]:
-    """Return what compiles a robot as it runs, and what does so without real devices; its system is read once."""
-    outside = NOTHING
+def compile_with(file: str, layers: ChosenLayers) -> tuple[Compile, Compile, tuple[str, ...]]:
+    """Return what compiles a robot as it runs, what does so without real devices, and who shares its manifest.
+
+    Its system is read once.
+    """
+    outside, others = NOTHING, tuple[str, ...]()
     if layers.system:
         system = compile_system(
             layers.system, environment=os.environ, real=layers.real, profiles=layers.system_profiles
         )
         outside = system.robots[layers.member].robot.outside if layers.member in system.robots else NOTHING
+        others = _sharing(Path(file).resolve(), layers.member, system)
 
     def compiled(unsaved: Mapping[Path, str], *, real: bool = layers.real) -> Compilation:
         return compile_robot(
@@ -49,10 +56,32 @@ def compile_with(file: str, layers: ChosenLayers) -> tuple[Compile, Compile]:
             tries_profiles=False,
         )
 
-    return compiled, partial(compiled, real=False)
+    return compiled, partial(compiled, real=False), others
 
 
-def answer_line(editor: MissionEditor, line: str) -> dict[str, Any]:
+def _sharing(file: Path, member: str, system: System) -> tuple[str, ...]:
+    """Return the other robots of a system that are made of the same file."""
+    robots = {name: placed.robot.manifest.files.values() for name, placed in system.robots.items() if name != member}
+    return tuple(name for name, files in robots.items() if file in files)
+
+
+@dataclass(frozen=True, slots=True)
+class RobotEditors:
+    """The editors of what a robot is and of what it does."""
+
+    missions: MissionEditor
+    robot: RobotEditor
+
+    def answer(self, request: Mapping[str, Any]) -> Any:
+        """Return the answer of the editor that a request is for.
+
+        Raises:
+            Refused: with the reason.
+        """
+        return (self.robot if request["do"].startswith(PREFIX) else self.missions).answer(request)
+
+
+def answer_line(editor: MissionEditor | RobotEditors, line: str) -> dict[str, Any]:
     """Return the answer to one request."""
     try:
         return {"answer": editor.answer(json.loads(line)), "refused": ""}
@@ -73,8 +102,10 @@ def main(robot: str) -> int:
         except NotDoneError:
             newest = None
         if newest is not None and (state is None or (newest.file, newest.layers) != (state.file, state.layers)):
-            compiled, simulated = compile_with(newest.file, newest.layers)
-            state, editor = newest, MissionEditor(compiled, Path(newest.file), simulated)
+            compiled, simulated, others = compile_with(newest.file, newest.layers)
+            file = Path(newest.file)
+            missions = MissionEditor(compiled, file, simulated)
+            state, editor = newest, RobotEditors(missions, RobotEditor(compiled, file, others))
         told = _NOT_UP if editor is None else answer_line(editor, line)
         answers.write(f"{json.dumps(told)}\n")
         answers.flush()

@@ -31,6 +31,7 @@ from rbxcompose.compiler.plan.diff import Difference, difference
 from rbxcompose.compiler.plan.dump import dump
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.model import PlacedRobot, System
+from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.tree import FILE_BYTES, at
 from rbxcompose.msgs.rbxcompose_parameters import ParameterChange
 from rbxcompose.msgs.rcl_interfaces import GetParameters, Parameter
@@ -42,6 +43,8 @@ from rbxcompose.tools.live_rules import compiled_with
 from rbxcompose.tools.parameters.changes import PIPED, change_values, message_of, write_values
 from rbxcompose.tools.parameters.history import changes_of
 from rbxcompose.tools.parameters.nodes import ParameterNodes, listed
+from rbxcompose.tools.project_texts import difference as difference_of
+from rbxcompose.tools.project_texts import hash_of
 from rbxcompose.tools.system_runs import layers_of
 
 NOT_SAVED = kind("RBX9044")
@@ -147,6 +150,21 @@ class NewTexts:
     before: Mapping[Path, bytes]
     after: Mapping[Path, bytes]
     fix: Fix
+
+    @property
+    def hash(self) -> str:
+        """Return what tells whether the same would be written into the same files."""
+        parts = ((str(path).encode(), self.before[path], data) for path, data in sorted(self.after.items()))
+        return hash_of(b"".join(f"{len(part)} ".encode() + part for one in parts for part in one))
+
+    @property
+    def difference(self) -> list[str]:
+        """Return the lines that change, below the name of each file."""
+        lines: list[str] = []
+        for path, data in self.after.items():
+            old, new = (text.decode("utf-8-sig").replace("\r\n", "\n") for text in (self.before[path], data))
+            lines += [f"@@ {shown_name(path)} @@", *difference_of(old, new)]
+        return lines
 
 
 def files_with(live: LiveSettings, changes: Sequence[LiveChange], compiled: Compiled) -> NewTexts:
@@ -382,8 +400,14 @@ def save(live: LiveSettings, changes: Sequence[LiveChange], compiled: Compiled, 
         NotDoneError: if one cannot be written, or something else would change by it.
     """
     places: list[str] = []
+    lines: list[str] = []
+    seen = ""
     if changes:
         texts = files_with(live, changes, compiled)
+        lines, seen = texts.difference, texts.hash
+        if arguments.only_as not in ("", seen):
+            message = "nothing is saved: the files or the values have changed since they were shown"
+            raise NotDoneError(NOT_SAVED.at(None, message, help="look at them again with '--dry-run'"))
         if not arguments.dry_run:
             write(texts)
         places = sorted(str(edit.span) for edit in texts.fix.edits)
@@ -393,6 +417,8 @@ def save(live: LiveSettings, changes: Sequence[LiveChange], compiled: Compiled, 
                 {
                     "saved": [_data(live_change) for live_change in changes],
                     "places": places,
+                    "difference": lines,
+                    "hash": seen,
                     "dry_run": arguments.dry_run,
                 }
             )

@@ -46,7 +46,7 @@ from rbxcompose.domains.console.editor_process import EditorProcess
 from rbxcompose.domains.console.foxglove_server import FoxgloveServer, RobotAccess
 from rbxcompose.domains.console.lease import DriveLimits
 from rbxcompose.domains.console.log_tail import findings, tail
-from rbxcompose.domains.console.models import MESHES, ServedFile, ServedModel
+from rbxcompose.domains.console.models import MESHES, CandidateModels, ServedFile, ServedModel
 from rbxcompose.domains.console.protocol import (
     LARGEST,
     RELEASE,
@@ -111,7 +111,7 @@ _STOPPED = 1.0  # [s] for all processes to answer to a stop over the bus
 _SHY = 5.0  # [s] for a client to say who it is
 _SAVING = 30.0  # [s] for a save
 _TRYING = 90.0  # [s] for a dry run, and for the tests of a mission
-_LONG = ("test", "try")
+_LONG = ("test", "try", "robot/")
 _LONGEST_LOGIN = 4096  # [bytes]
 _COOKIE_AGE = 365 * 24 * 3600  # [s]
 _POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; object-src 'none'"
@@ -473,6 +473,7 @@ class GatewaySession:
         self._foxglove: FoxgloveServer | None = None
         self.trouble = ""  # what is not served beside the page
         self._saving = asyncio.Lock()
+        self._candidates = CandidateModels()
         self._editor = EditorProcess(folder.path.name)
         self._trier = EditorProcess(folder.path.name, patience=_TRYING)  # so that nobody who types waits for it
         self._watches: dict[str, asyncio.Task[None]] = {}  # by window
@@ -581,7 +582,9 @@ class GatewaySession:
         async def mesh(request: Request) -> Response:
             if self._role(request) < Role.VIEW:
                 return self._file(request, None)
-            return self._file(request, await asyncio.to_thread(model.mesh, request.path_params["address"]))
+            address = request.path_params["address"]
+            found = await asyncio.to_thread(model.mesh, address)
+            return self._file(request, found or await asyncio.to_thread(self._candidates.mesh, address))
 
         return [Route("/console/model.urdf", urdf), Route(f"{MESHES}{{address:path}}", mesh)]
 
@@ -1034,7 +1037,7 @@ class GatewaySession:
 
     async def _save(self, request: SaveSettings) -> None:
         """Save as the command line does, in a process of its own: it needs the whole compiler."""
-        trial = ("--dry-run",) if request.is_trial else ()
+        trial = ("--dry-run",) if request.is_trial else ("--only-as", request.seen) if request.seen else ()
         robot = ("--robot", self._folder.path.name)
         command = (sys.executable, "-m", "rbxcompose", "param", "save", "--json", *robot, *trial, *request.names)
         async with self._saving:
@@ -1049,8 +1052,10 @@ class GatewaySession:
         self._pump()
 
     async def _edit_mission(self, number: int, request: Mapping[str, Any]) -> None:
-        process = self._trier if request["do"] in _LONG else self._editor
+        process = self._trier if request["do"].startswith(_LONG) else self._editor
         answer, refusal = await process.ask(request)
+        if isinstance(answer, dict) and isinstance(model := answer.get("model"), dict):
+            answer["model"] = await asyncio.to_thread(self._candidates.add, model["urdf"], model["meshes"])
         self._bridge.robot_answered(number, answer, refusal)
         self._pump()
 

@@ -1,0 +1,1 @@
+"""The editor of robots: places, muxes and parts changed as texts."""
