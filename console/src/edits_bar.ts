@@ -1,6 +1,7 @@
 /** What stands around every editor of the robot: undo, save with what changes, what is wrong. */
 import { askInDialog, h, icon, type Icon } from "./dom";
 import { kindOf, verdict } from "./edited";
+import { LiveChanges } from "./live_changes";
 import type { Robot } from "./page";
 import type { Entry, RobotEdits, RobotFound, SaveTrial } from "./robot_edits";
 import "./mission_editor.css";
@@ -19,19 +20,24 @@ export class EditsBar<E extends Entry> {
   readonly #redo = barButton("redo", "Redo", () => void this.#edits.redo());
   readonly #save = barButton("check", "Save", () => void this.#offer());
   readonly #load = barButton("undo", "Load it again", () => void this.#edits.reload());
+  readonly #live: LiveChanges;
   readonly #closers: (() => void)[];
 
   constructor(robot: Robot, edits: RobotEdits<E>, done: () => void) {
     [this.#robot, this.#edits] = [robot, edits];
-    const close = barButton("cross", "Close", done);
+    const close = barButton("cross", "Close", () => {
+      done();
+      if (this.#live.isChanged) window.dispatchEvent(new HashChangeEvent("hashchange")); // the page opens again
+    });
     const bar = h("div", { class: "editor-bar" }, this.#undo, this.#redo, this.#save, close, this.#verdict);
-    this.element.append(bar, this.#says, this.#list);
+    this.#live = new LiveChanges(robot);
+    this.element.append(bar, this.#says, this.#live.element, this.#list);
     this.#closers = [
       edits.robot.watch(() => this.#show()),
       edits.says.watch(() => this.#show()),
       edits.isStale.watch(() => this.#show()),
       robot.link.state.watch(({ is }) => {
-        if (is === "open") void edits.open();
+        if (is === "open") void edits.open().then(() => this.#live.look());
         this.#show();
       }),
     ];
@@ -69,7 +75,10 @@ export class EditsBar<E extends Entry> {
   async #offer(): Promise<void> {
     this.#save.disabled = true;
     const trial = await this.#edits.compare();
-    if (trial && (await confirmed(this.element, trial))) await this.#edits.save();
+    if (trial && (await confirmed(this.element, trial))) {
+      await this.#edits.save();
+      await this.#live.look();
+    }
     this.#show();
   }
 }

@@ -150,7 +150,7 @@ export class RobotEdits<E extends Entry> {
     try {
       const { files } = await askRobotEditor<{ files: string[] }>(this.#link, "save", given);
       await this.#restart();
-      this.says.set(`Saved in ${files.join(", ")}. The robot takes it up by 'rbxcompose apply', or when it comes up again.`);
+      this.says.set(`Saved in ${files.join(", ")}.`);
     } catch (error) {
       if (error instanceof LostError) {
         this.#before = JSON.stringify(given.hashes);

@@ -556,6 +556,16 @@ def test_a_place_is_moved_in_the_file_of_the_robot_that_runs(robot: Robot) -> No
         assert (await browser.calls("/console/robot/save", **given))["success"]
         refused = await browser.calls("/console/robot/save", **given)
         assert "has changed on disk" in refused["message"]
+        found = (await browser.calls("/console/robot/compare"))["answer"]
+        assert {one["name"]: one["fate"] for one in found["components"]} == {
+            "charger": "restarted",
+            "gateway": "changed live",
+        }
+        assert (await browser.calls("/console/robot/apply", generation=found["generation"]))["success"]
+        assert (await browser.calls("/console/robot/compare"))["answer"]["is_empty"]
+        assert json.loads(get("/console/config")[1])["places"]["dock"]["x"] == 1.25
+        assert (await browser.calls("/console/robot/revert", generation=found["generation"]))["success"]
+        assert not (await browser.calls("/console/robot/apply", generation=99))["success"]
         built = (await browser.calls("/console/robot/look", subject="include", changes=[]))["answer"]
         assert "<robot" in built["model"]
         offered = (await browser.calls("/console/robot/palette"))["answer"]

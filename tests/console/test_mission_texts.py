@@ -13,6 +13,7 @@ from rbxcompose.domains.console.editor_process import MOST_WAITING, EditorProces
 from rbxcompose.domains.console.protocol import MISSION_TEXTS, ROBOT_TEXTS, EditMission
 from rbxcompose.tools.mission_editor.editor import REQUESTS
 from rbxcompose.tools.robot_editor.editor import ROBOT_REQUESTS
+from rbxcompose.tools.robot_editor.live_robot import LIVE_REQUESTS
 from tests.console.clients import Room
 
 READ = {"mission": "patrol"}
@@ -99,7 +100,7 @@ MOVED = {"subject": "places", "changes": [{"op": "remove", "path": ["places", "d
 def test_what_the_robot_is_is_edited_by_the_same_process() -> None:
     room = Room()
     client = room.client(who="10.0.0.7")
-    assert set(ROBOT_TEXTS) == set(ROBOT_REQUESTS)
+    assert {f"robot/{name}" for name in ROBOT_TEXTS} == {*LIVE_REQUESTS, *(f"robot/{name}" for name in ROBOT_REQUESTS)}
     assert client.does("call_service", service="/console/robot/look", args=MOVED) == []
     (asked,) = room.asked()
     assert isinstance(asked, EditMission)
@@ -108,6 +109,19 @@ def test_what_the_robot_is_is_edited_by_the_same_process() -> None:
     assert not any("saves" in note for note in room.bridge.notes)
     client.does("call_service", service="/console/robot/save", args=MOVED)
     assert room.bridge.notes[-1] == "10.0.0.7 (configure): saves places of the robot"
+
+
+def test_the_robot_that_runs_is_changed_by_who_configures_and_that_is_noted() -> None:
+    room = Room()
+    client = room.client(who="10.0.0.7")
+    assert client.does("call_service", service="/console/robot/compare", args={}) == []
+    for name, note in (("apply", "changes the robot to what its files say"), ("revert", "takes back a change of")):
+        assert "needs the role 'configure'" in room.client(Role.OPERATE).calls(
+            f"/console/robot/{name}", {"generation": 0}
+        )
+        client.does("call_service", service=f"/console/robot/{name}", args={"generation": 0})
+        assert note in room.bridge.notes[-1]
+    assert [asked.request["do"] for asked in room.asked()] == ["robot/compare", "robot/apply", "robot/revert"]
 
 
 def test_only_who_configures_may_change_what_the_robot_is() -> None:

@@ -85,7 +85,41 @@ def test_a_place_is_moved_and_turned_by_hand_and_saved_with_all_comments(
     assert [line for line in after if line not in before] == [
         "  dock: {x: 0.5 m, y: -0.25 m, heading: 90 deg}   # below the window"
     ]
-    expect(page.get_by_text("rbxcompose apply")).to_be_visible()
+    expect(page.get_by_text("The robot runs without what is saved: mission changed live.")).to_be_visible()
+
+
+def test_what_was_saved_is_brought_to_the_robot_that_runs_and_taken_back(
+    open_page: Callable[..., Page], project: EditedProject
+) -> None:
+    page = open_page(page_name="map")
+    edits(page)
+    drag(page, at(page, 0.0, 0.0), at(page, 0.5, 0.0))
+    saves(page)
+    page.get_by_role("button", name="Change the running robot").click()
+    dialog = page.get_by_role("dialog")
+    expect(dialog.get_by_role("list", name="What happens to what runs")).to_have_text(
+        "mission patrol goes on where it is"
+    )
+    assert violations(page) == []
+    shows(page, "places_apply")
+    dialog.get_by_role("button", name="Change it").click()
+    expect(page.get_by_text("The robot is changed.")).to_be_visible()
+    assert project.runs_with == project.text() != ROBOT
+    page.get_by_role("button", name="Take it back").click()
+    expect(page.get_by_text("The robot runs as before; the files stay as they are.")).to_be_visible()
+    assert project.runs_with == ROBOT != project.text()
+
+
+def test_why_the_robot_cannot_be_changed_now_is_told(open_page: Callable[..., Page], project: EditedProject) -> None:
+    project.why_not = "'base' moves"
+    page = open_page(page_name="map")
+    edits(page)
+    drag(page, at(page, 0.0, 0.0), at(page, 0.5, 0.0))
+    saves(page)
+    expect(page.get_by_text("Not now: 'base' moves.")).to_be_visible()
+    project.why_not = ""
+    page.get_by_role("button", name="Change the running robot").click()  # it looks again
+    expect(page.get_by_text("Not now")).to_be_hidden()
 
 
 def test_a_finger_moves_and_adds_places_as_well(open_page: Callable[..., Page], project: EditedProject) -> None:

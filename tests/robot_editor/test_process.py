@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.runtime.folder import ChosenLayers
+from rbxcompose.runtime.folder import ChosenLayers, RobotFolder
 from rbxcompose.tools.mission_editor.editor import MissionEditor
 from rbxcompose.tools.mission_editor.process import RobotEditors, answer_line, compile_with
 from rbxcompose.tools.robot_editor.editor import RobotEditor
+from rbxcompose.tools.robot_editor.live_robot import LiveRobot
 
 ROBOT = "rbx: 1\nkind: Robot\nname: scout\nplaces:\n  dock: {x: 0 m, y: 0 m}\n"
 SYSTEM = """rbx: 1
@@ -38,9 +39,11 @@ def test_a_robot_of_a_system_is_edited_unless_another_has_its_manifest(
     (tmp_path / "system.yaml").write_text(SYSTEM.replace("DIGGER", digger), encoding="utf-8")
     layers = ChosenLayers(system=str(tmp_path / "system.yaml"), member="scout")
     compiled, simulated, others = compile_with(str(file), layers)
-    editors = RobotEditors(MissionEditor(compiled, file, simulated), RobotEditor(compiled, file, others))
+    live = LiveRobot(RobotFolder(tmp_path), compiled, layers)
+    editors = RobotEditors(MissionEditor(compiled, file, simulated), RobotEditor(compiled, file, others), live)
     change = {"op": "set", "path": ["places", "dock"], "values": {"x": 1}}
     given = {"do": "robot/look", "subject": "places", "changes": [change]}
     assert others == (("digger",) if shared else ())
     assert ("is the manifest of 'digger', too" in told(editors, **given)["refused"]) is shared
+    assert "belongs to a system" in told(editors, do="robot/compare")["refused"]
     assert told(editors, do="palette", mission="none")["refused"] == "the robot has no mission 'none'"

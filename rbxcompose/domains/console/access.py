@@ -69,6 +69,9 @@ _SERVICES = {
     "/console/mission/try": Role.OPERATE,
     "/console/robot/look": Role.VIEW,  # of changes that nobody else sees
     "/console/robot/palette": Role.VIEW,
+    "/console/robot/apply": Role.CONFIGURE,
+    "/console/robot/compare": Role.VIEW,
+    "/console/robot/revert": Role.CONFIGURE,
     "/console/robot/save": Role.CONFIGURE,
     "/console/tested": Role.VIEW,
     "/console/save": Role.CONFIGURE,

@@ -1300,6 +1300,8 @@ class Bridge:
             request["dry_run"] = True
         elif name == "save":
             self._note(client, f"saves {_short(request['subject'])} of the robot")
+        elif name in _CHANGES:
+            self._note(client, _CHANGES[name])
         self._requests.append(EditMission(number, request))
 
     def _rosapi(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -1461,10 +1463,14 @@ _EDITED: Mapping[str, type] = {"operation": dict, "path": list}
 """The types of those arguments that are no texts."""
 ROBOT_TEXTS: Mapping[str, Mapping[str, tuple[type, object]]] = {
     "palette": {},
+    "compare": {},
+    "apply": {"generation": (int, None)},
+    "revert": {"generation": (int, None)},
     "look": {"subject": (str, None), "changes": (list, None), "hashes": (dict, {})},
     "save": {"subject": (str, None), "changes": (list, None), "hashes": (dict, None)},
 }
 """What can be asked about what the robot is: the type of each argument, and what stands for it if it is missing."""
+_CHANGES = {"apply": "changes the robot to what its files say", "revert": "takes back a change of the robot"}
 _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str, Any] | None]] = {
     "/console/ask": Bridge._ask_service,
     "/console/drive": Bridge._drive_service,

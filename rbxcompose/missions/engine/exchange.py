@@ -79,8 +79,8 @@ class _Exchange:
         self._refuse_lost()
         for run, before in self._runs():
             self._take_run(run, before)
-        for number, before in self.pairing.around.items():
-            if before in self.live:
+        for number, inside in self.pairing.around.items():
+            if inside in self.live:
                 self._put_around(number)
         for number, tasks in self.new_tasks.items():
             if number in self.before:
@@ -142,7 +142,9 @@ class _Exchange:
             if (was := known.get(reaction.name)) is not None:
                 courses[was] = reaction
                 reaction.is_armed, reaction.trouble = was.is_armed, was.trouble
-                reaction.scope.seen |= {name: was.scope.seen.get(name, count) for name, count in reaction.scope.seen.items()}
+                reaction.scope.seen |= {
+                    name: was.scope.seen.get(name, count) for name, count in reaction.scope.seen.items()
+                }
         if gone := next((course for course in before.stack if course not in courses), None):
             raise NotPossible(f"the interrupt '{getattr(gone, 'name', '')}' acts, and would be gone")
         for course, now in courses.items():
@@ -263,7 +265,9 @@ class _Exchange:
         old, new, after = self.old, self.new, self.after
         for name in _ENGINE:
             setattr(new, name, getattr(old, name))
-        nodes = [(old.program.nodes[before].span.place, new.program.nodes[now].span.place) for before, now in after.items()]
+        nodes = [
+            (old.program.nodes[before].span.place, new.program.nodes[now].span.place) for before, now in after.items()
+        ]
         places = dict(nodes)
         new.reading, new.named = set(old.reading), {places.get(place, place) for place in old.named}
         new.reasons = {after[number]: reason for number, reason in old.reasons.items() if number in after}
@@ -272,7 +276,9 @@ class _Exchange:
         goes_on = {before: now for before, now in after.items() if now not in self.restarted}
         new.arrived = [(goes_on[leaf], result) for leaf, result in old.arrived if leaf in goes_on]
         new.stops[:] = [goes_on[number] for number in old.stops if number in goes_on]
-        new.debugger.take_up([(goes_on[number], *rest) for number, *rest in old.debugger.pending() if number in goes_on])
+        new.debugger.take_up(
+            [(goes_on[number], *rest) for number, *rest in old.debugger.pending() if number in goes_on]
+        )
 
     # What people should know
 

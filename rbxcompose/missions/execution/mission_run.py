@@ -86,7 +86,9 @@ class LeftMission:
 
 def common_inputs(inputs: Mapping[str, Value], old: Program, new: Program) -> Mapping[str, Value]:
     """Return the inputs that two versions of a mission have with the same type."""
-    same = {name for name, declared in new.inputs.items() if name in old.inputs and old.inputs[name].type == declared.type}
+    same = {
+        name for name, declared in new.inputs.items() if name in old.inputs and old.inputs[name].type == declared.type
+    }
     return {name: value for name, value in inputs.items() if name in same}
 
 
@@ -301,7 +303,12 @@ class MissionRun:
 
     def seen(self, since: int = 0) -> dict[str, Any]:
         """Return what has changed since the version that a viewer has; 0 gives the full state."""
-        more = {"state": self.state, "began": self.began, "edition": self.edition, "transitions": list(self.transitions)}
+        more = {
+            "state": self.state,
+            "began": self.began,
+            "edition": self.edition,
+            "transitions": list(self.transitions),
+        }
         return {"mission": self.name, **self.mirror.look(since), **more, "stopped_at": self.stopped_at}
 
     def _do(self, what: str, call: Callable[[], object], now: float, intervention: Intervention | None = None) -> None:

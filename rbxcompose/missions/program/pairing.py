@@ -106,9 +106,7 @@ class Pairing:
             paired_old |= self._alike(old, new, left, right)
         yield from ((old.children[one], new.children[other]) for one, other in sorted(paired_old.items()))
 
-    def _alike(
-        self, old: MissionNode, new: MissionNode, left: Sequence[int], right: Sequence[int]
-    ) -> dict[int, int]:
+    def _alike(self, old: MissionNode, new: MissionNode, left: Sequence[int], right: Sequence[int]) -> dict[int, int]:
         """Return the children at these positions that are of the same kind, in order; then what is left of them.
 
         Of those, one may have been put into a list, or left of one.

@@ -26,6 +26,7 @@ from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.tools.mission_editor.editor import Compile, MissionEditor
 from rbxcompose.tools.robot_editor.editor import PREFIX, RobotEditor
+from rbxcompose.tools.robot_editor.live_robot import LIVE_REQUESTS, LiveRobot
 
 _NOT_UP = {"answer": None, "refused": "the robot is not up any more"}
 
@@ -67,10 +68,11 @@ def _sharing(file: Path, member: str, system: System) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class RobotEditors:
-    """The editors of what a robot is and of what it does."""
+    """The editors of what a robot is and of what it does, and the one that runs."""
 
     missions: MissionEditor
     robot: RobotEditor
+    live: LiveRobot
 
     def answer(self, request: Mapping[str, Any]) -> Any:
         """Return the answer of the editor that a request is for.
@@ -78,6 +80,8 @@ class RobotEditors:
         Raises:
             Refused: with the reason.
         """
+        if request["do"] in LIVE_REQUESTS:
+            return self.live.answer(request)
         return (self.robot if request["do"].startswith(PREFIX) else self.missions).answer(request)
 
 
@@ -98,14 +102,16 @@ def main(robot: str) -> int:
     sys.stdout = sys.stderr  # whatever a component prints in a dry run is no answer
     for line in sys.stdin:
         try:
-            newest = known_state(find_robot(robot))
+            folder = find_robot(robot)
+            newest = known_state(folder)
         except NotDoneError:
             newest = None
         if newest is not None and (state is None or (newest.file, newest.layers) != (state.file, state.layers)):
             compiled, simulated, others = compile_with(newest.file, newest.layers)
             file = Path(newest.file)
             missions = MissionEditor(compiled, file, simulated)
-            state, editor = newest, RobotEditors(missions, RobotEditor(compiled, file, others))
+            live = LiveRobot(folder, compiled, newest.layers)
+            state, editor = newest, RobotEditors(missions, RobotEditor(compiled, file, others), live)
         told = _NOT_UP if editor is None else answer_line(editor, line)
         answers.write(f"{json.dumps(told)}\n")
         answers.flush()

@@ -26,7 +26,7 @@ from contextlib import suppress
 from functools import cached_property, partial
 from pathlib import Path
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from rbxcompose.base.clock import SteppedClock
 from rbxcompose.base.config import AngularSpeed, Config, Speed
@@ -85,7 +85,7 @@ from rbxcompose.runtime.control import NoAnswerError, ask_as_data
 from rbxcompose.runtime.folder import FINDINGS, BrokenStateError, RobotFolder, all_folders
 from rbxcompose.runtime.log import NAME as LOG
 from rbxcompose.runtime.process_group.group import stop_key
-from rbxcompose.sdk import Capability, Component, NeedsExtra, Qos, Setting, TaskStatus, component
+from rbxcompose.sdk import Capability, Component, Live, NeedsExtra, Qos, Setting, TaskStatus, component
 from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal
 from rbxcompose.sdk.capabilities import ServesPage
 from rbxcompose.sdk.ports import BULK
@@ -163,7 +163,7 @@ class GatewayConfig(Config):
     """Where the pages of the robots of its system are: `ADDRESS:PORT`, without an address on the same host."""
     values: dict[str, dict[str, str]] = {}
     """The values of the manifest: topic, type and field of each, and the unit of the number in the message."""
-    places: dict[str, dict[str, Any]] = {}
+    places: Annotated[dict[str, dict[str, Any]], Live()] = {}
     """The places of the manifest: `x` and `y` [m], `heading` [rad] and `colour` of each."""
     urdf: str = ""
     """Text of the URDF; empty if the robot has no body."""
@@ -214,6 +214,11 @@ class Gateway(Component[GatewayConfig]):
         if type(self.context.clock) is not SteppedClock:
             self.server = GatewayThread(self.config)
 
+    def reconfigure(self, old: GatewayConfig) -> None:
+        """Show other places to who opens the page from now on."""
+        if self.server is not None:
+            self.server.follow(self.config)
+
     def start(self) -> None:
         """Serve; who has come before has waited."""
         if self.server is not None:
@@ -257,6 +262,12 @@ class GatewayThread:
     def trouble(self) -> str:
         """Return what it does not serve beside the page."""
         return self._session.trouble if self._session is not None else ""
+
+    def follow(self, config: GatewayConfig) -> None:
+        """Show what another configuration says; it differs in what is live."""
+        self._config = config
+        if self._session is not None:
+            self._session.config = config
 
     def start(self) -> None:
         """Begin to serve."""
@@ -449,7 +460,7 @@ class GatewaySession:
         complain: Callable[[str], None],
     ) -> None:
         self._complain = complain
-        self._config, self._folder, self._guest, self._note = config, folder, guest, note
+        self.config, self._folder, self._guest, self._note = config, folder, guest, note
         self._secret = own_secret() if config.listen == "lan" else None
         self._graph = LiveGraph(guest)
         guest.graph()  # a round trip, after which the tokens of all others are here, too
@@ -492,8 +503,8 @@ class GatewaySession:
                 await stop.wait()
 
         self._loop.add_reader(self._guest.fileno(), self._pump)
-        if self._config.foxglove:
-            self._serve_foxglove(self._config.foxglove)
+        if self.config.foxglove:
+            self._serve_foxglove(self.config.foxglove)
         self._pump()
         settings = uvicorn.Config(
             self._guarded(self._application()),
@@ -574,7 +585,7 @@ class GatewaySession:
         """Return the addresses of the body and its meshes."""
         from starlette.routing import Route
 
-        model = ServedModel(self._config.urdf, self._config.meshes)
+        model = ServedModel(self.config.urdf, self.config.meshes)
 
         async def urdf(request: Request) -> Response:
             return self._file(request, model.urdf)
@@ -662,7 +673,7 @@ class GatewaySession:
 
     @property
     def _cookie(self) -> str:
-        return f"rbxcompose-{self._config.port}"  # cookies are for all ports of a host
+        return f"rbxcompose-{self.config.port}"  # cookies are for all ports of a host
 
     def _role_of(self, token: str) -> Role:
         return role_of(self._secret, self._folder.path.name, token) if self._secret else Role.CONFIGURE
@@ -676,7 +687,7 @@ class GatewaySession:
         return max(map(self._role_of, filter(None, shown)), default=Role.NOBODY)
 
     def _shown_config(self) -> dict[str, object]:
-        config, shown = self._config, None
+        config, shown = self.config, None
         if (drive := config.drive) is not None:
             limits = {"max_speed": drive.max_speed, "max_turn_rate": drive.max_turn_rate}
             finite = {name: limit if math.isfinite(limit) else None for name, limit in limits.items()}
@@ -687,10 +698,10 @@ class GatewaySession:
 
     def _guarded(self, application: Any) -> Callable[..., Awaitable[None]]:
         """Return the application behind a door that pages of others do not pass."""
-        fleet = sorted(_places(self._config.fleet.values()))  # a page shows all robots of its system
-        origins = frozenset((*self._config.origins, *(f"http://{place}" for place in fleet)))
+        fleet = sorted(_places(self.config.fleet.values()))  # a page shows all robots of its system
+        origins = frozenset((*self.config.origins, *(f"http://{place}" for place in fleet)))
         is_lan = self._secret is not None
-        door = Door(self._config.port, is_lan, network_names() if is_lan else (), origins)
+        door = Door(self.config.port, is_lan, network_names() if is_lan else (), origins)
         # A policy cannot name addresses of IPv6.
         policy = "; connect-src ".join(
             (_POLICY, " ".join(("'self'", *(f"ws://{place}" for place in fleet if "[" not in place))))
@@ -810,7 +821,7 @@ class GatewaySession:
                 end.is_wanted = lambda: self._bridge.wants(topic, self._now)  # what comes too early is not decoded
                 self._ends[Subscribe, topic] = end
             case Advertise(topic, message, is_latched):
-                qos = Qos.COMMAND if topic == self._config.drive_topic else Qos.LATCHED if is_latched else Qos.STATE
+                qos = Qos.COMMAND if topic == self.config.drive_topic else Qos.LATCHED if is_latched else Qos.STATE
                 self._ends[Advertise, topic] = self._bus.publisher(NAME, topic, message, qos)
             case Unsubscribe(topic):
                 self._withdraw(self._ends.pop((Subscribe, topic)))
@@ -928,7 +939,7 @@ class GatewaySession:
         return future
 
     def _refused_to_foxglove(self, topic: str) -> str:
-        drives = self._config.drive_topic, *self._config.drive_aliases
+        drives = self.config.drive_topic, *self.config.drive_aliases
         return "people drive by the console, which knows who drives" if topic in drives else ""
 
     def _stop_watching(self, window: str) -> None:
@@ -1032,7 +1043,7 @@ class GatewaySession:
         self._pump()
 
     async def _read_tested(self, number: int, mission: str) -> None:
-        self._bridge.robot_answered(number, await asyncio.to_thread(read_tested, self._config.robot, mission))
+        self._bridge.robot_answered(number, await asyncio.to_thread(read_tested, self.config.robot, mission))
         self._pump()
 
     async def _save(self, request: SaveSettings) -> None:
