@@ -77,13 +77,13 @@ def test_a_mission_that_is_exchanged_for_itself_goes_on_as_if_nothing_had_been(c
 def edited(node: Any, chance: Random) -> Any:
     """Return a node with one more step, one less, or one that says something else, somewhere in it."""
     match node:
-        case {"sequence": list(steps), **more} if chance.random() < 0.7:  # noqa: PLR2004
+        case {"sequence": list(steps), **more} if chance.random() < 0.7:
             return {"sequence": edited(steps, chance), **more}
         case [*steps] if steps:
             at, what = chance.randrange(len(steps)), chance.random()
-            if what < 0.3:  # noqa: PLR2004
+            if what < 0.3:
                 return [*steps[:at], {"wait": "0.25 s"}, *steps[at:]]
-            if what < 0.5 and len(steps) > 1:  # noqa: PLR2004
+            if what < 0.5 and len(steps) > 1:
                 return [*steps[:at], *steps[at + 1 :]]
             return [*steps[:at], edited(steps[at], chance), *steps[at + 1 :]]
         case {"parallel": list(branches), **more}:

@@ -49,7 +49,7 @@ class Pairing:
         return number in self.before and self._content(self.new, number) == self._content(self.old, self.before[number])
 
     def has_same_options(self, number: int) -> bool:
-        """Return whether a node has the same options and modifiers as before; what its children are called may differ."""
+        """Return whether a node has the same options and modifiers as before; names of its children may differ."""
         nodes = self.new.nodes[number], self.old.nodes[self.before[number]]
         options = [(_plain(node.modifiers), _fields(node.step, without=_ABOUT_CHILDREN)) for node in nodes]
         return options[0] == options[1]
