@@ -195,9 +195,18 @@ class Live:
     """Marks a field that may change while the robot runs: `speed: Annotated[Speed, Live()] = 0.3`."""
 
 
+class Replaceable:
+    """Marks a field that `apply` changes while the robot runs, such as missions; unlike a live one, it is no parameter."""
+
+
 def is_live(field: FieldInfo) -> bool:
     """Return whether a field may change while the robot runs."""
     return any(isinstance(mark, Live) for mark in field.metadata)
+
+
+def may_be_applied(field: FieldInfo) -> bool:
+    """Return whether `apply` may change a field without a restart."""
+    return any(isinstance(mark, Live | Replaceable) for mark in field.metadata)
 
 
 def leaves(config: Config) -> Iterator[tuple[str, FieldInfo]]:

@@ -202,7 +202,7 @@ class Component(Generic[C]):
         """Prepare: import heavy packages, build the core, open devices. Nothing moves yet."""
 
     def reconfigure(self, old: C) -> None:
-        """Apply `config`, which differs from `old` in fields that are marked `Live`.
+        """Apply `config`, which differs from `old` in fields that are marked `Live` or `Replaceable`.
 
         Raises:
             Refused: if this cannot be done now, with the reason; `config` is then `old` again.

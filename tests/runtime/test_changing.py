@@ -64,7 +64,9 @@ class Changed(Stage):
 
 def test_what_changes_is_retired_in_reverse_order_then_started_in_order() -> None:
     stage = Changed()
-    stage.apply(with_settings(with_settings(robot(), "mission", start="other"), "mux", output="other"))
+    stage.apply(
+        with_settings(with_settings(robot(), "mission", services={"x": "std_srvs/srv/Trigger"}), "mux", output="other")
+    )
     assert stage.sent == [("mission", say.Retire(["mission"]))]
     stage.retire("mission")
     assert stage.sent[-1] == ("robot", say.Retire(["mux"]))

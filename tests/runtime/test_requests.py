@@ -113,7 +113,7 @@ class Desk:
         """Return what a plan would change, as it comes to who asked; the components have `considered` it."""
         self.handler.handle(as_data(ComparePlan(plan)), 1)
         if considered is not None:
-            self.handler.considering.receive("mission", considered)
+            self.handler.consultations.receive("mission", considered)
         _, answer, is_refused = self.replies.pop()
         assert not is_refused
         found: PlanComparison = from_data(ComparePlan.answer_type(), json.loads(json.dumps(answer)))
@@ -245,7 +245,7 @@ def test_a_change_that_a_component_refuses_touches_nothing() -> None:
     assert desk.compare(text, say.Considered(1, [], ["it runs"])).why_not == "it runs"
     desk.handler.handle(as_data(ApplyPlan(text, 0)), 1)
     assert desk.replies == []  # it waits
-    desk.handler.considering.receive("mission", say.Considered(2, [], ["it runs"]))
+    desk.handler.consultations.receive("mission", say.Considered(2, [], ["it runs"]))
     assert desk.replies == [(1, "it runs", True)]
     assert [type(message) for _, message in desk.sent] == [say.Consider, say.Consider]
 
@@ -255,7 +255,7 @@ def test_a_process_that_ends_has_nothing_to_say_about_a_change() -> None:
     desk.conductor._is_running = True
     text = dump(replace(PLAN, instances=(replace(PLAN.instances[0], restart=Restart(when="never")),)))
     desk.handler.handle(as_data(ComparePlan(text)), 1)
-    desk.handler.considering.gone("mission")
+    desk.handler.consultations.gone("mission")
     assert [is_refused for _, _, is_refused in desk.replies] == [False]
 
 

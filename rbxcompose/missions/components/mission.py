@@ -29,10 +29,10 @@ from rbxcompose.sdk import (
     Component,
     Config,
     Level,
-    Live,
     Place,
     Port,
     Refused,
+    Replaceable,
     RunsMissions,
     ServesAction,
     answers,
@@ -59,17 +59,17 @@ Made = Annotated[InstanceOf[T], WithJsonSchema({"type": "object"})]  # made by t
 class MissionConfig(Config):
     """The robot's missions as the compiler has prepared them."""
 
-    programs: Annotated[dict[str, Made[Program]], Live()] = {}
+    programs: Annotated[dict[str, Made[Program]], Replaceable()] = {}
     """Missions by name."""
-    start: Annotated[str | None, Live()] = None
+    start: Annotated[str | None, Replaceable()] = None
     """The mission that starts by itself."""
-    inputs: Annotated[dict[str, dict[str, Any]], Live()] = {}
+    inputs: Annotated[dict[str, dict[str, Any]], Replaceable()] = {}
     """Values of the inputs, by mission and name."""
-    after_crash: Annotated[dict[str, str], Live()] = {}
+    after_crash: Annotated[dict[str, str], Replaceable()] = {}
     """What missions do after a crash, by mission: `restart`, `ask` or `continue`."""
     values: dict[str, Made[ValueSource]] = {}
     """Where the robot's values come from."""
-    places: Annotated[dict[str, Made[Place]], Live()] = {}
+    places: Annotated[dict[str, Made[Place]], Replaceable()] = {}
     """The robot's places."""
     skills: dict[str, Made[SkillSource]] = {}
     """The robot's skills."""

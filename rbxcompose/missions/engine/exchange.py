@@ -23,9 +23,9 @@ from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.run import Run
 from rbxcompose.missions.engine.task import MovedChildren, Task
 from rbxcompose.missions.modifiers.registry import Decorator
+from rbxcompose.missions.program.counterparts import Pairing
 from rbxcompose.missions.program.in_turn import InTurnTask
 from rbxcompose.missions.program.outcomes import RUNNING
-from rbxcompose.missions.program.pairing import Pairing
 from rbxcompose.missions.program.program import MissionNode
 
 _ENGINE = ("status", "outcome", "now", "time", "lost", "is_paused", "draws", "held_until", "instant", "ticks", "wake")

@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from enum import StrEnum
 
-from rbxcompose.base.config import HIDDEN, Config, Secret, is_live, leaves
+from rbxcompose.base.config import HIDDEN, Config, Secret, leaves, may_be_applied
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.compiler.plan.diff import BOUNDS, WHOLE, Change, difference
 from rbxcompose.compiler.plan.model import Instance, OtherHost, Plan
@@ -171,7 +171,7 @@ def _is_live(instance: Instance, key: str) -> bool:
     if head in _OPTIONS:
         return head in _TAKEN_OVER
     found = (field for name, field in leaves(instance.config) if f"{key}.".startswith(f"{name}."))
-    return any(is_live(field) for field in found)
+    return any(may_be_applied(field) for field in found)
 
 
 def _secrets(value: object, path: str) -> Iterator[tuple[str, Secret]]:

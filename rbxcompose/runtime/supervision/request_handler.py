@@ -13,7 +13,7 @@ from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanCompari
 from rbxcompose.runtime.requests import ROBOT, BringDown, DescribeRobot, ReleaseRobot, RobotStatus, StopRobot
 from rbxcompose.runtime.supervision.changes import Changes, changes
 from rbxcompose.runtime.supervision.conductor import FINE, Conductor
-from rbxcompose.runtime.supervision.considering import Considering
+from rbxcompose.runtime.supervision.consultation import Consultations
 from rbxcompose.runtime.supervision.descriptions import described
 from rbxcompose.runtime.supervision.setting_changes import SettingChanges
 from rbxcompose.sdk.registry import component_type
@@ -53,7 +53,7 @@ class RequestHandler:
     def __init__(self, supervisor: Supervised, settings: SettingChanges, *, is_stepped: bool) -> None:
         """On a stepped clock the process group logs what came from outside, at its own time."""
         self._supervisor, self._settings, self._is_stepped = supervisor, settings, is_stepped
-        self.considering = Considering(supervisor.send)
+        self.consultations = Consultations(supervisor.send)
         self._before: tuple[Plan, ChosenLayers, int] | None = None  # what the last change can be reverted to
 
     def handle(self, data: object, number: int) -> None:
@@ -159,7 +159,7 @@ class RequestHandler:
             compared = PlanComparison.of(found, conductor.generation, why_not or refused, tuple(said))
             self._supervisor.answer(number, to_data(compared))
 
-        self.considering.ask(found, () if why_not else conductor.reached, considered)
+        self.consultations.ask(found, () if why_not else conductor.reached, considered)
 
     def _apply(self, request: ApplyPlan, number: int) -> None:
         found, conductor = self._changes(_loaded(request.plan)), self._supervisor.conductor
@@ -184,7 +184,7 @@ class RequestHandler:
             except Refused as refusal:
                 self._supervisor.refuse(number, str(refusal))
 
-        self.considering.ask(found, conductor.reached, considered)
+        self.consultations.ask(found, conductor.reached, considered)
 
     def _carry_out_change(self, found: Changes, layers: ChosenLayers, number: int, refused: str) -> None:
         conductor = self._supervisor.conductor

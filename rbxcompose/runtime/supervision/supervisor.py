@@ -351,7 +351,7 @@ class Supervisor:
         for message in received:
             self.conductor.receive(name, message)  # type: ignore[arg-type]
             self.settings.changes.receive(name, message)  # type: ignore[arg-type]
-            self._requests.considering.receive(name, message)  # type: ignore[arg-type]
+            self._requests.consultations.receive(name, message)  # type: ignore[arg-type]
 
     def _receive_from_parent(self) -> None:
         try:
@@ -389,7 +389,7 @@ class Supervisor:
             self.log(Level.OK, f"process '{name}' {how}; what it had printed is in the log file", printed)
         self.conductor.exited(name, how, printed)
         self.settings.changes.gone(name)
-        self._requests.considering.gone(name)
+        self._requests.consultations.gone(name)
 
     def _printed(self, name: str) -> str:
         try:

@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import NotRegularError, TooLargeError, read_regular
 from rbxcompose.base.requests import Refused
 from rbxcompose.base.units import ANGLE, LENGTH, Dimension, UnitError, format_quantity, to_si
 from rbxcompose.compiler.model.robot import Robot
@@ -54,10 +55,8 @@ def offered_parts(file: Path) -> list[OfferedPart]:
 def _offered(path: Path, shown: str) -> OfferedPart | None:
     """Return a part; None for another file, or one that cannot be read: the compiler tells why when it is included."""
     try:
-        if path.stat().st_size > _LARGEST:
-            return None
-        root = placed(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError):
+        root = placed(read_regular(path, _LARGEST).decode("utf-8"))
+    except (OSError, NotRegularError, TooLargeError, UnicodeDecodeError):
         return None
     if root is None or root.form != "map" or (kind := root.get("kind")) is None or kind.text != "Part":
         return None

@@ -85,7 +85,7 @@ from rbxcompose.runtime.control import NoAnswerError, ask_as_data
 from rbxcompose.runtime.folder import FINDINGS, BrokenStateError, RobotFolder, all_folders
 from rbxcompose.runtime.log import NAME as LOG
 from rbxcompose.runtime.process_group.group import stop_key
-from rbxcompose.sdk import Capability, Component, Live, NeedsExtra, Qos, Setting, TaskStatus, component
+from rbxcompose.sdk import Capability, Component, NeedsExtra, Qos, Replaceable, Setting, TaskStatus, component
 from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal
 from rbxcompose.sdk.capabilities import ServesPage
 from rbxcompose.sdk.ports import BULK
@@ -163,7 +163,7 @@ class GatewayConfig(Config):
     """Where the pages of the robots of its system are: `ADDRESS:PORT`, without an address on the same host."""
     values: dict[str, dict[str, str]] = {}
     """The values of the manifest: topic, type and field of each, and the unit of the number in the message."""
-    places: Annotated[dict[str, dict[str, Any]], Live()] = {}
+    places: Annotated[dict[str, dict[str, Any]], Replaceable()] = {}
     """The places of the manifest: `x` and `y` [m], `heading` [rad] and `colour` of each."""
     urdf: str = ""
     """Text of the URDF; empty if the robot has no body."""

@@ -22,7 +22,7 @@ class _Question:
     refused: list[str] = field(default_factory=list)
 
 
-class Considering:
+class Consultations:
     """The questions that are open; a process that ends says nothing, since its components have nothing to lose."""
 
     def __init__(self, send: Callable[[str, messages.ChannelOrder], None]) -> None:
