@@ -196,7 +196,7 @@ class Live:
 
 
 class Replaceable:
-    """Marks a field that `apply` changes while the robot runs, such as missions; unlike a live one, it is no parameter."""
+    """Marks a field that `apply` changes while the robot runs, such as missions; it is no parameter, as live ones are."""
 
 
 def is_live(field: FieldInfo) -> bool:
