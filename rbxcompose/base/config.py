@@ -196,7 +196,7 @@ class Live:
 
 
 class Replaceable:
-    """Marks a field that `apply` changes while the robot runs, such as missions; it is no parameter, as live ones are."""
+    """Marks a field that `apply` changes while the robot runs; unlike a live one, it is no parameter."""
 
 
 def is_live(field: FieldInfo) -> bool:
