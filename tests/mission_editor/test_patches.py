@@ -109,7 +109,7 @@ def changes(draw: st.DrawFn) -> tuple[str, dict[str, Any], TextPatch]:
     ]
     if slots:
         slot = draw(st.sampled_from(slots))
-        operations.append({"op": "move_to", "to": slot.path, "index": 0})
+        operations.append({"op": "move_to", "to": slot.path, "index": draw(st.integers(0, 3))})
         operations.append({"op": "insert", "path": slot.path, "index": 1, "yaml": "log: new\noptional: true"})
     operation = {"path": block.path, **draw(st.sampled_from(operations))}
     try:
@@ -229,6 +229,12 @@ def test_an_option_of_a_step_that_was_only_a_word() -> None:
 )
 def test_a_value_is_in_quotes_only_if_it_needs_them(value: str, written: str) -> None:
     assert f"go_to: {written}   # at once" in after(TEXT, op="set", path=["do", 0], key="go_to", value=value)
+
+
+def test_a_step_without_a_name_does_not_go_among_those_that_have_names() -> None:
+    text = f"{TEXT}  - parallel:\n      a: recharge\n      b: recharge\n"
+    with pytest.raises(Refused, match="has names"):
+        change(text, {"op": "move_to", "path": ["do", 0], "to": ["do", 3, "parallel"], "index": 1})
 
 
 def test_states_and_interrupts_have_names_and_move_among_themselves() -> None:

@@ -202,6 +202,11 @@ class _Patch:
     def is_step_slot(self, path: Path) -> bool:
         return any(slot.path == path and slot.holds == ONE for slot in self.slots())
 
+    def takes_names(self, path: Path) -> bool:
+        """Return whether what is in a slot has names, as it is written."""
+        node = self.root.at(path)
+        return node is not None and node.form == "map" and not self.is_step_slot(path)
+
     def slots(self) -> list[Slot]:
         within = [slot for top in self.outline.blocks for block in top.all() for slot in block.slots]
         return [*self.outline.slots, *within]
@@ -239,6 +244,10 @@ class _Patch:
             raise Refused("this is the only one here: what is around it would be empty")
         if not any(slot.path == to and slot.of == "step" for slot in self.slots()):
             raise Refused("no step can be there")
+        if self.root.at(to) is None:
+            raise Refused(f"nothing is there yet: add '{to[-1]}' first")
+        if self.takes_names(to):
+            raise Refused("what is there has names: copy its text there by hand")
         moved = source[1][key]
         made = self.insert_item(to, index, self.lines.lines[first:last], deepcopy(moved), column)
         self.cut(first, last)

@@ -1,0 +1,183 @@
+"""The outline of the editor of missions in a real browser: blocks are dragged, folded, added and drawn."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from tests.console.browser import CHROMIUM
+from tests.console.fake_gateway import FakeGateway
+from tests.console.looks import PHONE, WIDE, expect_fit, violations
+from tests.console.test_page_editor import Project, block, edits, lines, project
+from tests.mission_editor.test_editor import FETCH
+
+__all__ = ["project"]
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
+
+NESTED = f"""{FETCH}  # again and again
+  - repeat: 2
+    do:
+      - log: one
+      - log: two
+  - log: the end
+"""
+
+
+@pytest.fixture
+def page(open_page: Callable[..., Page], project: Project) -> Page:
+    project.file.write_text(NESTED, encoding="utf-8")
+    return edits(open_page(page_name="mission"))
+
+
+def shot(page: Page, name: str) -> None:
+    if (shots := os.environ.get("SHOTS")) is not None:
+        page.screenshot(path=f"{shots}/{name}.png", full_page=True)
+
+
+def row(page: Page, text: str) -> Locator:
+    return block(page, text).locator(":scope > .outline-row")
+
+
+def spot(page: Page, text: str, part: float) -> tuple[float, float]:
+    """Return a place of a row: a part of its height below its top."""
+    box = row(page, text).bounding_box()
+    assert box is not None
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] * part
+
+
+def drags(page: Page, text: str, to: str, part: float) -> None:
+    """Press a row, and move it to a place of another one; it is not dropped yet."""
+    row(page, text).scroll_into_view_if_needed()
+    page.mouse.move(*spot(page, text, 0.5))
+    page.mouse.down()
+    page.mouse.move(*spot(page, to, 0.5), steps=4)
+    page.mouse.move(*spot(page, to, part))
+
+
+def test_a_step_is_dragged_to_a_gap_with_its_comments(page: Page, project: Project) -> None:
+    drags(page, "repeat 2", "go_to table", 0.1)
+    expect(page.get_by_text("Drop it before go_to table")).to_be_visible()
+    shot(page, "drag")
+    assert violations(page) == []
+    page.mouse.up()
+    expect(page.locator(".cm-line").nth(5)).to_contain_text("# again and again")
+    assert lines(page)[5:10] == NESTED.split("\n")[7:12]
+    expect(block(page, "repeat 2")).to_have_attribute("aria-selected", "true")
+    page.get_by_role("button", name="Undo").click()
+    expect(page.locator(".cm-line").nth(5)).to_contain_text("go_to: table")
+    assert "\n".join(lines(page)) == NESTED
+
+
+def test_a_step_is_dragged_into_another_one_and_out_of_it(page: Page) -> None:
+    drags(page, "wait 2 s", "repeat 2", 0.5)
+    expect(page.get_by_text("Drop it into repeat 2")).to_be_visible()
+    page.mouse.up()
+    expect(block(page, "repeat 2").get_by_role("treeitem")).to_have_count(3)
+    assert lines(page)[6:12][-1] == "      - wait: 2 s"
+    drags(page, "log one", "log the end", 0.9)
+    page.mouse.up()
+    expect(block(page, "repeat 2").get_by_role("treeitem")).to_have_count(2)
+    assert lines(page)[-2] == "  - log: one"
+
+
+def test_escape_ends_a_drag_and_a_drop_that_cannot_be_says_why(page: Page) -> None:
+    drags(page, "wait 2 s", "log the end", 0.9)
+    page.keyboard.press("Escape")
+    expect(page.locator(".outline-says")).to_be_empty()
+    page.mouse.up()
+    assert "\n".join(lines(page)) == NESTED
+    drags(page, "repeat 2", "log one", 0.2)
+    expect(page.get_by_text("Not into itself")).to_be_visible()
+    page.mouse.up()
+    drags(page, "wait 2 s", "go_to table", 0.9)
+    page.mouse.up()
+    expect(page.get_by_text("it is there already")).to_be_visible()
+    assert "\n".join(lines(page)) == NESTED
+
+
+def touched(page: Page) -> Callable[..., None]:
+    session = page.context.new_cdp_session(page)
+
+    def touch(what: str, *at: float) -> None:
+        points = [{"x": at[0], "y": at[1]}] if at else []
+        session.send("Input.dispatchTouchEvent", {"type": f"touch{what}", "touchPoints": points})
+
+    return touch
+
+
+def test_a_finger_scrolls_and_drags_after_a_rest(open_page: Callable[..., Page], project: Project) -> None:
+    project.file.write_text(NESTED, encoding="utf-8")
+    page = edits(open_page(page_name="mission", viewport=PHONE, has_touch=True))
+    touch = touched(page)
+    row(page, "wait 2 s").scroll_into_view_if_needed()
+    start, end = spot(page, "wait 2 s", 0.5), spot(page, "go_to table", 0.1)
+    touch("Start", *start)
+    touch("Move", *end)
+    touch("End")
+    assert "\n".join(lines(page)) == NESTED
+    page.wait_for_timeout(200)
+    row(page, "wait 2 s").scroll_into_view_if_needed()
+    start, end = spot(page, "wait 2 s", 0.5), spot(page, "go_to table", 0.1)
+    touch("Start", *start)
+    expect(page.locator(".dragged")).to_have_count(1)
+    touch("Move", start[0], (start[1] + end[1]) / 2)
+    touch("Move", *end)
+    expect(page.get_by_text("Drop it before go_to table")).to_be_visible()
+    shot(page, "drag_phone")
+    touch("End")
+    expect(page.locator(".cm-line").nth(5)).to_contain_text("wait: 2 s")
+
+
+def test_who_may_not_configure_drags_nothing(
+    open_page: Callable[..., Page], project: Project, gateway: FakeGateway
+) -> None:
+    gateway.config = {**gateway.config, "role": "operate"}
+    page = edits(open_page(page_name="mission"))
+    drags(page, "wait 2 s", "go_to table", 0.1)
+    expect(page.locator(".dragged")).to_have_count(0)
+    page.mouse.up()
+
+
+def test_blocks_are_folded_by_keys_and_stay_folded_through_edits(page: Page) -> None:
+    block(page, "repeat 2").locator(":scope > .outline-row").click()
+    page.keyboard.press("ArrowLeft")
+    repeat = block(page, "repeat 2")
+    expect(repeat).to_have_attribute("aria-expanded", "false")
+    expect(page.get_by_role("treeitem")).to_have_count(4)
+    page.keyboard.press("Alt+ArrowUp")
+    expect(page.locator(".cm-line").nth(6)).to_contain_text("again and again")
+    expect(repeat).to_have_attribute("aria-expanded", "false")
+    page.keyboard.press("ArrowDown")
+    expect(block(page, "wait 2 s")).to_be_focused()
+    page.locator(".editor-text .cm-line", has_text="log: one").click()
+    expect(repeat).to_have_attribute("aria-selected", "true")
+    page.keyboard.press("End")
+    page.keyboard.type("!")
+    expect(page.locator(".cm-content")).to_contain_text("log: one!")
+    expect(repeat).to_have_attribute("aria-expanded", "false")
+    repeat.focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    expect(block(page, "log one!")).to_be_focused()
+    page.keyboard.press("ArrowLeft")
+    expect(repeat).to_be_focused()
+    assert violations(page) == []
+
+
+def test_a_button_folds_and_what_is_moved_into_a_folded_block_is_shown(page: Page) -> None:
+    page.get_by_role("button", name="Hide what is in repeat 2").click()
+    expect(page.get_by_role("treeitem")).to_have_count(4)
+    shot(page, "folded")
+    row(page, "log the end").click()
+    page.keyboard.press("Alt+ArrowRight")
+    expect(block(page, "repeat 2")).to_have_attribute("aria-expanded", "true")
+    expect(block(page, "log the end")).to_be_focused()
+
+
+def test_folds_fit_the_window_and_the_finger(page: Page) -> None:
+    for size in (WIDE, PHONE):
+        page.set_viewport_size(size)
+        expect_fit(page)
