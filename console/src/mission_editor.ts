@@ -3,6 +3,7 @@ import { askInDialog, emptyCard, h, icon, setText } from "./dom";
 import {
   askEditor,
   kindOf,
+  partsOf,
   placeBehind,
   RefusedError,
   verdict,
@@ -57,8 +58,14 @@ export class MissionEditor {
     (block, isByHand) => this.#chose(block, isByHand),
     () => this.#text?.focus(),
   );
-  readonly #palette = new Palette((offered) => this.#add(offered));
-  readonly #form = new StepForm((key, value) => this.#set(key, value));
+  readonly #palette = new Palette(
+    (offered) => this.#add(offered),
+    ({ path, index }) => void this.#change({ op: "add", path, index }),
+  );
+  readonly #form = new StepForm(
+    (key, value) => this.#set({ op: "set", key, value }),
+    (name) => this.#set({ op: "rename", name }),
+  );
   #text: TextEditor | null = null;
   #formTimer: ReturnType<typeof setTimeout> | undefined;
   #wanted: Path | null = null; // the block to choose in the next outline
@@ -222,6 +229,7 @@ export class MissionEditor {
   #chose(block: Block | null, isByHand: boolean): void {
     if (block && isByHand) this.#text?.show(block.from, block.to);
     else this.#text?.hideBlock();
+    this.#palette.showParts(partsOf(this.#outline.outline, block));
     clearTimeout(this.#formTimer);
     this.#formTimer = setTimeout(() => void this.#fillForm(block), FORM);
   }
@@ -249,9 +257,9 @@ export class MissionEditor {
     else this.#robot.notify("Choose a step first: the new one goes behind it.");
   }
 
-  #set(key: string, value: string): void {
+  #set(operation: { op: string; [key: string]: string }): void {
     const block = this.#outline.chosen;
-    if (block) void this.#change({ op: "set", path: block.path, key, value });
+    if (block) void this.#change({ ...operation, path: block.path } as Operation);
   }
 
   /** Has the robot say how a change of the outline changes the text. */

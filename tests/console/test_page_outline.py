@@ -38,7 +38,8 @@ def shot(page: Page, name: str) -> None:
 
 
 def row(page: Page, text: str) -> Locator:
-    return block(page, text).locator(":scope > .outline-row")
+    found: Locator = block(page, text).locator(":scope > .outline-row")
+    return found
 
 
 def spot(page: Page, text: str, part: float) -> tuple[float, float]:
@@ -181,3 +182,49 @@ def test_folds_fit_the_window_and_the_finger(page: Page) -> None:
     for size in (WIDE, PHONE):
         page.set_viewport_size(size)
         expect_fit(page)
+
+
+MACHINE = """rbx: 1
+kind: Mission
+name: fetch
+machine:
+  start: away
+  states:
+    away:
+      do:
+        go_to: table
+      next: {success: home, failure: failed}
+    home:
+      do:
+        go_to: dock
+      next: {success: finished, failure: failed}
+"""
+
+
+def test_a_state_is_added_behind_the_chosen_one_and_given_a_name(
+    open_page: Callable[..., Page], project: Project
+) -> None:
+    project.file.write_text(MACHINE, encoding="utf-8")
+    page = edits(open_page(page_name="mission"))
+    row(page, "go_to table").click()
+    page.get_by_text("Add a step").click()
+    page.get_by_role("button", name="Add a state to the mission").click()
+    expect(page.get_by_text("Options of state")).to_be_visible()
+    name = page.get_by_label("Name What leads to it follows.")
+    expect(name).to_have_value("new_state")
+    assert violations(page) == []
+    shot(page, "parts")
+    name.fill("look")
+    name.press("Enter")
+    expect(page.locator(".cm-content")).to_contain_text("success: look")
+    expect(block(page, "look state")).to_have_attribute("aria-selected", "true")
+    assert lines(page)[9:14] == [
+        "      next: {success: look, failure: failed}",
+        "    look:",
+        "      do:",
+        "        wait: 1 s",
+        "      next: home",
+    ]
+    expect(page.get_by_text("No mistakes")).to_be_visible()
+    page.set_viewport_size(PHONE)
+    expect_fit(page)

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.requests import Refused
 from rbxcompose.tools.mission_editor.outline import Block, MissionOutline
-from rbxcompose.tools.mission_editor.patches import OPERATIONS, TextPatch, change
+from rbxcompose.tools.mission_editor.patch import TextPatch
+from rbxcompose.tools.mission_editor.patches import OPERATIONS, change
 
 HEAD = "# what it is for\nrbx: 1\nkind: Mission\nname: fetch\n"
 WORDS = (
@@ -33,7 +34,8 @@ OPTIONS = ("timeout: 3 s", "optional: true  # it may fail", "# timeout: 5 s")
 @st.composite
 def steps(draw: st.DrawFn, depth: int = 0) -> list[str]:
     """Return the lines of one step."""
-    kind = draw(st.sampled_from(("word", "word", "sequence", "fallback", "repeat", "if", "list")))
+    kinds = ("word", "word", "sequence", "fallback", "repeat", "if", "list", "choose", "branches", "machine")
+    kind = draw(st.sampled_from(kinds))
     if kind == "word" or depth == 3:
         lines = draw(st.sampled_from(WORDS)).split("\n")
         if ":" in lines[0] and not lines[0].startswith("{"):
@@ -46,9 +48,37 @@ def steps(draw: st.DrawFn, depth: int = 0) -> list[str]:
     if kind == "repeat":
         is_one = draw(st.booleans()) and not inside[0][0].startswith("{") and ":" in inside[0][0]
         return ["repeat: 2", "do:  # again", *((f"  {line}" for line in inside[0]) if is_one else indented(listed))]
+    if kind in ("choose", "branches"):
+        cases = [line for name, step in zip("xyz", inside, strict=False) for line in named(name, step)]
+        return ["choose: $room", "cases:", *indented(cases)] if kind == "choose" else ["parallel:", *indented(cases)]
+    if kind == "machine":
+        return ["machine:", *indented(draw(machine(inside)))]
     if kind == "if":
         return ["if: $battery > 3 %", "then:", *indented(listed), "else:", "  wait: 1 s"]
     return [f"{kind}:", *indented(listed)]
+
+
+def named(name: str, step: list[str]) -> list[str]:
+    """Return the lines of a step with a name."""
+    return [f"{name}:  # {name}", *indented([f"- {step[0]}", *indented(step[1:])])]
+
+
+@st.composite
+def machine(draw: st.DrawFn, inside: list[list[str]]) -> list[str]:
+    """Return the lines of a machine's start and states."""
+    lines, names = [], [name for name, _ in zip("pqr", inside, strict=False)]
+    for name, step in zip(names, inside, strict=True):
+        targets = st.sampled_from((*names, "finished"))
+        one, other = draw(targets), draw(targets)
+        forms: tuple[list[str], ...] = (
+            [f"next: {one}"],
+            ["next:", f"  success: {one}  # on", f"  failure: {other}"],
+            [f"next: {{success: {one}, failure: {other}}}"],
+            [],
+        )
+        body = ["do:", *indented([f"- {step[0]}", *indented(step[1:])])]
+        lines += [f"{name}:", *indented([*body, *draw(st.sampled_from(forms))])]
+    return [f"start: {draw(st.sampled_from(names))}", "states:", *indented(lines)]
 
 
 @st.composite
@@ -106,10 +136,12 @@ def changes(draw: st.DrawFn) -> tuple[str, dict[str, Any], TextPatch]:
         {"op": "set", "key": "timeout", "value": "7 s"},
         {"op": "set", "key": block.kind, "value": "a: 'b' # c"},
         {"op": "set", "key": "timeout", "value": ""},
+        {"op": "rename", "name": draw(st.sampled_from(("renamed", "x", "a b")))},
     ]
     if slots:
         slot = draw(st.sampled_from(slots))
         operations.append({"op": "move_to", "to": slot.path, "index": draw(st.integers(0, 3))})
+        operations.append({"op": "add", "path": slot.path, "index": draw(st.integers(0, 3))})
         operations.append({"op": "insert", "path": slot.path, "index": 1, "yaml": "log: new\noptional: true"})
     operation = {"path": block.path, **draw(st.sampled_from(operations))}
     try:
@@ -150,6 +182,11 @@ def test_the_tree_afterwards_is_the_one_that_was_meant(given_: tuple[str, dict[s
     if operation["op"] == "delete":
         *above, last = operation["path"]
         del at(before, above)[last]
+        assert after == before
+    elif operation["op"] == "duplicate" and isinstance(operation["path"][-1], str):
+        *above, last = operation["path"]
+        copy = at(after, above).pop(made.chosen[-1])
+        assert copy == at(before, above)[last]
         assert after == before
     elif operation["op"] == "duplicate":
         *above, last = operation["path"]

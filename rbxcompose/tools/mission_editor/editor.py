@@ -28,7 +28,8 @@ from rbxcompose.manifest.tree import FILE_BYTES
 from rbxcompose.tools.mission_editor.new_mission import make_mission, templates
 from rbxcompose.tools.mission_editor.outline import MissionOutline, told
 from rbxcompose.tools.mission_editor.palette import form, palette
-from rbxcompose.tools.mission_editor.patches import change, path_of
+from rbxcompose.tools.mission_editor.patch import path_of
+from rbxcompose.tools.mission_editor.patches import change
 from rbxcompose.tools.mission_editor.units import Utf16
 
 MOST_FINDINGS = 200

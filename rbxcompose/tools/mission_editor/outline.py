@@ -20,16 +20,25 @@ ONE, SEVERAL, NAMED = "one", "several", "named"
 """What a slot holds: one step, a list of steps, or entries by their names."""
 LONGEST = 80  # characters of the text of a block
 STATE, INTERRUPT, SEQUENCE = "state", "interrupt", "sequence"
+INTERRUPTS = "interrupts"
 _INSIDE: Mapping[Takes, str] = {Takes.STEP: ONE, Takes.STEPS: SEVERAL, Takes.BRANCHES: SEVERAL, Takes.CASES: NAMED}
+_PARTS: Mapping[Takes, str] = {Takes.CASES: "case", Takes.BRANCHES: "branch"}
 
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """A place for blocks: the path of what is there, what it holds, and what the blocks are."""
+    """A place for blocks: the path of what is there, what it holds, and what the blocks are.
+
+    `part` is what one of them is called: a state, an interrupt, a case, else by the key of the place. `is_there` means
+    that something is written there, `has_names` that its parts have names, as they are written.
+    """
 
     path: Path
     holds: str
     of: str = "step"
+    part: str = ""
+    is_there: bool = True
+    has_names: bool = False
 
 
 @dataclass(slots=True)
@@ -60,11 +69,13 @@ class Block:
 
 
 @cache
-def _slots_of_kind(kind: str) -> tuple[tuple[str, str], ...]:
-    """Return the keys of a kind that take steps, each with what it holds."""
+def _slots_of_kind(kind: str) -> tuple[tuple[str, str, str], ...]:
+    """Return the keys of a kind that take steps, each with what it holds, and what one of its parts is called."""
     cls = kinds().get(kind)
     fields = cls.fields.values() if cls is not None else ()
-    return tuple((one.key, _INSIDE[one.takes]) for one in fields if one.takes in _INSIDE)
+    return tuple(
+        (one.key, _INSIDE[one.takes], _PARTS.get(one.takes, one.key)) for one in fields if one.takes in _INSIDE
+    )
 
 
 def kind_of(step: PlacedNode) -> str:
@@ -83,11 +94,21 @@ def slots_of(step: PlacedNode, path: Path) -> list[Slot]:
     if step.form == "list":
         return [Slot(path, SEVERAL)]
     kind = kind_of(step)
-    found = [Slot((*path, key), holds) for key, holds in _slots_of_kind(kind)]
-    machine = step.get("machine")
-    if machine is not None:
-        found.append(Slot((*path, "machine", "states"), NAMED, STATE))
+    found = [_slot_in(step, path, key, holds, part) for key, holds, part in _slots_of_kind(kind)]
+    if step.get("machine") is not None:
+        found.append(_states_in(step, path))
     return found
+
+
+def _slot_in(step: PlacedNode, path: Path, key: str, holds: str, part: str) -> Slot:
+    there = step.get(key)
+    has_names = holds == NAMED or (holds == SEVERAL and there is not None and there.form == "map")
+    return Slot((*path, key), holds, part=part, is_there=there is not None, has_names=has_names)
+
+
+def _states_in(node: PlacedNode, path: Path) -> Slot:
+    is_there = node.at(("machine", "states")) is not None
+    return Slot((*path, "machine", "states"), NAMED, STATE, STATE, is_there, has_names=True)
 
 
 class MissionOutline:
@@ -102,6 +123,11 @@ class MissionOutline:
     def at(self, path: Path) -> Block | None:
         """Return the block at a path."""
         return next((block for top in self.blocks for block in top.all() if block.path == path), None)
+
+    def all_slots(self) -> list[Slot]:
+        """Return all places for blocks."""
+        within = [slot for top in self.blocks for block in top.all() for slot in block.slots]
+        return [*self.slots, *within]
 
     def region(self, path: Path) -> tuple[int, int, int] | None:
         """Return the lines of an item or an entry, and its column; None if it shares a line with something else."""
@@ -142,10 +168,10 @@ class MissionOutline:
         root = self.root
         if root is None:
             return
-        if (interrupts := root.get("interrupts")) is not None:
-            self.slots.append(Slot(("interrupts",), NAMED, INTERRUPT))
-            for key, value in interrupts.pairs if not interrupts.is_flow else ():
-                yield self._named(key.text, value, ("interrupts", key.text), INTERRUPT)
+        interrupts = root.get(INTERRUPTS)
+        self.slots.append(Slot((INTERRUPTS,), NAMED, INTERRUPT, INTERRUPT, interrupts is not None, has_names=True))
+        for key, value in interrupts.pairs if interrupts is not None and not interrupts.is_flow else ():
+            yield self._named(key.text, value, (INTERRUPTS, key.text), INTERRUPT)
         if (body := root.get("do")) is not None:
             self.slots.append(Slot(("do",), ONE))
             if body.form == "list":
@@ -153,7 +179,7 @@ class MissionOutline:
             else:
                 yield self._step(body, ("do",), "")
         elif root.get("machine") is not None:
-            self.slots.append(Slot(("machine", "states"), NAMED, STATE))
+            self.slots.append(_states_in(root, ()))
             yield from self._states(root, ())
 
     def _steps(self, node: PlacedNode, path: Path) -> Iterator[Block]:
@@ -167,7 +193,7 @@ class MissionOutline:
         block.text = _shown(value) if value is not None else ""
         name = node.get("name")
         block.name = name.text if name is not None else ""
-        inside = {key for key, _ in _slots_of_kind(kind)} | {"machine", "name", kind}
+        inside = {key for key, _, _ in _slots_of_kind(kind)} | {"machine", "name", kind}
         block.notes = [f"{key.text} {_shown(of)}".strip() for key, of in node.pairs if key.text not in inside]
         block.slots = slots_of(node, path)
         block.children = list(self._inside(node, block.slots, kind))
@@ -253,7 +279,14 @@ def told(outline: MissionOutline, at: Callable[[int], int]) -> dict[str, Any]:
 
 
 def _slot(slot: Slot) -> dict[str, Any]:
-    return {"path": list(slot.path), "holds": slot.holds, "of": slot.of}
+    return {
+        "path": list(slot.path),
+        "holds": slot.holds,
+        "of": slot.of,
+        "part": slot.part,
+        "is_there": slot.is_there,
+        "has_names": slot.has_names,
+    }
 
 
 def _block(block: Block, at: Callable[[int], int]) -> dict[str, Any]:

@@ -41,14 +41,14 @@ def palette(robot: Robot, file: FilePath) -> list[dict[str, str]]:
         for name in sorted(known.of(SKILL))
     ]
     words = [
-        {"word": name, "sort": "kind", "about": first_line(cls.__doc__), "yaml": _example(name)}
+        {"word": name, "sort": "kind", "about": first_line(cls.__doc__), "yaml": example_of(name)}
         for name, cls in kinds().items()
     ]
     return [*skills, *words]
 
 
 def form(robot: Robot, file: FilePath, text: str, path: Path) -> dict[str, Any]:
-    """Return the values of the step, state or interrupt at a path that can be typed in one line.
+    """Return the values of the step, state or interrupt at a path that can be typed in one line, and its own name.
 
     Raises:
         Refused: if there is none.
@@ -87,7 +87,9 @@ def form(robot: Robot, file: FilePath, text: str, path: Path) -> dict[str, Any]:
             }
         )
     fields.sort(key=lambda one: (not one["is_word"], not one["value"]))
-    return {"kind": block.kind, "about": guide.describe((*path, kind)) if kind else "", "fields": fields}
+    name = str(path[-1]) if any(slot.path == path[:-1] and slot.has_names for slot in outline.all_slots()) else ""
+    about = guide.describe((*path, kind)) if kind else ""
+    return {"kind": block.kind, "name": name, "about": about, "fields": fields}
 
 
 def _choices(value: GuidedValue, spot: Spot, schema: Mapping[str, Any]) -> dict[str, Any]:
@@ -133,7 +135,7 @@ def _skill(robot: Robot, file: FilePath, name: str) -> str:
 
 
 @cache
-def _example(kind: str) -> str:
+def example_of(kind: str) -> str:
     """Return a step of a kind as its docstring shows it."""
     text = dedent((inspect.getdoc(kinds()[kind]) or "").partition(_EXAMPLE)[2]).strip("\n")
     root = placed(f"{text}\n") if text else None
