@@ -63,7 +63,7 @@ export class MissionEditor {
     ({ path, index }) => void this.#change({ op: "add", path, index }),
   );
   readonly #form = new StepForm(
-    (key, value) => this.#set({ op: "set", key, value }),
+    ({ key, within, shape }, value) => this.#set({ op: "set", key, within, shape, value }),
     (name) => this.#set({ op: "rename", name }),
   );
   #text: TextEditor | null = null;
@@ -257,7 +257,7 @@ export class MissionEditor {
     else this.#robot.notify("Choose a step first: the new one goes behind it.");
   }
 
-  #set(operation: { op: string; [key: string]: string }): void {
+  #set(operation: { op: string; [key: string]: string | Path }): void {
     const block = this.#outline.chosen;
     if (block) void this.#change({ ...operation, path: block.path } as Operation);
   }

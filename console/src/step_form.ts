@@ -11,18 +11,24 @@ export interface Offered {
   yaml: string;
 }
 
-/** One value of a step. `only` means that it is one of the choices; `is_fixed` that it has several lines. */
+/**
+ * One value of a step, or of the map `within` it. It is edited in a `line`, in `lines` of YAML, as a `text` of several
+ * lines, or only in the text of the mission. `only` means that it is one of the choices.
+ */
 export interface FormField {
   key: string;
+  within: string[];
   about: string;
   value: string;
-  is_fixed: boolean;
+  shape: Shape;
   is_word: boolean;
   choices: string[];
   only: boolean;
   units: string[];
   default: string;
 }
+
+export type Shape = "line" | "lines" | "text" | "fixed";
 
 export interface Form {
   kind: string;
@@ -115,12 +121,12 @@ export class StepForm {
   readonly #title = h("summary", {}, "Options");
   readonly #about = h("p", { class: "label" });
   readonly #fields = h("div", { class: "form-fields" });
-  readonly #set: (key: string, value: string) => void;
+  readonly #set: (field: FormField, value: string) => void;
   readonly #rename: (name: string) => void;
   #shown = "";
 
   /** `set` changes a value in the text, and an empty one takes it away; `rename` gives the block another name. */
-  constructor(set: (key: string, value: string) => void, rename: (name: string) => void) {
+  constructor(set: (field: FormField, value: string) => void, rename: (name: string) => void) {
     [this.#set, this.#rename] = [set, rename];
     this.element.append(this.#title, this.#about, this.#fields);
     this.hide("Choose a step to see its options.");
@@ -143,8 +149,7 @@ export class StepForm {
     const name = form.name ? [this.#nameRow(form, mayChange)] : [];
     this.#fields.replaceChildren(...name, ...form.fields.map((field) => this.#row(field, mayChange)));
     const again = focused?.id.startsWith("option-") ? document.getElementById(focused.id) : null;
-    const isTyped = focused instanceof HTMLInputElement && focused.value !== focused.defaultValue;
-    if (isTyped && again instanceof HTMLInputElement) again.value = focused.value;
+    if (isTyped(focused) && again?.tagName === focused.tagName) (again as typeof focused).value = focused.value;
     again?.focus();
   }
 
@@ -157,31 +162,23 @@ export class StepForm {
   }
 
   #row(field: FormField, mayChange: boolean): HTMLElement {
-    const id = `option-${field.key}`;
+    const id = `option-${[...field.within, field.key].join("-")}`;
     const label = h("label", { for: id }, formatName(field.key), h("span", { class: "label" }, ` ${said(field.about)}`));
     const unit = field.units.length > 0 ? [h("span", { class: "unit" }, `with a unit: ${field.units.slice(0, 4).join(", ")}`)] : [];
-    if (field.is_fixed) {
-      return h("div", { class: "field" }, h("span", {}, formatName(field.key)), h("span", { class: "label" }, "Several lines: change it in the text."));
+    if (field.shape === "fixed") {
+      const why = "It is shared with other steps by a mark such as '&low': change it in the text.";
+      return h("div", { class: "field" }, h("span", {}, formatName(field.key)), h("span", { class: "label" }, why));
     }
-    let control: HTMLInputElement | HTMLSelectElement;
-    const more: Node[] = [];
-    if (field.only) {
-      control = h("select", { id }, h("option", { value: "" }, field.default ? `${field.default} (usual)` : "not set"));
-      control.append(...field.choices.map((choice) => h("option", { value: choice }, choice)));
-    } else {
-      control = h("input", { id, type: "text", autocomplete: "off", list: `${id}-choices`, placeholder: field.default });
-      more.push(h("datalist", { id: `${id}-choices` }, ...field.choices.map((choice) => h("option", { value: choice }))));
-    }
-    if (control instanceof HTMLInputElement) control.defaultValue = field.value;
-    control.value = field.value;
-    this.#writes(control, field.value, mayChange, (value) => this.#set(field.key, value));
-    return h("div", { class: "field" }, label, control, ...more, ...unit);
+    const [control, ...more] = controlOf(field, id);
+    this.#writes(control, field.value, mayChange, (value) => this.#set(field, value));
+    return h("div", { class: field.shape === "line" ? "field" : "field wide" }, label, control, ...more, ...unit);
   }
+
   /** Has a control write what it holds, once for each change. */
-  #writes(control: HTMLInputElement | HTMLSelectElement, written: string, mayChange: boolean, set: (value: string) => void): void {
+  #writes(control: Control, written: string, mayChange: boolean, set: (value: string) => void): void {
     control.disabled = !mayChange;
     const write = (): void => {
-      const value = control.value.trim();
+      const value = control instanceof HTMLTextAreaElement ? control.value : control.value.trim();
       if (!control.isConnected || value === written) return; // else what is drawn anew would be written twice
       written = value;
       set(value);
@@ -189,7 +186,35 @@ export class StepForm {
     control.onchange = write;
     control.onblur = write; // a text that was carried over does not count as a change
     control.onkeydown = (event) => {
-      if ((event as KeyboardEvent).key === "Enter") write();
+      const { key, ctrlKey } = event as KeyboardEvent;
+      if (key === "Enter" && (ctrlKey || !(control instanceof HTMLTextAreaElement))) write();
     };
   }
+}
+
+type Control = HTMLInputElement | HTMLSelectElement | HTMLTextAreaElement;
+
+function isTyped(element: Element | null): element is HTMLInputElement | HTMLTextAreaElement {
+  const isText = element instanceof HTMLInputElement || element instanceof HTMLTextAreaElement;
+  return isText && element.value !== element.defaultValue;
+}
+
+/** Returns what edits a value, and what belongs to it. */
+function controlOf(field: FormField, id: string): [Control, ...Node[]] {
+  if (field.shape !== "line") {
+    const rows = Math.min(Math.max(field.value.split("\n").length, 2), 10);
+    const area = h("textarea", { id, rows: String(rows), spellcheck: String(field.shape === "text"), autocomplete: "off" });
+    area.defaultValue = area.value = field.value;
+    const hint = field.shape === "lines" ? "As in the text, such as 'a: 1' in lines, or [a, b]. " : "";
+    return [area, h("span", { class: "unit" }, `${hint}Ctrl+Enter, or leaving it, writes it.`)];
+  }
+  if (field.only) {
+    const select = h("select", { id }, h("option", { value: "" }, field.default ? `${field.default} (usual)` : "not set"));
+    select.append(...field.choices.map((choice) => h("option", { value: choice }, choice)));
+    select.value = field.value;
+    return [select];
+  }
+  const input = h("input", { id, type: "text", autocomplete: "off", list: `${id}-choices`, placeholder: field.default });
+  input.defaultValue = input.value = field.value;
+  return [input, h("datalist", { id: `${id}-choices` }, ...field.choices.map((choice) => h("option", { value: choice })))];
 }

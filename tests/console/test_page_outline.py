@@ -228,3 +228,30 @@ def test_a_state_is_added_behind_the_chosen_one_and_given_a_name(
     expect(page.get_by_text("No mistakes")).to_be_visible()
     page.set_viewport_size(PHONE)
     expect_fit(page)
+
+
+LINES = f"""{FETCH}  - go_to:
+      # over there
+      pose: dock
+  - log: |
+      one
+      two
+"""
+
+
+def test_a_value_of_several_lines_is_edited_in_a_larger_field(open_page: Callable[..., Page], project: Project) -> None:
+    project.file.write_text(LINES, encoding="utf-8")
+    page = edits(open_page(page_name="mission"))
+    row(page, "log one two").click()
+    text = page.locator("#option-log")
+    expect(text).to_have_value("one\ntwo\n")
+    text.fill("one\n  three\n")
+    text.press("Control+Enter")
+    expect(block(page, "log one three")).to_be_visible()
+    assert lines(page)[-4:] == ["  - log: |", "      one", "        three", ""]
+    row(page, "go_to pose dock").click()
+    expect(page.locator("#option-go_to-pose")).to_have_value("dock")
+    assert violations(page) == []
+    shot(page, "lines")
+    page.set_viewport_size(PHONE)
+    expect_fit(page)

@@ -25,9 +25,10 @@ from rbxcompose.compiler.compile import Compilation, look_at_mission
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import project_of, shown_name
 from rbxcompose.manifest.tree import FILE_BYTES
+from rbxcompose.tools.mission_editor.form import form
 from rbxcompose.tools.mission_editor.new_mission import make_mission, templates
 from rbxcompose.tools.mission_editor.outline import MissionOutline, told
-from rbxcompose.tools.mission_editor.palette import form, palette
+from rbxcompose.tools.mission_editor.palette import palette
 from rbxcompose.tools.mission_editor.patch import path_of
 from rbxcompose.tools.mission_editor.patches import change
 from rbxcompose.tools.mission_editor.units import Utf16
@@ -113,7 +114,7 @@ class MissionEditor:
         return palette(self._known, self._path(request["mission"]))
 
     def _form(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the values of a block that can be typed in one line."""
+        """Return the values of a block, and what they can be."""
         path = path_of(request["path"])
         return form(self._known, self._path(request["mission"]), request["text"], path)
 

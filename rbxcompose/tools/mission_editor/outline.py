@@ -46,7 +46,7 @@ class Block:
     """A step, a state or an interrupt; `start` and `end` are the offsets of whole lines, comments included.
 
     `role` is what it is to the block around it: `then`, or the name of a branch. `is_fixed` means that it cannot be
-    moved by itself: it is the only step there, or written within a line.
+    moved by itself: it is the only step there, or the only one within brackets.
     """
 
     path: Path
@@ -170,7 +170,7 @@ class MissionOutline:
             return
         interrupts = root.get(INTERRUPTS)
         self.slots.append(Slot((INTERRUPTS,), NAMED, INTERRUPT, INTERRUPT, interrupts is not None, has_names=True))
-        for key, value in interrupts.pairs if interrupts is not None and not interrupts.is_flow else ():
+        for key, value in interrupts.pairs if interrupts is not None else ():
             yield self._named(key.text, value, (INTERRUPTS, key.text), INTERRUPT)
         if (body := root.get("do")) is not None:
             self.slots.append(Slot(("do",), ONE))
@@ -228,7 +228,7 @@ class MissionOutline:
     def _states(self, node: PlacedNode, path: Path) -> Iterator[Block]:
         machine = node.get("machine")
         states = machine.get("states") if machine is not None else None
-        for key, value in states.pairs if states is not None and not states.is_flow else ():
+        for key, value in states.pairs if states is not None else ():
             yield self._named(key.text, value, (*path, "machine", "states", key.text), STATE)
 
     def _named(self, name: str, node: PlacedNode, path: Path, kind: str) -> Block:
@@ -256,7 +256,9 @@ class MissionOutline:
             start, end = self.lines.starts[lines[0]], self.lines.place(lines[1])
         else:
             start, end = self.lines.starts[region[0]], self.lines.place(region[1])
-        return Block(path, kind, "", "", role, start, end, region is None)
+        above = self.root.at(path[:-1]) if is_entry and self.root is not None else None
+        is_beside = above is not None and above.is_flow and len(above.items) + len(above.pairs) > 1
+        return Block(path, kind, "", "", role, start, end, region is None and not is_beside)
 
 
 def _shown(node: PlacedNode) -> str:

@@ -42,6 +42,23 @@ class TextPatch:
         return text
 
 
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A value as it is written: what stands behind its key, the lines below that, and what it is."""
+
+    head: str
+    lines: tuple[str, ...]
+    plain: PlainTree
+
+    def below(self, column: int) -> str:
+        """Return the lines below the key."""
+        return shifted(list(self.lines), column)
+
+    def behind(self, column: int) -> str:
+        """Return all that follows the colon of a key at a column."""
+        return f"{' ' if self.head else ''}{self.head}" + (f"\n{self.below(column + INDENT)}" if self.lines else "")
+
+
 class Patch:
     """Collects the edits of one operation, and what the tree is to be afterwards."""
 
@@ -242,16 +259,18 @@ class Patch:
         self.tree[1].insert(keys.index(body), [("scalar", INTERRUPTS, SCALAR_MARK), inner])
         return self.done((INTERRUPTS, name))
 
-    def add_key(self, path: Path, node: PlacedNode, key: str, written: str, plain: PlainTree) -> TextPatch:
+    def add_key(self, path: Path, node: PlacedNode, key: str, made: Written, chosen: Path) -> TextPatch:
         """Write a key that was not there below the others of a step."""
-        lines, pair = self.lines, [("scalar", key, SCALAR_MARK), plain]
+        lines, pair = self.lines, [("scalar", key, SCALAR_MARK), made.plain]
         if node.form == "map" and node.is_flow:
+            if made.lines:
+                raise Refused(f"this is written within a line: {BY_HAND}")
             if not node.pairs:
                 raise Refused(f"the map is empty: {BY_HAND}")
             end = max(node.pairs[-1][1].end, node.pairs[-1][0].end + 1)
-            self.edits.append(TextEdit(end, end, f", {key}: {written}"))
+            self.edits.append(TextEdit(end, end, f", {key}: {made.head}"))
             tree_at(self.tree, path)[1].append(pair)
-            return self.done(path)
+            return self.done(chosen)
         if node.form == "map":
             # Right below the word of the step if its value is short, so that it stays with what it is about.
             word, value = node.pairs[0]
@@ -262,40 +281,46 @@ class Patch:
             last = lines.of(max(end - 1, 0)) + 1
             if not is_short:
                 last = lines.region(node.start, node.end, column)[1]
-            self.paste(last, f"{' ' * column}{key}: {written}")
+            self.paste(last, f"{' ' * column}{key}:{made.behind(column)}")
             tree_at(self.tree, path)[1].insert(index, pair)
-            return self.done(path)
+            return self.done(chosen)
         if node.form != "scalar" or "\n" in lines.text[node.start : node.end] or not node.text:
             raise Refused(f"this step has no keys: {BY_HAND}")
         if not lines.text[lines.starts[lines.of(node.start)] : node.start].strip(" -") == "":
             raise Refused(f"this step is written behind its key: {BY_HAND}")
         self.edits.append(TextEdit(node.end, node.end, ":"))
-        self.paste(lines.of(node.start) + 1, f"{' ' * lines.column(node.start)}{key}: {written}")
-        made = ["map", [[("scalar", node.text, node.mark), ("scalar", "", SCALAR_MARK)], pair], BLOCK_MARK]
-        put_into(tree_at(self.tree, path[:-1]), path[-1], made)
-        return self.done(path)
+        column = lines.column(node.start)
+        self.paste(lines.of(node.start) + 1, f"{' ' * column}{key}:{made.behind(column)}")
+        step = ["map", [[("scalar", node.text, node.mark), ("scalar", "", SCALAR_MARK)], pair], BLOCK_MARK]
+        put_into(tree_at(self.tree, path[:-1]), path[-1], step)
+        return self.done(chosen)
 
-    def unset(self, path: Path, node: PlacedNode, key: str, old: PlacedNode | None) -> TextPatch:
+    def unset(self, path: Path, node: PlacedNode, key: str, old: PlacedNode | None, chosen: Path) -> TextPatch:
         """Take a key of a step away, or the value of its word."""
         if old is None:
             raise Refused(f"there is no '{key}'")
         names = [name.text for name, _ in node.pairs]
         at = names.index(key)
-        if at == 0:
+        if at == 0 and (path == chosen or len(names) == 1):
+            if path != chosen:
+                raise Refused(f"'{key}' is the only one here: {BY_HAND}")
             if old.form != "scalar" or "\n" in self.lines.text[old.start : old.end]:
                 raise Refused(f"'{key}' is the word of the step: {BY_HAND}")
             start = node.pairs[0][0].end + 1
             self.edits.append(TextEdit(start, old.end, ""))
             put_into(tree_at(self.tree, path), key, ("scalar", "", SCALAR_MARK))
-            return self.done(path)
+            return self.done(chosen)
         if node.is_flow:
-            before = node.pairs[at - 1]
-            self.edits.append(TextEdit(max(before[1].end, before[0].end + 1), old.end, ""))
+            if at == 0:
+                self.edits.append(TextEdit(node.pairs[0][0].start, node.pairs[1][0].start, ""))
+            else:
+                before = node.pairs[at - 1]
+                self.edits.append(TextEdit(max(before[1].end, before[0].end + 1), old.end, ""))
         else:
             first, last, _ = self.region((*path, key))
             self.cut(first, last)
         take_out(tree_at(self.tree, path), key)
-        return self.done(path)
+        return self.done(chosen)
 
     def done(self, chosen: Path) -> TextPatch:
         """Return the change, if it does what was meant and nothing else."""

@@ -13,22 +13,28 @@ from typing import Any
 
 from rbxcompose.base.requests import Refused
 from rbxcompose.manifest.yaml_nodes import compose
+from rbxcompose.tools.mission_editor.flow import (
+    delete_in_brackets,
+    in_brackets,
+    insert_in_brackets,
+    is_in_brackets,
+    order_in_brackets,
+)
 from rbxcompose.tools.mission_editor.outline import INTERRUPTS, MissionOutline
 from rbxcompose.tools.mission_editor.parts import add_part, rename
 from rbxcompose.tools.mission_editor.patch import (
     BY_HAND,
     SCALAR_MARK,
     Patch,
-    TextEdit,
     TextPatch,
     as_item,
     path_of,
-    put_into,
     scalar_text,
     take_out,
     tree_at,
 )
-from rbxcompose.tools.mission_editor.yaml_places import placed
+from rbxcompose.tools.mission_editor.values import set_value
+from rbxcompose.tools.mission_editor.yaml_places import Path, PlainTree, placed
 
 
 def change(text: str, operation: Mapping[str, Any]) -> TextPatch:
@@ -53,6 +59,8 @@ class _Operations(Patch):
     def delete(self, operation: Mapping[str, Any]) -> TextPatch:
         """Take a step, a state or an interrupt out."""
         path = path_of(operation["path"])
+        if self.is_block_in_brackets(path):
+            return delete_in_brackets(self, path)
         first, last, _ = self.movable(path)
         above = self.node(path[:-1])
         if len(above.items) + len(above.pairs) == 1:
@@ -68,6 +76,8 @@ class _Operations(Patch):
     def duplicate(self, operation: Mapping[str, Any]) -> TextPatch:
         """Write a block once more below itself; a named one gets another name."""
         path = path_of(operation["path"])
+        if self.is_block_in_brackets(path):
+            return self.duplicate_in_brackets(path)
         first, last, _ = self.movable(path)
         block, container = self.text_of(first, last), tree_at(self.tree, path[:-1])
         if isinstance(path[-1], int):
@@ -83,10 +93,51 @@ class _Operations(Patch):
         container[1].insert(index + 1, [("scalar", name, SCALAR_MARK), deepcopy(container[1][index][1])])
         return self.done((*path[:-1], name))
 
+    def place(self, path: Path, to: Path, index: int) -> TextPatch:
+        """Move a block into a slot; in brackets, only among those beside it."""
+        if not self.is_block_in_brackets(path):
+            return super().place(path, to, index)
+        if to != path[:-1]:
+            raise Refused(f"it is written in brackets, and moves only within these: {BY_HAND}")
+        return order_in_brackets(self, path, index)
+
+    def insert_entry(self, path: Path, index: int, name: str, snippet: str, plain: PlainTree) -> TextPatch:
+        """Write an entry with a name into a map, in lines or in brackets as the others."""
+        node, new = self.node(path), placed(snippet)
+        if not node.is_flow or new is None:
+            return super().insert_entry(path, index, name, snippet, plain)
+        if not name or scalar_text(name) != name or any(key.text == name for key, _ in node.pairs):
+            raise Refused("it needs a name of its own: letters, digits and underscores")
+        text, written = in_brackets(new), placed(f"[{in_brackets(new)}]")
+        plain = written.items[0].plain() if written is not None else plain
+        insert_in_brackets(self, path, index, f"{name}: {text}", [("scalar", name, SCALAR_MARK), plain])
+        return self.done((*path, name))
+
+    def is_block_in_brackets(self, path: Path) -> bool:
+        """Return whether a block is in brackets, beside others or alone."""
+        return is_in_brackets(self, path) and self.outline.at(path) is not None
+
+    def duplicate_in_brackets(self, path: Path) -> TextPatch:
+        """Write an entry in brackets once more behind itself."""
+        above, container = self.node(path[:-1]), tree_at(self.tree, path[:-1])
+        if isinstance(path[-1], int):
+            item = above.items[path[-1]]
+            text, plain = self.lines.text[item.start : item.end], deepcopy(container[1][path[-1]])
+            return self.done((*path[:-1], insert_in_brackets(self, path[:-1], path[-1] + 1, text, plain)))
+        names = [key.text for key, _ in above.pairs]
+        name = next(one for number in range(2, 10_000) if (one := f"{path[-1]}_{number}") not in names)
+        at = names.index(path[-1])
+        key, value = above.pairs[at]
+        text = f"{name}{self.lines.text[key.end : max(value.end, key.end)]}"
+        plain = [("scalar", name, SCALAR_MARK), deepcopy(container[1][at][1])]
+        insert_in_brackets(self, path[:-1], at + 1, text, plain)
+        return self.done((*path[:-1], name))
+
     def move(self, operation: Mapping[str, Any]) -> TextPatch:
         """Move a block `up`, `down`, `in` (to the end of the step before it) or `out` (behind the step around it)."""
         path, way = path_of(operation["path"]), operation["way"]
-        self.movable(path)
+        if not self.is_block_in_brackets(path):
+            self.movable(path)
         above = self.node(path[:-1])
         names = [key.text for key, _ in above.pairs]
         index = path[-1] if isinstance(path[-1], int) else names.index(path[-1])
@@ -116,7 +167,6 @@ class _Operations(Patch):
     def move_to(self, operation: Mapping[str, Any]) -> TextPatch:
         """Move a block to a place: before the one with `index` in the slot `to`."""
         path, to, index = path_of(operation["path"]), path_of(operation["to"]), int(operation["index"])
-        self.movable(path)
         return self.place(path, to, index)
 
     def insert(self, operation: Mapping[str, Any]) -> TextPatch:
@@ -132,28 +182,15 @@ class _Operations(Patch):
         node = self.root.at(path)
         if node is None and path == (INTERRUPTS,):
             return self.first_interrupt(name, snippet, new.plain())
+        if node is not None and node.form == "list" and node.is_flow:
+            text = in_brackets(new)
+            written = placed(f"[{text}]")
+            plain = written.items[0].plain() if written is not None else new.plain()
+            return self.done((*path, insert_in_brackets(self, path, index, text, plain)))
         if node is not None and self.takes_names(path):
             return self.insert_entry(path, index, name, snippet, new.plain())
         lines = as_item(snippet.split("\n"))
         return self.done(self.insert_item(path, index, lines, new.plain()))
-
-    def set(self, operation: Mapping[str, Any]) -> TextPatch:
-        """Give the key `key` of the block at `path` a value; an empty one takes the key away."""
-        path, key, value = path_of(operation["path"]), str(operation["key"]), str(operation["value"])
-        node, written = self.node(path), scalar_text(value)
-        old = node.get(key) if node.form == "map" else None
-        if not value.strip():
-            return self.unset(path, node, key, old)
-        fresh = placed(written)
-        plain = fresh.plain() if fresh is not None else ("scalar", "", SCALAR_MARK)
-        if old is not None:
-            if not (old.form == "scalar" or old.is_flow) or "\n" in self.lines.text[old.start : old.end]:
-                raise Refused(f"'{key}' is written in several lines: {BY_HAND}")
-            gap = " " if old.start == old.end and self.lines.text[old.start - 1 : old.start] == ":" else ""
-            self.edits.append(TextEdit(old.start, old.end, f"{gap}{written}"))
-            put_into(tree_at(self.tree, path), key, plain)
-            return self.done(path)
-        return self.add_key(path, node, key, written, plain)
 
 
 OPERATIONS: Mapping[str, Callable[[_Operations, Mapping[str, Any]], TextPatch]] = MappingProxyType(
@@ -165,6 +202,6 @@ OPERATIONS: Mapping[str, Callable[[_Operations, Mapping[str, Any]], TextPatch]] 
         "move": _Operations.move,
         "move_to": _Operations.move_to,
         "rename": rename,
-        "set": _Operations.set,
+        "set": set_value,
     }
 )
