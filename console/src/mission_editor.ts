@@ -283,17 +283,16 @@ export class MissionEditor {
 
   // Trying it
 
-  /** Runs the text as it is here on the simulated robot, or the tests of the file as it is on disk. */
+  /** Runs the text as it is here on the simulated robot, or the tests of the mission with it. */
   async #run(what: "try" | "test"): Promise<void> {
     const { text } = this.#text!;
     this.#isTrying = true;
     this.#mayUndo();
     this.#trial.replaceChildren(h("p", { role: "status" }, what === "try" ? "Running on the simulated robot\u2026" : "Running its tests\u2026"));
     try {
-      const given = what === "try" ? { text } : {};
-      if (what === "test") this.#trial.replaceChildren(showTests(await this.#askLong<TestReport>(what, given)));
+      if (what === "test") this.#trial.replaceChildren(showTests(await this.#askLong<TestReport>(what, { text }), text !== this.#saved));
       else {
-        const run = await this.#askLong<DryRun>(what, given);
+        const run = await this.#askLong<DryRun>(what, { text });
         this.#trial.replaceChildren(showDryRun(run));
         this.#ran = { text, run };
         this.#colour();

@@ -1433,7 +1433,7 @@ MISSION_TEXTS: Mapping[str, tuple[str, ...]] = {
     "read": (),
     "save": ("text", "hash"),
     "templates": (),
-    "test": (),
+    "test": ("text",),
     "try": ("text",),
 }
 """What can be asked about the text of a mission, with its arguments besides `mission`."""

@@ -138,11 +138,12 @@ class MissionEditor:
         return dry_run(self._simulated({path: text}), request["mission"], path, text)
 
     def _test(self, request: Mapping[str, Any]) -> Any:
-        """Run the tests of a mission as it is on disk."""
+        """Run the tests of a mission with a text in place of its file."""
         from rbxcompose.tools.mission_editor.dry_run import run_tests
 
-        self._path(request["mission"])
-        return json.loads(run_tests(self._project, request["mission"]))
+        path = self._path(request["mission"])
+        unsaved = {} if self._read_file(request["mission"]).text == request["text"] else {path: request["text"]}
+        return json.loads(run_tests(self._project, request["mission"], unsaved))
 
     def _check(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Return all that `check` finds with a text in place of a mission's file."""
