@@ -37,6 +37,8 @@ export interface Slot {
   part: string;
   is_there: boolean;
   has_names: boolean;
+  /** The first of its states, if it is a machine's. */
+  start: string;
 }
 
 /** Where something is in the tree of a text: keys, and numbers in lists. */
@@ -53,6 +55,8 @@ export interface Block {
   to: number;
   is_fixed: boolean;
   notes: string[];
+  /** Where a state leads to; an empty outcome is any. */
+  leads: { outcome: string; to: string }[];
   slots: Slot[];
   children: Block[];
 }

@@ -15,9 +15,12 @@ import {
   type Path,
   type ReadText,
 } from "./edited";
+import { MachineView } from "./machine_view";
+import { machinesAround } from "./machines";
 import { OutlineView, type Operation } from "./outline";
 import type { Robot } from "./page";
 import { LostError, type Message } from "./rosbridge";
+import { ReadView, type Sentence } from "./read_view";
 import { Palette, StepForm, type Form, type Offered } from "./step_form";
 import { showDryRun, showTests, type DryRun, type TestReport } from "./trial";
 import type { TextEditor } from "./text_editor";
@@ -27,6 +30,9 @@ const PAUSE = 200; // [ms] after a key, until the text is looked at
 const TRYING = 95_000; // [ms] for a dry run
 const FORM = 150; // [ms] after a choice, until its form is drawn
 const REST = 1_000; // [ms] after that, until the whole robot is checked with it
+
+const VIEWS = { text: "Text", read: "Read", graph: "Graph" } as const; // beside the outline
+type View = keyof typeof VIEWS;
 
 /** What was typed and not saved, by mission: it stays while the page shows something else. */
 const drafts = new Map<string, { text: string; hash: string; saved: string }>();
@@ -66,6 +72,11 @@ export class MissionEditor {
     ({ key, within, shape }, value) => this.#set({ op: "set", key, within, shape, value }),
     (name) => this.#set({ op: "rename", name }),
   );
+  readonly #read = new ReadView((path) => this.#outline.choose(path));
+  readonly #graph = new MachineView(({ path }) => this.#outline.choose(path));
+  readonly #views = new Map<View, HTMLButtonElement>();
+  #view: View = "text";
+  #isReading = false;
   #text: TextEditor | null = null;
   #formTimer: ReturnType<typeof setTimeout> | undefined;
   #wanted: Path | null = null; // the block to choose in the next outline
@@ -101,7 +112,7 @@ export class MissionEditor {
 
   async #open(): Promise<void> {
     try {
-      const [read, { TextEditor }] = await Promise.all([this.#read(), import("./text_editor")]);
+      const [read, { TextEditor }] = await Promise.all([this.#load(), import("./text_editor")]);
       if (this.#isClosed) return;
       const draft = drafts.get(this.#mission);
       this.#text = new TextEditor(
@@ -140,10 +151,54 @@ export class MissionEditor {
     const bar = h("div", { class: "editor-bar" }, this.#undo, this.#redo, this.#save, this.#try, this.#test, this.#verdict, close);
     this.element.replaceChildren(bar, this.#file, this.#says, this.#panes, this.#list, this.#trial, this.#tools);
     this.#tools.replaceChildren(this.#palette.element, this.#form.element);
-    this.#panes.replaceChildren(this.#outline.element, this.#text!.element);
+    const views = (Object.keys(VIEWS) as View[]).map((view) => {
+      const choose = h("button", { type: "button" }, VIEWS[view]);
+      choose.onclick = () => this.#see(view);
+      this.#views.set(view, choose);
+      return choose;
+    });
+    const which = h("div", { class: "outline-bar", role: "group", "aria-label": "Beside the outline" }, ...views);
+    const side = h("div", { class: "editor-side" }, which, this.#text!.element, this.#read.element, this.#graph.element);
+    this.#panes.replaceChildren(this.#outline.element, side);
+    this.#see("text");
   }
 
-  #read(): Promise<ReadText> {
+  /** Shows the text, the mission in sentences, or the graph of its machines beside the outline. */
+  #see(view: View): void {
+    this.#view = view;
+    const elements = { text: this.#text!.element, read: this.#read.element, graph: this.#graph.element };
+    for (const [one, button] of this.#views) {
+      elements[one].hidden = one !== view;
+      button.setAttribute("aria-pressed", String(one === view));
+    }
+    this.#fillView();
+  }
+
+  #fillView(): void {
+    if (this.#view === "read") void this.#readAloud();
+    if (this.#view === "graph") this.#drawGraph();
+  }
+
+  async #readAloud(): Promise<void> {
+    if (this.#isReading) return;
+    this.#isReading = true;
+    const { text } = this.#text!;
+    try {
+      const sentences = await askEditor<Sentence[]>(this.#robot.link, "aloud", this.#mission, { text });
+      if (!this.#isClosed) this.#read.show(sentences, this.#outline.chosen);
+    } catch (error) {
+      this.#read.tell((error as Error).message);
+    }
+    this.#isReading = false;
+  }
+
+  #drawGraph(): void {
+    const { outline, chosen } = this.#outline;
+    const statuses = this.#ran?.text === this.#text!.text ? this.#ran.run.statuses : [];
+    void this.#graph.show(machinesAround(outline, chosen), chosen, statuses);
+  }
+
+  #load(): Promise<ReadText> {
     return askEditor<ReadText>(this.#robot.link, "read", this.#mission);
   }
 
@@ -191,6 +246,7 @@ export class MissionEditor {
       this.#outline.show(looked.outline, this.#wanted, this.#text!.cursor);
       this.#wanted = null;
       this.#colour();
+      this.#fillView();
     }
     this.#text!.mark(looked.findings);
     this.#verdict.dataset.state = looked.errors > 0 ? "failure" : looked.count > 0 ? "waiting" : "success";
@@ -230,6 +286,8 @@ export class MissionEditor {
     if (block && isByHand) this.#text?.show(block.from, block.to);
     else this.#text?.hideBlock();
     this.#palette.showParts(partsOf(this.#outline.outline, block));
+    this.#read.mark(block);
+    if (this.#view === "graph") this.#drawGraph();
     clearTimeout(this.#formTimer);
     this.#formTimer = setTimeout(() => void this.#fillForm(block), FORM);
   }
@@ -296,6 +354,7 @@ export class MissionEditor {
         this.#trial.replaceChildren(showDryRun(run));
         this.#ran = { text, run };
         this.#colour();
+        this.#fillView();
       }
     } catch (error) {
       this.#trial.replaceChildren(h("p", { role: "status" }, icon("warning"), ` ${(error as Error).message}`));
@@ -362,7 +421,7 @@ export class MissionEditor {
   async #learnSaved(): Promise<void> {
     this.#isLost = false;
     try {
-      const read = await this.#read();
+      const read = await this.#load();
       if (read.text === this.#text!.text) {
         this.#take(read);
         this.#keepDraft();
@@ -382,7 +441,7 @@ export class MissionEditor {
 
   async #loadTheirs(): Promise<void> {
     try {
-      const read = await this.#read();
+      const read = await this.#load();
       this.#take(read);
       this.#text!.replace(read.text);
       this.#show(read);

@@ -106,6 +106,14 @@ export class OutlineView {
     if (block !== this.#chosen) this.#mark(block, false);
   }
 
+  /** Chooses the block at a path, and shows it. */
+  choose(path: Path): void {
+    const block = allBlocks(this.#outline.blocks).find((one) => isSame(one.path, path));
+    if (!block) return;
+    this.#reach(block);
+    this.#mark(block, true);
+  }
+
   /** Colours the blocks by how each ended, until another outline is shown. */
   colour(statuses: readonly { path: Path; status: string }[]): void {
     this.#fade();

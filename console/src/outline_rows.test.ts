@@ -12,7 +12,8 @@ const block = (kind: string, path: Path, ...children: Block[]): Block => ({
   to: 0,
   is_fixed: false,
   notes: [],
-  slots: children.length > 0 ? [{ path: children[0]!.path.slice(0, -1), holds: "several", of: "step", part: "do", is_there: true, has_names: false }] : [],
+  leads: [],
+  slots: children.length > 0 ? [{ path: children[0]!.path.slice(0, -1), holds: "several", of: "step", part: "do", is_there: true, has_names: false, start: "" }] : [],
   children,
 });
 const wait = block("wait", ["do", 1, "sequence", 0]);
@@ -50,7 +51,7 @@ const row = (one: Block, parent: Block | null, turn: number, left: number): Row 
   block: one,
   parent,
   siblings: parent ? parent.children : MISSION,
-  slots: parent ? parent.slots : [{ path: ["do"], holds: "one", of: "step", part: "do", is_there: true, has_names: false }],
+  slots: parent ? parent.slots : [{ path: ["do"], holds: "one", of: "step", part: "do", is_there: true, has_names: false, start: "" }],
   top: 40 * turn,
   bottom: 40 * turn + 40,
   left,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 
 import pytest
@@ -255,3 +256,78 @@ def test_a_value_of_several_lines_is_edited_in_a_larger_field(open_page: Callabl
     shot(page, "lines")
     page.set_viewport_size(PHONE)
     expect_fit(page)
+
+
+def test_the_mission_is_read_aloud_as_it_is_typed_and_a_sentence_chooses_its_block(page: Page) -> None:
+    page.get_by_role("button", name="Read", exact=True).click()
+    sentences = page.get_by_role("list", name="The mission in sentences")
+    expect(sentences.get_by_role("button", name="Wait 2 s")).to_be_visible()
+    assert violations(page) == []
+    sentences.get_by_role("button", name="Wait 2 s").click()
+    expect(block(page, "wait 2 s")).to_have_attribute("aria-selected", "true")
+    expect(sentences.get_by_role("button", name="Wait 2 s")).to_have_attribute("aria-current", "true")
+    shot(page, "read")
+    page.locator("#option-wait").fill("5 s")
+    page.locator("#option-wait").press("Enter")
+    expect(sentences.get_by_role("button", name="Wait 5 s")).to_be_visible()
+    page.locator("#option-wait").fill("5 secs")
+    page.locator("#option-wait").press("Enter")
+    expect(page.get_by_text("it cannot be read aloud yet")).to_be_visible()
+    page.set_viewport_size(PHONE)
+    expect_fit(page)
+
+
+NESTED_MACHINE = """rbx: 1
+kind: Mission
+name: fetch
+machine:
+  start: away
+  ends: {lost: failure}
+  states:
+    away:
+      do:
+        go_to: table
+      next: {success: look, failure: lost}
+    look:
+      machine:
+        start: wait_a_while
+        states:
+          wait_a_while:
+            do:
+              wait: 1 s
+            next: log_it
+          log_it:
+            do:
+              log: done
+            next: finished
+      next: home
+    home:
+      do:
+        go_to: dock
+      next: {success: finished, failure: away}
+"""
+
+
+def test_machines_are_drawn_and_a_box_chooses_its_state(open_page: Callable[..., Page], project: Project) -> None:
+    project.file.write_text(NESTED_MACHINE, encoding="utf-8")
+    page = edits(open_page(page_name="mission"))
+    page.get_by_role("button", name="Graph").click()
+    machine = page.get_by_label("Machine: The mission")
+    expect(machine.get_by_role("button")).to_have_count(3)
+    expect(machine.get_by_role("button", name="away start")).to_be_visible()
+    expect(machine.locator(".machine-end")).to_have_text(["lostend", "finishedend"])
+    expect(machine.get_by_role("img")).to_have_attribute("aria-label", re.compile("away leads to lost after failure"))
+    assert violations(page) == []
+    machine.get_by_role("button", name="look").click()
+    look = page.get_by_role("treeitem").filter(has_text="look state").first
+    expect(look).to_have_attribute("aria-selected", "true")
+    expect(page.get_by_label("Machine: look").get_by_role("button")).to_have_count(2)
+    shot(page, "graph")
+    page.get_by_role("button", name="Dry run").click()
+    expect(machine.get_by_role("button", name="home")).to_have_attribute("data-status", "success")
+    assert violations(page) == []
+    shot(page, "graph_run")
+    for size in (WIDE, PHONE):
+        page.set_viewport_size(size)
+        expect_fit(page)
+    shot(page, "graph_phone")

@@ -1424,6 +1424,7 @@ _ANSWERED = frozenset({"call_service", "send_action_goal"})  # operations whose 
 
 
 MISSION_TEXTS: Mapping[str, tuple[str, ...]] = {
+    "aloud": ("text",),
     "check": ("text",),
     "edit": ("text", "operation"),
     "form": ("text", "path"),

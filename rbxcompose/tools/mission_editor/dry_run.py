@@ -22,7 +22,7 @@ from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING
 from rbxcompose.sdk.capabilities import RunsProgram
 from rbxcompose.sdk.registry import declared
-from rbxcompose.tools.mission_editor.outline import Block, MissionOutline
+from rbxcompose.tools.mission_editor.outline import MissionOutline
 from rbxcompose.tools.mission_tests.coverage import SeenWays
 from rbxcompose.tools.mission_tests.finding_files import tests_of
 from rbxcompose.tools.mission_tests.model import RUNS, Expectations, Trial
@@ -91,18 +91,10 @@ def _by_block(outline: MissionOutline, file: str, nodes: Any, statuses: dict[int
     told: dict[tuple[str | int, ...], str] = {}
     for node in nodes:
         if node.number in statuses and node.span.file == file:
-            offset = outline.lines.starts[min(node.span.line, len(outline.lines.lines)) - 1] + node.span.column - 1
-            block = _innermost(outline.blocks, offset)
+            block = outline.written_at(node.span.line, node.span.column)
             if block is not None:
                 told[block.path] = NAMES[statuses[node.number]]
     return [{"path": list(path), "status": status} for path, status in told.items()]
-
-
-def _innermost(blocks: list[Block], offset: int) -> Block | None:
-    for block in blocks:
-        if block.start <= offset < block.end:
-            return _innermost(block.children, offset) or block
-    return None
 
 
 def run_tests(project: Path, mission: str, unsaved: Mapping[Path, str]) -> str:

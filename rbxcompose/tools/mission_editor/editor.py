@@ -145,6 +145,14 @@ class MissionEditor:
         unsaved = {} if self._read_file(request["mission"]).text == request["text"] else {path: request["text"]}
         return json.loads(run_tests(self._project, request["mission"], unsaved))
 
+    def _aloud(self, request: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Return what a text says, in sentences."""
+        from rbxcompose.tools.mission_editor.reading import read_aloud
+
+        path = self._path(request["mission"])
+        with paused_collection():
+            return read_aloud(self._known, request["mission"], path, request["text"])
+
     def _check(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Return all that `check` finds with a text in place of a mission's file."""
         path = self._path(request["mission"])
@@ -268,6 +276,7 @@ class MissionEditor:
 
 REQUESTS: Mapping[str, Callable[[MissionEditor, Mapping[str, Any]], Any]] = MappingProxyType(
     {
+        "aloud": MissionEditor._aloud,
         "check": MissionEditor._check,
         "edit": MissionEditor._edit,
         "form": MissionEditor._form,

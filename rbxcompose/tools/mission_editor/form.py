@@ -58,7 +58,7 @@ def form(robot: Robot, file: FilePath, text: str, path: Path) -> dict[str, Any]:
     guide, known = guide_of(robot, file, root)
     drawn = _FormDrawing(Document(file, text, robot), root, guide, known, outline.lines)
     fields = list(drawn.fields(path, node, kind))
-    fields.sort(key=lambda one: (not one["is_word"], not one["within"], not one["value"]))
+    fields.sort(key=lambda one: (not one["is_word"], not one["within"], not one["value"], one["shape"] != LINE))
     name = str(path[-1]) if any(slot.path == path[:-1] and slot.has_names for slot in outline.all_slots()) else ""
     about = guide.describe((*path, kind)) if kind else ""
     return {"kind": block.kind, "name": name, "about": about, "fields": fields}

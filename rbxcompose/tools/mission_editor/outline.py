@@ -39,6 +39,8 @@ class Slot:
     part: str = ""
     is_there: bool = True
     has_names: bool = False
+    start: str = ""
+    """The first of its states, if it is a machine's."""
 
 
 @dataclass(slots=True)
@@ -57,7 +59,11 @@ class Block:
     start: int
     end: int
     is_fixed: bool
+    written: tuple[int, int]
+    """Where it is written itself: several can be in one line."""
     notes: list[str] = field(default_factory=list)
+    leads: list[tuple[str, str]] = field(default_factory=list)
+    """Where a state leads to: outcomes (empty: any), each with the name of a state or an end."""
     slots: list[Slot] = field(default_factory=list)
     children: list[Block] = field(default_factory=list)
 
@@ -108,7 +114,9 @@ def _slot_in(step: PlacedNode, path: Path, key: str, holds: str, part: str) -> S
 
 def _states_in(node: PlacedNode, path: Path) -> Slot:
     is_there = node.at(("machine", "states")) is not None
-    return Slot((*path, "machine", "states"), NAMED, STATE, STATE, is_there, has_names=True)
+    start = node.at(("machine", "start"))
+    first = start.text if start is not None else ""
+    return Slot((*path, "machine", "states"), NAMED, STATE, STATE, is_there, has_names=True, start=first)
 
 
 class MissionOutline:
@@ -123,6 +131,11 @@ class MissionOutline:
     def at(self, path: Path) -> Block | None:
         """Return the block at a path."""
         return next((block for top in self.blocks for block in top.all() if block.path == path), None)
+
+    def written_at(self, line: int, column: int) -> Block | None:
+        """Return the innermost block at a place of the text; both count from 1."""
+        offset = self.lines.starts[min(line, len(self.lines.lines)) - 1] + column - 1
+        return _innermost(self.blocks, offset)
 
     def all_slots(self) -> list[Slot]:
         """Return all places for blocks."""
@@ -238,6 +251,7 @@ class MissionOutline:
         if node.form == "map":
             others = ((key, of) for key, of in node.pairs if key.text not in ("do", "machine"))
             block.notes = [f"{key.text} {_shown(of)}".strip() for key, of in others]
+            block.leads = _leads(node.get("next"))
             body = node.get("do")
             block.slots = [Slot((*path, "do"), ONE)] if node.get("machine") is None else slots_of(node, path)
             if body is not None and body.form == "list":
@@ -258,7 +272,24 @@ class MissionOutline:
             start, end = self.lines.starts[region[0]], self.lines.place(region[1])
         above = self.root.at(path[:-1]) if is_entry and self.root is not None else None
         is_beside = above is not None and above.is_flow and len(above.items) + len(above.pairs) > 1
-        return Block(path, kind, "", "", role, start, end, region is None and not is_beside)
+        key = next((key for key, value in above.pairs if value is node), node) if above is not None else node
+        written = key.start, max(node.end, key.end)
+        return Block(path, kind, "", "", role, start, end, region is None and not is_beside, written)
+
+
+def _leads(following: PlacedNode | None) -> list[tuple[str, str]]:
+    if following is None:
+        return []
+    if following.form == "scalar":
+        return [("", following.text)] if following.text else []
+    return [(outcome.text, target.text) for outcome, target in following.pairs if target.text]
+
+
+def _innermost(blocks: list[Block], offset: int) -> Block | None:
+    there = [block for block in blocks if block.start <= offset < block.end]
+    exact = (block for block in there if block.written[0] <= offset < block.written[1])
+    block = next(exact, there[0] if there else None)
+    return block and (_innermost(block.children, offset) or block)
 
 
 def _shown(node: PlacedNode) -> str:
@@ -288,6 +319,7 @@ def _slot(slot: Slot) -> dict[str, Any]:
         "part": slot.part,
         "is_there": slot.is_there,
         "has_names": slot.has_names,
+        "start": slot.start,
     }
 
 
@@ -302,6 +334,7 @@ def _block(block: Block, at: Callable[[int], int]) -> dict[str, Any]:
         "to": at(block.end),
         "is_fixed": block.is_fixed,
         "notes": block.notes,
+        "leads": [{"outcome": outcome, "to": to} for outcome, to in block.leads],
         "slots": [_slot(slot) for slot in block.slots],
         "children": [_block(child, at) for child in block.children],
     }

@@ -496,8 +496,8 @@ class WrittenTrial:
 class TrialReader:
     """Reads the tests of one run; each robot is compiled once with each profile, and its findings are reported once.
 
-    `sources` are the texts of all files, `report` has the findings on robots; `unsaved` are texts that count in place of
-    those of the files of robots and missions.
+    `sources` are the texts of all files, `report` has the findings on robots; `unsaved` are texts that count instead of
+    those in the files of robots and missions.
     """
 
     environment: Mapping[str, str]
