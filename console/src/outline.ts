@@ -141,7 +141,11 @@ export class OutlineView {
     const keeps = new Set<Element>(items);
     for (const item of [...list.children]) if (!keeps.has(item)) item.remove();
     items.forEach((item, turn) => {
-      const there = list.children[turn];
+      let there = list.children[turn];
+      if (there && there.nextElementSibling === item) {
+        there.remove(); // it went further down: the others need not move
+        there = list.children[turn];
+      }
       if (there !== item) list.insertBefore(item, there ?? null);
     });
   }
