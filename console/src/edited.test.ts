@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { allBlocks, blockAt, isSame, kindOf, partsOf, placeBehind, verdict, type Block } from "./edited";
 import { matching, type Offered } from "./step_form";
 
-const PART = { part: "do", is_there: true, has_names: false, start: "" };
+const PART = { part: "do", is_there: true, has_names: false, start: "", is_optional: false };
 
 function block(path: Block["path"], from: number, to: number, children: Block[] = []): Block {
   const slots = children.length > 0 ? [{ path: [...path, "do"], holds: "several" as const, of: "step" as const, ...PART }] : [];
@@ -37,7 +37,7 @@ describe("the outline", () => {
 });
 
 describe("parts", () => {
-  const name = { holds: "named" as const, is_there: true, has_names: true, start: "" };
+  const name = { holds: "named" as const, is_there: true, has_names: true, start: "", is_optional: false };
   const [a, b] = ["a", "b"].map((state) => ({ ...block(["machine", "states", state], 0, 1), kind: "state", name: state }));
   const step = { ...block(["machine", "states", "a", "do"], 0, 1), slots: [{ ...name, path: ["x", "else"], of: "step" as const, part: "else", is_there: false }] };
   a!.children.push(step);

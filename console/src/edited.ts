@@ -39,6 +39,8 @@ export interface Slot {
   has_names: boolean;
   /** The first of its states, if it is a machine's. */
   start: string;
+  /** Whether nothing need be there. */
+  is_optional: boolean;
 }
 
 /** Where something is in the tree of a text: keys, and numbers in lists. */

@@ -2,7 +2,7 @@ import { expect, it } from "vitest";
 import type { Block, Path, Slot } from "./edited";
 import { arrowWords, graphOf, machinesAround } from "./machines";
 
-const slot = (path: Path, start: string): Slot => ({ path, holds: "named", of: "state", part: "state", is_there: true, has_names: true, start });
+const slot = (path: Path, start: string): Slot => ({ path, holds: "named", of: "state", part: "state", is_there: true, has_names: true, start, is_optional: false });
 const state = (path: Path, leads: Block["leads"], slots: Slot[] = [], children: Block[] = []): Block => ({
   path,
   kind: "state",

@@ -37,6 +37,7 @@ export class OutlineView {
   readonly #choose: (block: Block | null, isByHand: boolean) => void;
   readonly #enter: () => void;
   readonly #folded = new Set<Block>();
+  readonly #drag: OutlineDrag;
   #outline: Outline = { blocks: [], slots: [] };
   #shown = new Map<Block, Shown>();
   #byItem = new Map<Element, Shown>();
@@ -56,7 +57,7 @@ export class OutlineView {
     this.element.append(bar, this.#tree, this.#says);
     this.#tree.onkeydown = (event) => this.#key(event);
     this.#tree.onclick = ({ target }) => this.#click(target);
-    new OutlineDrag(this.#tree, {
+    this.#drag = new OutlineDrag(this.#tree, {
       blockOf: (target) => this.#draggable(target),
       rows: () => this.#rows(),
       show: (moved, drop, words) => this.#showDrag(moved, drop, words),
@@ -94,6 +95,8 @@ export class OutlineView {
       return old && before.get(old);
     };
     this.#fill(this.#tree, outline.blocks, null, known);
+    const now = new Map([...same].map(([block, old]) => [old, block]));
+    this.#drag.follow((block) => now.get(block));
     const wanted = path ? allBlocks(outline.blocks).find((block) => isSame(block.path, path)) : undefined;
     if (wanted) this.#reach(wanted);
     this.#mark(wanted ?? this.#seenAt(cursor), wanted !== undefined);
@@ -241,7 +244,17 @@ export class OutlineView {
   }
 
   #enable(): void {
-    for (const one of this.#buttons) one.disabled = !this.#mayChange || !this.#chosen || this.#chosen.is_fixed;
+    const chosen = this.#mayChange ? this.#chosen : null;
+    this.#buttons.forEach((one, turn) => {
+      const canGo = chosen !== null && ACTIONS[turn]!.operation.op === "delete" && this.#isOptional(chosen);
+      one.disabled = !chosen || (chosen.is_fixed && !canGo);
+    });
+  }
+
+  /** Returns whether a block is the only one in a place that may be empty, such as `else`. */
+  #isOptional(block: Block): boolean {
+    const parent = this.#shown.get(block)?.parent;
+    return parent?.slots.some(({ path, is_optional: isOptional }) => isOptional && isSame(path, block.path)) ?? false;
   }
 
   #do(operation: (typeof ACTIONS)[number]["operation"]): void {

@@ -39,6 +39,17 @@ export class OutlineDrag {
     tree.addEventListener("click", (event) => this.#hasDragged && event.stopPropagation(), { capture: true });
   }
 
+  /** Goes on with another outline, in which `find` returns what the dragged block has become. */
+  follow(find: (block: Block) => Block | undefined): void {
+    if (!this.#pressed) return;
+    const now = find(this.#pressed.block);
+    if (!now) return this.cancel();
+    this.#pressed.block = now;
+    if (!this.#moved) return;
+    this.#moved = now;
+    this.#aim();
+  }
+
   /** Ends a drag without a drop. */
   cancel(): void {
     clearTimeout(this.#timer);

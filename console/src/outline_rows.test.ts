@@ -13,7 +13,7 @@ const block = (kind: string, path: Path, ...children: Block[]): Block => ({
   is_fixed: false,
   notes: [],
   leads: [],
-  slots: children.length > 0 ? [{ path: children[0]!.path.slice(0, -1), holds: "several", of: "step", part: "do", is_there: true, has_names: false, start: "" }] : [],
+  slots: children.length > 0 ? [{ path: children[0]!.path.slice(0, -1), holds: "several", of: "step", part: "do", is_there: true, has_names: false, start: "", is_optional: false }] : [],
   children,
 });
 const wait = block("wait", ["do", 1, "sequence", 0]);
@@ -51,7 +51,7 @@ const row = (one: Block, parent: Block | null, turn: number, left: number): Row 
   block: one,
   parent,
   siblings: parent ? parent.children : MISSION,
-  slots: parent ? parent.slots : [{ path: ["do"], holds: "one", of: "step", part: "do", is_there: true, has_names: false, start: "" }],
+  slots: parent ? parent.slots : [{ path: ["do"], holds: "one", of: "step", part: "do", is_there: true, has_names: false, start: "", is_optional: false }],
   top: 40 * turn,
   bottom: 40 * turn + 40,
   left,

@@ -331,3 +331,17 @@ def test_machines_are_drawn_and_a_box_chooses_its_state(open_page: Callable[...,
         page.set_viewport_size(size)
         expect_fit(page)
     shot(page, "graph_phone")
+
+
+def test_else_is_added_and_deleted_again(open_page: Callable[..., Page], project: Project) -> None:
+    text = f"{FETCH}  - if: 1 > 2\n    then:\n      wait: 3 s\n"
+    project.file.write_text(text, encoding="utf-8")
+    page = edits(open_page(page_name="mission"))
+    row(page, "wait 3 s").click()
+    expect(page.get_by_role("button", name="Delete")).to_be_disabled()
+    page.get_by_text("Add a step").click()
+    page.get_by_role("button", name="Add 'else' to if 1 > 2").click()
+    expect(block(page, "else: wait 1 s")).to_have_attribute("aria-selected", "true")
+    page.get_by_role("button", name="Delete").click()
+    expect(block(page, "else")).to_have_count(0)
+    assert "\n".join(lines(page)) == text

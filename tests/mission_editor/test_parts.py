@@ -90,11 +90,30 @@ def test_whatever_a_kind_declares_can_be_added_to_its_example(editor: MissionEdi
             assert made.chosen[: len(slot.path)] == slot.path
 
 
+def test_what_need_not_be_there_goes_with_the_last_of_its_steps(editor: MissionEditor) -> None:
+    text = f"{HEAD}do:\n  - if: 1 > 2\n    then:\n      wait: 1 s\n  - wait: 2 s\n"
+    with_else = after(text, op="add", path=["do", 0, "else"], index=0)
+    assert after(with_else, op="delete", path=["do", 0, "else"]) == text
+    listed = after(with_else, op="insert", path=["do", 0, "else"], index=1, yaml="wait: 3 s")
+    one = after(listed, op="delete", path=["do", 0, "else", 0])
+    assert after(one, op="delete", path=["do", 0, "else", 0]) == text
+    with pytest.raises(Refused):
+        change(text, {"op": "delete", "path": ["do", 0, "then"]})
+    low = change(FETCH, {"op": "add", "path": ["interrupts"], "index": 0})
+    gone = change(low.applied(FETCH), {"op": "delete", "path": list(low.chosen)})
+    assert "interrupts" not in gone.applied(low.applied(FETCH))
+    assert gone.chosen == ("do", 0)
+
+
 def test_a_state_is_renamed_with_all_that_leads_to_it(editor: MissionEditor) -> None:
     text = after(MACHINE, op="rename", path=[*STATES, "away"], name="out")
     assert text == MACHINE.replace("away", "out")
     assert findings(editor, text) == []
     assert after(text, op="rename", path=[*STATES, "out"], name="away") == MACHINE
+    low = MACHINE.replace("machine:", "interrupts:\n  low:\n    when: false\n    afterwards: {restart: away}\nmachine:")
+    text = after(low, op="rename", path=[*STATES, "away"], name="out")
+    assert text == low.replace("away", "out")
+    assert findings(editor, text) == []
 
 
 @pytest.mark.parametrize(

@@ -190,6 +190,8 @@ def test_the_tree_afterwards_is_the_one_that_was_meant(given_: tuple[str, dict[s
     before, after = yaml.safe_load(text), yaml.safe_load(made.applied(text))
     if operation["op"] == "delete":
         *above, last = operation["path"]
+        if isinstance(last, int) and len(at(before, above)) == 1:  # `else` goes with the only one in it
+            *above, last = above
         del at(before, above)[last]
         assert after == before
     elif operation["op"] == "duplicate" and isinstance(operation["path"][-1], str):
@@ -224,6 +226,22 @@ def test_each_block_begins_and_ends_at_lines_and_holds_those_below_it(text: str)
         assert block.end in (len(text), 0) or text[block.end - 1] == "\n"
         for child in block.children:
             assert block.start <= child.start < child.end <= block.end
+
+
+ANYTHING: st.SearchStrategy[Any] = st.one_of(
+    st.integers(-3, 9), st.sampled_from(("do", "machine", "states", "a", "up", "", "x: [", "lines")), st.none(),
+    st.lists(st.sampled_from(("do", 0, 1, "then", "cases", "x", "machine", "states", "p", True, -1)), max_size=6),
+)  # fmt: skip
+KEYS = ("path", "to", "index", "way", "yaml", "name", "key", "value", "within", "shape")
+
+
+@given(missions(), st.sampled_from((*OPERATIONS,)), st.dictionaries(st.sampled_from(KEYS), ANYTHING))
+def test_whatever_is_asked_for_is_done_or_refused(text: str, name: str, given_: dict[str, Any]) -> None:
+    try:
+        made = change(text, {**given_, "op": name})
+    except Refused:
+        return
+    assert undone(text, made) == text
 
 
 def at(tree: Any, path: Any) -> Any:

@@ -147,7 +147,7 @@ class MissionEditor:
 
     def _aloud(self, request: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Return what a text says, in sentences."""
-        from rbxcompose.tools.mission_editor.reading import read_aloud
+        from rbxcompose.tools.mission_editor.sentences import read_aloud
 
         path = self._path(request["mission"])
         with paused_collection():

@@ -11,6 +11,7 @@ from functools import cache
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.missions.language.fields import Field
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.keys import anywhere
 from rbxcompose.missions.program.registry import kinds
@@ -41,6 +42,8 @@ class Slot:
     has_names: bool = False
     start: str = ""
     """The first of its states, if it is a machine's."""
+    is_optional: bool = False
+    """Whether nothing need be there."""
 
 
 @dataclass(slots=True)
@@ -75,13 +78,11 @@ class Block:
 
 
 @cache
-def _slots_of_kind(kind: str) -> tuple[tuple[str, str, str], ...]:
-    """Return the keys of a kind that take steps, each with what it holds, and what one of its parts is called."""
+def _slots_of_kind(kind: str) -> tuple[Field, ...]:
+    """Return the keys of a kind that take steps."""
     cls = kinds().get(kind)
     fields = cls.fields.values() if cls is not None else ()
-    return tuple(
-        (one.key, _INSIDE[one.takes], _PARTS.get(one.takes, one.key)) for one in fields if one.takes in _INSIDE
-    )
+    return tuple(one for one in fields if one.takes in _INSIDE)
 
 
 def kind_of(step: PlacedNode) -> str:
@@ -100,16 +101,23 @@ def slots_of(step: PlacedNode, path: Path) -> list[Slot]:
     if step.form == "list":
         return [Slot(path, SEVERAL)]
     kind = kind_of(step)
-    found = [_slot_in(step, path, key, holds, part) for key, holds, part in _slots_of_kind(kind)]
+    found = [_slot_in(step, path, one) for one in _slots_of_kind(kind)]
     if step.get("machine") is not None:
         found.append(_states_in(step, path))
     return found
 
 
-def _slot_in(step: PlacedNode, path: Path, key: str, holds: str, part: str) -> Slot:
-    there = step.get(key)
+def _slot_in(step: PlacedNode, path: Path, of: Field) -> Slot:
+    there, holds, part = step.get(of.key), _INSIDE[of.takes], _PARTS.get(of.takes, of.key)
     has_names = holds == NAMED or (holds == SEVERAL and there is not None and there.form == "map")
-    return Slot((*path, key), holds, part=part, is_there=there is not None, has_names=has_names)
+    return Slot(
+        (*path, of.key),
+        holds,
+        part=part,
+        is_there=there is not None,
+        has_names=has_names,
+        is_optional=not of.is_required,
+    )
 
 
 def _states_in(node: PlacedNode, path: Path) -> Slot:
@@ -182,7 +190,8 @@ class MissionOutline:
         if root is None:
             return
         interrupts = root.get(INTERRUPTS)
-        self.slots.append(Slot((INTERRUPTS,), NAMED, INTERRUPT, INTERRUPT, interrupts is not None, has_names=True))
+        is_there = interrupts is not None
+        self.slots.append(Slot((INTERRUPTS,), NAMED, INTERRUPT, INTERRUPT, is_there, has_names=True, is_optional=True))
         for key, value in interrupts.pairs if interrupts is not None else ():
             yield self._named(key.text, value, (INTERRUPTS, key.text), INTERRUPT)
         if (body := root.get("do")) is not None:
@@ -206,7 +215,7 @@ class MissionOutline:
         block.text = _shown(value) if value is not None else ""
         name = node.get("name")
         block.name = name.text if name is not None else ""
-        inside = {key for key, _, _ in _slots_of_kind(kind)} | {"machine", "name", kind}
+        inside = {one.key for one in _slots_of_kind(kind)} | {"machine", "name", kind}
         block.notes = [f"{key.text} {_shown(of)}".strip() for key, of in node.pairs if key.text not in inside]
         block.slots = slots_of(node, path)
         block.children = list(self._inside(node, block.slots, kind))
@@ -320,6 +329,7 @@ def _slot(slot: Slot) -> dict[str, Any]:
         "is_there": slot.is_there,
         "has_names": slot.has_names,
         "start": slot.start,
+        "is_optional": slot.is_optional,
     }
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from rbxcompose.base.requests import Refused
 from rbxcompose.missions.language.machine_reader import RESULTS
 from rbxcompose.missions.program.machines import FINISHED
+from rbxcompose.missions.program.program import RESTART
 from rbxcompose.tools.mission_editor.outline import INTERRUPT, INTERRUPTS, STATE, Slot
 from rbxcompose.tools.mission_editor.patch import (
     BY_HAND,
@@ -74,6 +75,8 @@ def rename(patch: Patch, operation: Mapping[str, Any]) -> TextPatch:
     if any(slot.path == path[:-1] and slot.of == STATE for slot in patch.slots()):
         for leading in _leading(patch.node(path[:-2]), (*path[:-2],)):
             _lead_to(patch, leading, str(path[-1]), name, path)
+        for leading in _restarting(patch.root):
+            _lead_to(patch, leading, str(path[-1]), name)
     return patch.done((*path[:-1], name))
 
 
@@ -130,6 +133,15 @@ def _leading(machine: PlacedNode, path: Path) -> Iterator[tuple[PlacedNode, Path
             yield following, at
         for outcome, target in following.pairs:
             yield target, (*at, outcome.text)
+
+
+def _restarting(root: PlacedNode) -> Iterator[tuple[PlacedNode, Path]]:
+    """Yield what names the state, or the step, at which the mission restarts after an interrupt, and its path."""
+    interrupts = root.get(INTERRUPTS)
+    for key, _ in interrupts.pairs if interrupts is not None else ():
+        path = (INTERRUPTS, key.text, "afterwards", RESTART)
+        if (node := root.at(path)) is not None:
+            yield node, path
 
 
 def _lead_to(patch: Patch, leading: tuple[PlacedNode, Path], old: str, name: str, renamed: Path = ()) -> None:

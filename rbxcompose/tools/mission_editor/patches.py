@@ -48,7 +48,7 @@ def change(text: str, operation: Mapping[str, Any]) -> TextPatch:
         raise Refused(f"the text cannot be read: {BY_HAND} first")
     try:
         made = OPERATIONS[operation["op"]](_Operations(outline, outline.root), operation)
-    except (KeyError, TypeError, ValueError) as error:
+    except (LookupError, StopIteration, TypeError, ValueError) as error:
         raise Refused("this is no change of a mission") from error
     return made
 
@@ -57,8 +57,10 @@ class _Operations(Patch):
     """The operations: what each changes."""
 
     def delete(self, operation: Mapping[str, Any]) -> TextPatch:
-        """Take a step, a state or an interrupt out."""
+        """Take a step, a state or an interrupt out; with the last one, a place that may be empty, such as `else`."""
         path = path_of(operation["path"])
+        if (place := self.emptied_place(path)) is not None:
+            return self.delete_place(place)
         if self.is_block_in_brackets(path):
             return delete_in_brackets(self, path)
         first, last, _ = self.movable(path)
@@ -72,6 +74,23 @@ class _Operations(Patch):
         names = [key.text for key, _ in above.pairs]
         at = names.index(path[-1])
         return self.done((*path[:-1], names[at - 1 if at > 0 else 1]))
+
+    def emptied_place(self, path: Path) -> Path | None:
+        """Return the place that goes with a block, because it is the only one in it and nothing need be there."""
+        optional = [slot.path for slot in self.slots() if slot.is_optional and slot.is_there]
+        if path in optional and self.outline.at(path) is not None:
+            return path
+        above = self.root.at(path[:-1]) if path else None
+        is_alone = above is not None and len(above.items) + len(above.pairs) == 1
+        return path[:-1] if is_alone and path[:-1] in optional and self.outline.at(path) is not None else None
+
+    def delete_place(self, place: Path) -> TextPatch:
+        """Take a place away, with its key."""
+        first, last, _ = self.region(place)
+        self.cut(first, last)
+        take_out(tree_at(self.tree, place[:-1]), place[-1])
+        others = (block.path for block in self.outline.blocks if block.path[: len(place)] != place)
+        return self.done(place[:-1] or next(others, ()))
 
     def duplicate(self, operation: Mapping[str, Any]) -> TextPatch:
         """Write a block once more below itself; a named one gets another name."""
