@@ -135,3 +135,13 @@ def test_a_step_goes_behind_the_only_one_of_a_case(editor: MissionEditor) -> Non
     text = f"{HEAD}data: {{room: b}}\ndo:\n  choose: $room\n  cases:\n    a:\n      wait: 1 s\n"
     made = after(text, op="insert", path=["do", "cases", "a"], index=1, yaml="wait: 2 s")
     assert made.endswith("    a:\n      - wait: 1 s\n      - wait: 2 s\n")
+
+
+def test_what_holds_blocks_does_not_repeat_them_in_its_row() -> None:
+    text = (
+        f"{HEAD}do:\n  - sequence: [{{wait: 1 s}}]\n  - machine: {{start: a, states: {{a: {{do: {{wait: 1 s}}}}}}}}\n"
+    )
+    assert [(block.kind, block.text) for block in MissionOutline(text).blocks] == [
+        ("sequence", ""),
+        ("machine", "from a"),
+    ]

@@ -21,7 +21,7 @@ ONE, SEVERAL, NAMED = "one", "several", "named"
 """What a slot holds: one step, a list of steps, or entries by their names."""
 LONGEST = 80  # characters of the text of a block
 STATE, INTERRUPT, SEQUENCE = "state", "interrupt", "sequence"
-INTERRUPTS = "interrupts"
+INTERRUPTS, MACHINE = "interrupts", "machine"
 _INSIDE: Mapping[Takes, str] = {Takes.STEP: ONE, Takes.STEPS: SEVERAL, Takes.BRANCHES: SEVERAL, Takes.CASES: NAMED}
 _PARTS: Mapping[Takes, str] = {Takes.CASES: "case", Takes.BRANCHES: "branch"}
 
@@ -102,7 +102,7 @@ def slots_of(step: PlacedNode, path: Path) -> list[Slot]:
         return [Slot(path, SEVERAL)]
     kind = kind_of(step)
     found = [_slot_in(step, path, one) for one in _slots_of_kind(kind)]
-    if step.get("machine") is not None:
+    if step.get(MACHINE) is not None:
         found.append(_states_in(step, path))
     return found
 
@@ -121,10 +121,10 @@ def _slot_in(step: PlacedNode, path: Path, of: Field) -> Slot:
 
 
 def _states_in(node: PlacedNode, path: Path) -> Slot:
-    is_there = node.at(("machine", "states")) is not None
-    start = node.at(("machine", "start"))
+    is_there = node.at((MACHINE, "states")) is not None
+    start = node.at((MACHINE, "start"))
     first = start.text if start is not None else ""
-    return Slot((*path, "machine", "states"), NAMED, STATE, STATE, is_there, has_names=True, start=first)
+    return Slot((*path, MACHINE, "states"), NAMED, STATE, STATE, is_there, has_names=True, start=first)
 
 
 class MissionOutline:
@@ -200,7 +200,7 @@ class MissionOutline:
                 yield from self._steps(body, ("do",))
             else:
                 yield self._step(body, ("do",), "")
-        elif root.get("machine") is not None:
+        elif root.get(MACHINE) is not None:
             self.slots.append(_states_in(root, ()))
             yield from self._states(root, ())
 
@@ -212,12 +212,15 @@ class MissionOutline:
         kind = kind_of(node)
         value = node.get(kind) if node.form == "map" else None
         block = self._block(node, path, kind, role, is_entry=is_entry)
-        block.text = _shown(value) if value is not None else ""
+        inside = {one.key for one in _slots_of_kind(kind)} | {MACHINE, "name", kind}
+        block.slots = slots_of(node, path)
+        if kind == MACHINE:
+            block.text = next((f"from {slot.start}" for slot in block.slots if slot.start), "")
+        elif value is not None and kind not in {one.key for one in _slots_of_kind(kind)}:  # its steps are below it
+            block.text = _shown(value)
         name = node.get("name")
         block.name = name.text if name is not None else ""
-        inside = {one.key for one in _slots_of_kind(kind)} | {"machine", "name", kind}
         block.notes = [f"{key.text} {_shown(of)}".strip() for key, of in node.pairs if key.text not in inside]
-        block.slots = slots_of(node, path)
         block.children = list(self._inside(node, block.slots, kind))
         block.end = max([block.end, *(child.end for child in block.children)])  # with comments of the last one
         return block
@@ -248,21 +251,21 @@ class MissionOutline:
             yield block
 
     def _states(self, node: PlacedNode, path: Path) -> Iterator[Block]:
-        machine = node.get("machine")
+        machine = node.get(MACHINE)
         states = machine.get("states") if machine is not None else None
         for key, value in states.pairs if states is not None else ():
-            yield self._named(key.text, value, (*path, "machine", "states", key.text), STATE)
+            yield self._named(key.text, value, (*path, MACHINE, "states", key.text), STATE)
 
     def _named(self, name: str, node: PlacedNode, path: Path, kind: str) -> Block:
         """Return a state or an interrupt."""
         block = self._block(node, path, kind, "", is_entry=True)
         block.name = name
         if node.form == "map":
-            others = ((key, of) for key, of in node.pairs if key.text not in ("do", "machine"))
+            others = ((key, of) for key, of in node.pairs if key.text not in ("do", MACHINE))
             block.notes = [f"{key.text} {_shown(of)}".strip() for key, of in others]
             block.leads = _leads(node.get("next"))
             body = node.get("do")
-            block.slots = [Slot((*path, "do"), ONE)] if node.get("machine") is None else slots_of(node, path)
+            block.slots = [Slot((*path, "do"), ONE)] if node.get(MACHINE) is None else slots_of(node, path)
             if body is not None and body.form == "list":
                 block.children = list(self._steps(body, (*path, "do")))
             elif body is not None:
