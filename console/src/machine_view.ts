@@ -1,11 +1,17 @@
 /** Draws state machines: their boxes are buttons that choose the state. */
 import { h, svg } from "./dom";
 import { isSame, type Block, type Path } from "./edited";
-import { arrowWords, type MachineGraph, type StateBox } from "./machines";
+import { arrowWords, namesOf, type MachineGraph, type StateBox } from "./machines";
 
 const LETTER = 8.6; // [px] of a wide letter
 const SMALL = 7.2; // [px] of a letter of a label
 const [HIGH, LOW] = [52, 22]; // [px] of a box and of a label
+
+/** How states ended in a dry run, and those in which the robot is now. */
+export interface Progress {
+  statuses: readonly { path: Path; status: string }[];
+  active: ReadonlySet<string>;
+}
 
 export class MachineView {
   readonly element = h("div", { class: "machines" });
@@ -19,7 +25,7 @@ export class MachineView {
   }
 
   /** Draws machines, if they are others than before, and marks the chosen state. */
-  async show(graphs: readonly MachineGraph[], chosen: Block | null, statuses: readonly { path: Path; status: string }[]): Promise<void> {
+  async show(graphs: readonly MachineGraph[], chosen: Block | null, { statuses, active }: Progress): Promise<void> {
     const key = JSON.stringify(graphs.map(({ title, boxes, arrows }) => [title, arrows, boxes.map(({ block, ...box }) => [box, block?.path])]));
     const turn = (this.#turn += 1);
     if (key !== this.#shown) {
@@ -35,8 +41,9 @@ export class MachineView {
       const isChosen = block !== null && chosen !== null && isSame(chosen.path.slice(0, block.path.length), block.path);
       button.setAttribute("aria-pressed", String(isChosen));
       const status = statuses.find(({ path }) => block && isSame(path, block.path))?.status ?? "";
-      button.dataset.status = status;
-      button.title = status ? `${box.name}: ${status} in the dry run` : box.name;
+      const isActive = block !== null && active.has(namesOf(block.path));
+      button.dataset.status = isActive ? "running" : status;
+      button.title = isActive ? `${box.name}: the robot is in it now` : status ? `${box.name}: ${status} in the dry run` : box.name;
     }
   }
 

@@ -1,6 +1,7 @@
 import { expect, it } from "vitest";
 import type { Block, Path, Slot } from "./edited";
-import { arrowWords, graphOf, machinesAround } from "./machines";
+import { activeStates, arrowWords, graphOf, machinesAround, namesOf } from "./machines";
+import type { Drawn, Seen } from "./mission";
 
 const slot = (path: Path, start: string): Slot => ({ path, holds: "named", of: "state", part: "state", is_there: true, has_names: true, start, is_optional: false });
 const state = (path: Path, leads: Block["leads"], slots: Slot[] = [], children: Block[] = []): Block => ({
@@ -43,4 +44,25 @@ it("shows the machines around and in what is chosen, else the first one", () => 
   const step = { ...b, name: "later", path: ["do", 1] as Path };
   expect(machinesAround({ blocks: [step], slots: [] }, null).map(({ title }) => title)).toEqual(["later"]);
   expect(machinesAround({ blocks: [], slots: [] }, null)).toEqual([]);
+});
+
+const drawn = (number: number, name: string, form: string, ...children: Drawn[]): Drawn => ({
+  number,
+  kind: form,
+  text: "",
+  name: "",
+  role: name,
+  notes: [],
+  arrows: [],
+  is_start: false,
+  children,
+  sign: "",
+  form,
+});
+
+it("knows the states in which the robot is by their names", () => {
+  const main = drawn(0, "", "machine", drawn(1, "a", "state"), drawn(2, "b", "state", drawn(3, "", "machine", drawn(4, "x", "state"))));
+  const seen = { state: "running", statuses: { 0: 1, 1: 2, 2: 1, 3: 1, 4: 1 }, picture: { main, interrupts: [] } } as unknown as Seen;
+  expect(activeStates(seen)).toEqual(new Set([namesOf(b.path), namesOf(within.path)]));
+  expect(activeStates({ ...seen, state: "success" }).size).toBe(0);
 });

@@ -1,5 +1,6 @@
 /** The state machines of an outline as graphs: states and ends as boxes, transitions as arrows between them. */
-import { blocksAround, isSame, type Block, type Outline, type Slot } from "./edited";
+import { blocksAround, isSame, type Block, type Outline, type Path, type Slot } from "./edited";
+import { ACTIVE, statusOf, type Drawn, type Seen } from "./mission";
 
 export interface StateBox {
   name: string;
@@ -63,4 +64,21 @@ export function graphOf(title: string, slot: Slot, blocks: readonly Block[]): Ma
 /** Returns an arrow in words. */
 export function arrowWords({ from, to, outcomes }: StateArrow): string {
   return `${from} leads to ${to}${outcomes.length > 0 ? ` after ${outcomes.join(" or ")}` : ""}`;
+}
+
+/** Returns the states in which a mission is on the robot, each as its name behind those of the states around it. */
+export function activeStates({ state, picture, statuses }: Seen): ReadonlySet<string> {
+  const found = new Set<string>();
+  const walk = (node: Drawn, around: string[]): void => {
+    const names = node.form === "state" ? [...around, node.name || node.role] : around;
+    if (names !== around && statusOf(node, statuses) === "running") found.add(JSON.stringify(names));
+    for (const child of node.children) walk(child, names);
+  };
+  if (ACTIVE.has(state)) for (const root of [picture.main, ...picture.interrupts]) walk(root, []);
+  return found;
+}
+
+/** Returns the name of a state behind those of the states around it. */
+export function namesOf(path: Path): string {
+  return JSON.stringify(path.filter((_, turn) => path[turn - 1] === "states" && path[turn - 2] === "machine"));
 }

@@ -16,7 +16,8 @@ import {
   type ReadText,
 } from "./edited";
 import { MachineView } from "./machine_view";
-import { machinesAround } from "./machines";
+import { activeStates, machinesAround } from "./machines";
+import { isSeen, type Seen } from "./mission";
 import { OutlineView, type Operation } from "./outline";
 import type { Robot } from "./page";
 import { LostError, type Message } from "./rosbridge";
@@ -29,6 +30,7 @@ import "./mission_editor.css";
 const PAUSE = 200; // [ms] after a key, until the text is looked at
 const TRYING = 95_000; // [ms] for a dry run
 const FORM = 150; // [ms] after a choice, until its form is drawn
+const LOOK = 500; // [ms] between two looks at the mission on the robot
 const REST = 1_000; // [ms] after that, until the whole robot is checked with it
 
 const VIEWS = { text: "Text", read: "Read", graph: "Graph" } as const; // beside the outline
@@ -77,6 +79,8 @@ export class MissionEditor {
   readonly #views = new Map<View, HTMLButtonElement>();
   #view: View = "text";
   #isReading = false;
+  #active: ReadonlySet<string> = new Set();
+  #stopLooking: () => void = () => undefined;
   #text: TextEditor | null = null;
   #formTimer: ReturnType<typeof setTimeout> | undefined;
   #wanted: Path | null = null; // the block to choose in the next outline
@@ -105,6 +109,7 @@ export class MissionEditor {
     this.#isClosed = true;
     clearTimeout(this.#timer);
     clearTimeout(this.#formTimer);
+    this.#stopLooking();
     for (const close of this.#closers) close();
     this.#keepDraft();
     this.#text?.close();
@@ -171,7 +176,21 @@ export class MissionEditor {
       elements[one].hidden = one !== view;
       button.setAttribute("aria-pressed", String(one === view));
     }
+    this.#stopLooking();
+    this.#stopLooking = view === "graph" ? this.#lookAtRobot() : () => undefined;
     this.#fillView();
+  }
+
+  /** Follows the states in which the robot is; they are known by their names, since it may run an older text. */
+  #lookAtRobot(): () => void {
+    return this.#robot.link.watch(
+      `mission/LookAtAll/mission/${this.#mission}`,
+      (answer) => {
+        this.#active = isSeen(answer) ? activeStates(answer as unknown as Seen) : new Set();
+        if (!this.#isClosed && this.#view === "graph") this.#drawGraph();
+      },
+      LOOK,
+    );
   }
 
   #fillView(): void {
@@ -195,7 +214,7 @@ export class MissionEditor {
   #drawGraph(): void {
     const { outline, chosen } = this.#outline;
     const statuses = this.#ran?.text === this.#text!.text ? this.#ran.run.statuses : [];
-    void this.#graph.show(machinesAround(outline, chosen), chosen, statuses);
+    void this.#graph.show(machinesAround(outline, chosen), chosen, { statuses, active: this.#active });
   }
 
   #load(): Promise<ReadText> {
@@ -258,7 +277,7 @@ export class MissionEditor {
       ...looked.elsewhere.map((found) => rowElsewhere(found)),
     );
     this.#list.hidden = this.#list.childElementCount === 0;
-    setText(this.#says, this.#isLost ? (this.#says.textContent ?? "") : "");
+    if (!this.#isLost && !this.#says.querySelector("button")) setText(this.#says, ""); // an offer stays until it is taken
   }
 
   #row(found: Found): HTMLElement {

@@ -71,6 +71,8 @@ export class Palette {
   readonly #addPart: (part: OfferedPart) => void;
   #offered: Offered[] = [];
   #mayAdd = false;
+  #offeredParts: readonly OfferedPart[] = [];
+  #shownParts = "";
 
   constructor(add: (offered: Offered) => void, addPart: (part: OfferedPart) => void) {
     [this.#add, this.#addPart] = [add, addPart];
@@ -87,6 +89,10 @@ export class Palette {
 
   /** Offers what the chosen block and those around it can have besides steps. */
   showParts(parts: readonly OfferedPart[]): void {
+    this.#offeredParts = parts;
+    const key = JSON.stringify([this.#mayAdd, ...parts.map((one) => [one.part, one.path, one.index, blockName(one)])]);
+    if (key === this.#shownParts) return; // a button that is drawn anew while it is pressed does nothing
+    this.#shownParts = key;
     this.#parts.replaceChildren(
       ...parts.map((one) => {
         const words = h("span", {}, `Add ${article(one.part)}`, h("span", { class: "label" }, ` to ${blockName(one)}`));
@@ -100,6 +106,7 @@ export class Palette {
 
   show(offered: Offered[], mayAdd: boolean): void {
     [this.#offered, this.#mayAdd] = [offered, mayAdd];
+    this.showParts(this.#offeredParts);
     this.#draw();
   }
 

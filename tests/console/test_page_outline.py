@@ -9,6 +9,8 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
+from rbxcompose.missions.program.outcomes import RUNNING
+from rbxcompose.missions.view.picture import picture_of, picture_to_data
 from tests.console.browser import CHROMIUM
 from tests.console.fake_gateway import FakeGateway
 from tests.console.looks import PHONE, WIDE, expect_fit, violations
@@ -151,6 +153,7 @@ def test_blocks_are_folded_by_keys_and_stay_folded_through_edits(page: Page) -> 
     expect(page.get_by_role("treeitem")).to_have_count(4)
     page.keyboard.press("Alt+ArrowUp")
     expect(page.locator(".cm-line").nth(6)).to_contain_text("again and again")
+    expect(page.get_by_role("treeitem").nth(1)).to_contain_text("repeat 2")
     expect(repeat).to_have_attribute("aria-expanded", "false")
     page.keyboard.press("ArrowDown")
     expect(block(page, "wait 2 s")).to_be_focused()
@@ -345,3 +348,23 @@ def test_else_is_added_and_deleted_again(open_page: Callable[..., Page], project
     page.get_by_role("button", name="Delete").click()
     expect(block(page, "else")).to_have_count(0)
     assert "\n".join(lines(page)) == text
+
+
+def test_the_state_in_which_the_robot_is_stands_out_in_the_graph(
+    open_page: Callable[..., Page], project: Project, gateway: FakeGateway
+) -> None:
+    project.file.write_text(MACHINE, encoding="utf-8")
+    robot = project.compiled({}).robot
+    picture = picture_of(robot.missions["fetch"].program, robot.names)
+    numbers = {one.name or one.role: one.number for one in picture.main.all()}
+    seen = {"mission": "fetch", "state": "running", "began": 0.0, "data": {}, "transitions": []}
+    statuses = {str(numbers["home"]): RUNNING}
+    look = {**seen, "statuses": statuses, "picture": picture_to_data(picture)}
+    gateway.windows["mission/LookAtAll/mission/fetch"] = look
+    page = edits(open_page(page_name="mission"))
+    page.get_by_role("button", name="Graph").click()
+    home = page.get_by_label("Machine: The mission").get_by_role("button", name="home")
+    expect(home).to_have_attribute("data-status", "running")
+    expect(home).to_have_attribute("title", "home: the robot is in it now")
+    assert violations(page) == []
+    shot(page, "graph_live")
