@@ -25,6 +25,7 @@ interface Shown {
   fold: HTMLButtonElement;
   words: HTMLElement;
   said: string;
+  folding: string;
   inner: HTMLElement;
 }
 
@@ -142,15 +143,20 @@ export class OutlineView {
   #fill(list: HTMLElement, blocks: readonly Block[], parent: Block | null, known: (block: Block) => Shown | undefined): void {
     const items = blocks.map((block) => this.#show(block, parent, known));
     const keeps = new Set<Element>(items);
-    for (const item of [...list.children]) if (!keeps.has(item)) item.remove();
-    items.forEach((item, turn) => {
-      let there = list.children[turn];
-      if (there && there.nextElementSibling === item) {
+    for (let item = list.firstElementChild; item; ) {
+      const next = item.nextElementSibling;
+      if (!keeps.has(item)) item.remove();
+      item = next;
+    }
+    let there = list.firstElementChild;
+    for (const item of items) {
+      if (there !== item && there?.nextElementSibling === item) {
         there.remove(); // it went further down: the others need not move
-        there = list.children[turn];
+        there = item;
       }
-      if (there !== item) list.insertBefore(item, there ?? null);
-    });
+      if (there === item) there = there.nextElementSibling;
+      else list.insertBefore(item, there);
+    }
   }
 
   #show(block: Block, parent: Block | null, known: (block: Block) => Shown | undefined): HTMLElement {
@@ -168,9 +174,13 @@ export class OutlineView {
     return shown.item;
   }
 
-  #showFold({ block, item, fold, inner, words }: Shown): void {
+  #showFold(shown: Shown): void {
+    const { block, item, fold, inner, words, said } = shown;
     const hasInside = block.children.length > 0;
     const isFolded = this.#folded.has(block);
+    const folding = `${hasInside} ${isFolded} ${said}`;
+    if (folding === shown.folding) return;
+    shown.folding = folding;
     if (fold.hidden === hasInside) fold.hidden = !hasInside;
     if (!hasInside) {
       item.removeAttribute("aria-expanded");
@@ -332,7 +342,7 @@ function made(block: Block): Shown {
   const row = h("div", { class: "outline-row" }, fold, words);
   const item = h("li", { role: "treeitem", tabindex: "-1", "aria-selected": "false" }, row);
   fold.hidden = true;
-  return { block, parent: null, item, row, fold, words, said: "", inner: h("ul", { role: "group" }) };
+  return { block, parent: null, item, row, fold, words, said: "", folding: "", inner: h("ul", { role: "group" }) };
 }
 
 function words(block: Block): (Node | string)[] {
