@@ -32,7 +32,15 @@ export interface Elsewhere {
 export interface Slot {
   path: Path;
   holds: "one" | "several" | "named";
-  of: "step" | "state";
+  of: "step" | "state" | "interrupt";
+  /** What one of its parts is called: a state, a case; else the key of the place. */
+  part: string;
+  is_there: boolean;
+  has_names: boolean;
+  /** The first of its states, if it is a machine's. */
+  start: string;
+  /** Whether nothing need be there. */
+  is_optional: boolean;
 }
 
 /** Where something is in the tree of a text: keys, and numbers in lists. */
@@ -49,6 +57,8 @@ export interface Block {
   to: number;
   is_fixed: boolean;
   notes: string[];
+  /** Where a state leads to; an empty outcome is any. */
+  leads: { outcome: string; to: string }[];
   slots: Slot[];
   children: Block[];
 }
@@ -144,6 +154,42 @@ export function placeBehind(outline: Outline, chosen: Block | null): { path: Pat
     return { path: chosen.slots[0]!.path, index: 1_000 };
   }
   if (chosen) return { path: chosen.path, index: 1 };
-  const slot = outline.slots.find(({ of, holds }) => of === "step" && holds !== "named");
+  const slot = outline.slots.find(({ of, has_names: hasNames }) => of === "step" && !hasNames);
   return slot ? { path: slot.path, index: 1_000 } : null;
+}
+
+/** A part that can be added to a block, or to the mission, which is null: `path` and `index` are where it goes. */
+export interface OfferedPart {
+  part: string;
+  to: Block | null;
+  path: Path;
+  index: number;
+}
+
+/** Returns what can be added that has a name or a place of its own: to the chosen block first, then to those around it. */
+export function partsOf(outline: Outline, chosen: Block | null): OfferedPart[] {
+  const around = chosen ? blocksAround(outline.blocks, chosen) : [];
+  const places = [...around.map((block) => [block, block.slots] as const), [null, outline.slots] as const];
+  return places.flatMap(([to, slots]) =>
+    slots
+      .filter((slot) => slot.has_names || !slot.is_there)
+      .map(({ part, path }) => ({ part, to, path, index: indexBehind(to ? to.children : outline.blocks, path, chosen) })),
+  );
+}
+
+/** Returns a block and those around it, the innermost first. */
+export function blocksAround(blocks: readonly Block[], wanted: Block): Block[] {
+  for (const block of blocks) {
+    if (block === wanted) return [block];
+    const found = blocksAround(block.children, wanted);
+    if (found.length > 0) return [...found, block];
+  }
+  return [];
+}
+
+/** Returns the index in a place behind the part of it in which the chosen block is, else at its end. */
+function indexBehind(blocks: readonly Block[], path: Path, chosen: Block | null): number {
+  const there = blocks.filter((block) => isSame(block.path.slice(0, -1), path));
+  const at = there.findIndex((block) => chosen && isSame(chosen.path.slice(0, block.path.length), block.path));
+  return at < 0 ? 1_000 : at + 1;
 }

@@ -3,6 +3,7 @@ import { askInDialog, emptyCard, h, icon, setText } from "./dom";
 import {
   askEditor,
   kindOf,
+  partsOf,
   placeBehind,
   RefusedError,
   verdict,
@@ -14,9 +15,13 @@ import {
   type Path,
   type ReadText,
 } from "./edited";
+import { MachineView } from "./machine_view";
+import { activeStates, machinesAround } from "./machines";
+import { isSeen, type Seen } from "./mission";
 import { OutlineView, type Operation } from "./outline";
 import type { Robot } from "./page";
 import { LostError, type Message } from "./rosbridge";
+import { ReadView, type Sentence } from "./read_view";
 import { Palette, StepForm, type Form, type Offered } from "./step_form";
 import { showDryRun, showTests, type DryRun, type TestReport } from "./trial";
 import type { TextEditor } from "./text_editor";
@@ -25,7 +30,11 @@ import "./mission_editor.css";
 const PAUSE = 200; // [ms] after a key, until the text is looked at
 const TRYING = 95_000; // [ms] for a dry run
 const FORM = 150; // [ms] after a choice, until its form is drawn
+const LOOK = 500; // [ms] between two looks at the mission on the robot
 const REST = 1_000; // [ms] after that, until the whole robot is checked with it
+
+const VIEWS = { text: "Text", read: "Read", graph: "Graph" } as const; // beside the outline
+type View = keyof typeof VIEWS;
 
 /** What was typed and not saved, by mission: it stays while the page shows something else. */
 const drafts = new Map<string, { text: string; hash: string; saved: string }>();
@@ -57,8 +66,21 @@ export class MissionEditor {
     (block, isByHand) => this.#chose(block, isByHand),
     () => this.#text?.focus(),
   );
-  readonly #palette = new Palette((offered) => this.#add(offered));
-  readonly #form = new StepForm((key, value) => this.#set(key, value));
+  readonly #palette = new Palette(
+    (offered) => this.#add(offered),
+    ({ path, index }) => void this.#change({ op: "add", path, index }),
+  );
+  readonly #form = new StepForm(
+    ({ key, within, shape }, value) => this.#set({ op: "set", key, within, shape, value }),
+    (name) => this.#set({ op: "rename", name }),
+  );
+  readonly #read = new ReadView((path) => this.#outline.choose(path));
+  readonly #graph = new MachineView(({ path }) => this.#outline.choose(path));
+  readonly #views = new Map<View, HTMLButtonElement>();
+  #view: View = "text";
+  #isReading = false;
+  #active: ReadonlySet<string> = new Set();
+  #stopLooking: () => void = () => undefined;
   #text: TextEditor | null = null;
   #formTimer: ReturnType<typeof setTimeout> | undefined;
   #wanted: Path | null = null; // the block to choose in the next outline
@@ -87,6 +109,7 @@ export class MissionEditor {
     this.#isClosed = true;
     clearTimeout(this.#timer);
     clearTimeout(this.#formTimer);
+    this.#stopLooking();
     for (const close of this.#closers) close();
     this.#keepDraft();
     this.#text?.close();
@@ -94,7 +117,7 @@ export class MissionEditor {
 
   async #open(): Promise<void> {
     try {
-      const [read, { TextEditor }] = await Promise.all([this.#read(), import("./text_editor")]);
+      const [read, { TextEditor }] = await Promise.all([this.#load(), import("./text_editor")]);
       if (this.#isClosed) return;
       const draft = drafts.get(this.#mission);
       this.#text = new TextEditor(
@@ -133,10 +156,68 @@ export class MissionEditor {
     const bar = h("div", { class: "editor-bar" }, this.#undo, this.#redo, this.#save, this.#try, this.#test, this.#verdict, close);
     this.element.replaceChildren(bar, this.#file, this.#says, this.#panes, this.#list, this.#trial, this.#tools);
     this.#tools.replaceChildren(this.#palette.element, this.#form.element);
-    this.#panes.replaceChildren(this.#outline.element, this.#text!.element);
+    const views = (Object.keys(VIEWS) as View[]).map((view) => {
+      const choose = h("button", { type: "button" }, VIEWS[view]);
+      choose.onclick = () => this.#see(view);
+      this.#views.set(view, choose);
+      return choose;
+    });
+    const which = h("div", { class: "outline-bar", role: "group", "aria-label": "Beside the outline" }, ...views);
+    const side = h("div", { class: "editor-side" }, which, this.#text!.element, this.#read.element, this.#graph.element);
+    this.#panes.replaceChildren(this.#outline.element, side);
+    this.#see("text");
   }
 
-  #read(): Promise<ReadText> {
+  /** Shows the text, the mission in sentences, or the graph of its machines beside the outline. */
+  #see(view: View): void {
+    this.#view = view;
+    const elements = { text: this.#text!.element, read: this.#read.element, graph: this.#graph.element };
+    for (const [one, button] of this.#views) {
+      elements[one].hidden = one !== view;
+      button.setAttribute("aria-pressed", String(one === view));
+    }
+    this.#stopLooking();
+    this.#stopLooking = view === "graph" ? this.#lookAtRobot() : () => undefined;
+    this.#fillView();
+  }
+
+  /** Follows the states in which the robot is; they are known by their names, since it may run an older text. */
+  #lookAtRobot(): () => void {
+    return this.#robot.link.watch(
+      `mission/LookAtAll/mission/${this.#mission}`,
+      (answer) => {
+        this.#active = isSeen(answer) ? activeStates(answer as unknown as Seen) : new Set();
+        if (!this.#isClosed && this.#view === "graph") this.#drawGraph();
+      },
+      LOOK,
+    );
+  }
+
+  #fillView(): void {
+    if (this.#view === "read") void this.#readAloud();
+    if (this.#view === "graph") this.#drawGraph();
+  }
+
+  async #readAloud(): Promise<void> {
+    if (this.#isReading) return;
+    this.#isReading = true;
+    const { text } = this.#text!;
+    try {
+      const sentences = await askEditor<Sentence[]>(this.#robot.link, "aloud", this.#mission, { text });
+      if (!this.#isClosed) this.#read.show(sentences, this.#outline.chosen);
+    } catch (error) {
+      this.#read.tell((error as Error).message);
+    }
+    this.#isReading = false;
+  }
+
+  #drawGraph(): void {
+    const { outline, chosen } = this.#outline;
+    const statuses = this.#ran?.text === this.#text!.text ? this.#ran.run.statuses : [];
+    void this.#graph.show(machinesAround(outline, chosen), chosen, { statuses, active: this.#active });
+  }
+
+  #load(): Promise<ReadText> {
     return askEditor<ReadText>(this.#robot.link, "read", this.#mission);
   }
 
@@ -184,6 +265,7 @@ export class MissionEditor {
       this.#outline.show(looked.outline, this.#wanted, this.#text!.cursor);
       this.#wanted = null;
       this.#colour();
+      this.#fillView();
     }
     this.#text!.mark(looked.findings);
     this.#verdict.dataset.state = looked.errors > 0 ? "failure" : looked.count > 0 ? "waiting" : "success";
@@ -195,7 +277,7 @@ export class MissionEditor {
       ...looked.elsewhere.map((found) => rowElsewhere(found)),
     );
     this.#list.hidden = this.#list.childElementCount === 0;
-    setText(this.#says, this.#isLost ? (this.#says.textContent ?? "") : "");
+    if (!this.#isLost && !this.#says.querySelector("button")) setText(this.#says, ""); // an offer stays until it is taken
   }
 
   #row(found: Found): HTMLElement {
@@ -222,6 +304,9 @@ export class MissionEditor {
   #chose(block: Block | null, isByHand: boolean): void {
     if (block && isByHand) this.#text?.show(block.from, block.to);
     else this.#text?.hideBlock();
+    this.#palette.showParts(partsOf(this.#outline.outline, block));
+    this.#read.mark(block);
+    if (this.#view === "graph") this.#drawGraph();
     clearTimeout(this.#formTimer);
     this.#formTimer = setTimeout(() => void this.#fillForm(block), FORM);
   }
@@ -249,9 +334,9 @@ export class MissionEditor {
     else this.#robot.notify("Choose a step first: the new one goes behind it.");
   }
 
-  #set(key: string, value: string): void {
+  #set(operation: { op: string; [key: string]: string | Path }): void {
     const block = this.#outline.chosen;
-    if (block) void this.#change({ op: "set", path: block.path, key, value });
+    if (block) void this.#change({ ...operation, path: block.path } as Operation);
   }
 
   /** Has the robot say how a change of the outline changes the text. */
@@ -275,20 +360,20 @@ export class MissionEditor {
 
   // Trying it
 
-  /** Runs the text as it is here on the simulated robot, or the tests of the file as it is on disk. */
+  /** Runs the text as it is here on the simulated robot, or the tests of the mission with it. */
   async #run(what: "try" | "test"): Promise<void> {
     const { text } = this.#text!;
     this.#isTrying = true;
     this.#mayUndo();
     this.#trial.replaceChildren(h("p", { role: "status" }, what === "try" ? "Running on the simulated robot\u2026" : "Running its tests\u2026"));
     try {
-      const given = what === "try" ? { text } : {};
-      if (what === "test") this.#trial.replaceChildren(showTests(await this.#askLong<TestReport>(what, given)));
+      if (what === "test") this.#trial.replaceChildren(showTests(await this.#askLong<TestReport>(what, { text }), text !== this.#saved));
       else {
-        const run = await this.#askLong<DryRun>(what, given);
+        const run = await this.#askLong<DryRun>(what, { text });
         this.#trial.replaceChildren(showDryRun(run));
         this.#ran = { text, run };
         this.#colour();
+        this.#fillView();
       }
     } catch (error) {
       this.#trial.replaceChildren(h("p", { role: "status" }, icon("warning"), ` ${(error as Error).message}`));
@@ -355,7 +440,7 @@ export class MissionEditor {
   async #learnSaved(): Promise<void> {
     this.#isLost = false;
     try {
-      const read = await this.#read();
+      const read = await this.#load();
       if (read.text === this.#text!.text) {
         this.#take(read);
         this.#keepDraft();
@@ -375,7 +460,7 @@ export class MissionEditor {
 
   async #loadTheirs(): Promise<void> {
     try {
-      const read = await this.#read();
+      const read = await this.#load();
       this.#take(read);
       this.#text!.replace(read.text);
       this.#show(read);

@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { CallError, LostError, parseFrame, Rosbridge, waitBefore, type Message, type Socket } from "./rosbridge";
+import { CallError, LostError, parseFrame, Rosbridge, waitBefore, type Json, type Message, type Socket } from "./rosbridge";
 
 class FakeSocket implements Socket {
   static all: FakeSocket[] = [];
@@ -126,6 +126,18 @@ describe("topics", () => {
     last().lose();
     vi.advanceTimersByTime(250);
     expect(last().open().sent).toMatchObject([frame]);
+  });
+
+  it("that answer a query tell who comes later the last answer, unless it leaves first", async () => {
+    const link = make();
+    last().open();
+    const heard: Json[] = [];
+    link.watch("mission/ListMissions", (answer) => heard.push(["first", answer]));
+    last().receive({ op: "publish", topic: "/console/windows/mission/ListMissions", msg: { answer: 1 } });
+    link.watch("mission/ListMissions", (answer) => heard.push(["second", answer]));
+    link.watch("mission/ListMissions", (answer) => heard.push(["third", answer]))();
+    await Promise.resolve();
+    expect(heard).toEqual([["first", 1], ["second", 1]]);
   });
 
   it("are unsubscribed from with the last listener", () => {

@@ -105,10 +105,14 @@ export function isMessage(value: unknown): value is Message {
   return typeof value === "object" && value !== null && !Array.isArray(value);
 }
 
+const WINDOWS = "/console/windows/"; // before the queries whose answers are followed
+
 interface Subscription {
   id: string;
   options: SubscribeOptions;
   listeners: Set<(msg: Message) => void>;
+  /** The last message of a window, which is sent only when it is another. */
+  last: Message | null;
 }
 
 interface Call {
@@ -173,12 +177,13 @@ export class Rosbridge {
   subscribe(topic: string, listener: (msg: Message) => void, options: SubscribeOptions = {}): () => void {
     let subscription = this.#subscriptions.get(topic);
     if (!subscription) {
-      subscription = { id: this.#nextId("subscribe"), options, listeners: new Set() };
+      subscription = { id: this.#nextId("subscribe"), options, listeners: new Set(), last: null };
       this.#subscriptions.set(topic, subscription);
       this.#sendSubscribe(topic, subscription);
     }
-    const { id, listeners } = subscription;
+    const { id, listeners, last } = subscription;
     listeners.add(listener);
+    if (last) queueMicrotask(() => listeners.has(listener) && listener(last));
     return () => {
       if (!listeners.delete(listener) || listeners.size > 0) return;
       this.#subscriptions.delete(topic);
@@ -193,7 +198,7 @@ export class Rosbridge {
    */
   watch(query: string, listener: (answer: Json, refused: string) => void, period?: number): () => void {
     return this.subscribe(
-      `/console/windows/${query}`,
+      `${WINDOWS}${query}`,
       ({ answer, refused }) => listener(answer ?? null, typeof refused === "string" ? refused : ""),
       period === undefined ? {} : { throttle: period },
     );
@@ -311,7 +316,9 @@ export class Rosbridge {
       if (frame.result || status === CANCELED || status === ABORTED) goal?.resolve({ status, values });
       else goal?.reject(new CallError(reasonOf(values)));
     } else if (frame.op === "publish") {
-      for (const listener of [...(this.#subscriptions.get(frame.topic)?.listeners ?? [])]) listener(frame.msg);
+      const subscription = this.#subscriptions.get(frame.topic);
+      if (subscription && frame.topic.startsWith(WINDOWS)) subscription.last = frame.msg;
+      for (const listener of [...(subscription?.listeners ?? [])]) listener(frame.msg);
     } else {
       const call = this.#calls.get(frame.id);
       if (!call) return;

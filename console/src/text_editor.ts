@@ -203,6 +203,7 @@ export class TextEditor {
         ranges.push(Decoration.line({ class: "cm-block" }).range(doc.line(number).from));
       }
     }
+    if (ranges.length === 0 && this.#view.state.field(marks).size === 0) return;
     this.#view.dispatch({ effects: setMarks.of(Decoration.set(ranges, true)) });
   }
 }

@@ -43,7 +43,7 @@ export function showDryRun(run: DryRun): HTMLElement {
   return card("Dry run", isGood ? "check" : run.outcome ? "cross" : "wait", ending(run), ...left, story);
 }
 
-export function showTests(report: TestReport): HTMLElement {
+export function showTests(report: TestReport, isUnsaved: boolean): HTMLElement {
   const rows = report.tests.map((one) =>
     h(
       "li",
@@ -55,7 +55,8 @@ export function showTests(report: TestReport): HTMLElement {
   );
   const missing = report.coverage.missing.map(({ way, line }) => h("li", { class: "label" }, `not tested: ${way} (line ${line})`));
   const all = report.tests.every((one) => one.passed);
-  return card("Tests", all ? "check" : "cross", tested(report), h("ul", { class: "lines", tabindex: "0", "aria-label": "Tests" }, ...rows, ...missing));
+  const of = isUnsaved ? [h("p", { class: "label" }, "They ran with the text as it is here, which is not saved yet.")] : [];
+  return card("Tests", all ? "check" : "cross", tested(report), ...of, h("ul", { class: "lines", tabindex: "0", "aria-label": "Tests" }, ...rows, ...missing));
 }
 
 function card(title: string, picture: Icon, words: string, ...more: Node[]): HTMLElement {

@@ -73,6 +73,8 @@ DEVICE, DEVICE_PORT = "device", "device port"
 """A device; its port, `dev:NAME`, in a field that takes paths, too."""
 RUNNING = "running"
 """All components: those of the user and those of every robot."""
+PUBLISHED, SERVICE = "published topic", "service"
+"""A topic on which missions may publish; a service that they may call."""
 TOPIC, FILE, ANYTHING = "topic", "file", "anything"
 """A topic; a path relative to the file that writes it; a word that may be a name of any kind."""
 

@@ -129,18 +129,29 @@ def look_at_mission(
 
     The robot was compiled before. Its own rules are left out: only `compile_robot` sees what a mission does to it.
     """
+    changed, report, sources = with_text_of_mission(robot, name, environment, unsaved)
+    if changed is not None:
+        program = changed.missions[name].program
+
+        def find(rule: Rule[Any], subject: Robot | Examined) -> list[Finding]:
+            return findings_of(rule, subject) if getattr(subject, "program", None) is program else []
+
+        run_checks(changed, report, find)
+    return report, sources
+
+
+def with_text_of_mission(
+    robot: Robot, name: str, environment: Mapping[str, str], unsaved: Mapping[Path, str]
+) -> tuple[Robot | None, Report, Mapping[str, str]]:
+    """Return a robot with the newest text of one mission, None if it cannot be read; what is wrong; and the texts."""
     report, sources = Report(), Texts(unsaved)
     skills = names_of_skills(robot.components, robot.outside)
     read = read_missions(robot.manifest, environment, report, sources, skills, only=name).read
-    if (mission := read.get(name)) is not None:
-        missions = {**robot.missions, name: mission}
-        known = skills_of(robot.components, [one.program for one in missions.values()], robot.outside)
-
-        def find(rule: Rule[Any], subject: Robot | Examined) -> list[Finding]:
-            return findings_of(rule, subject) if getattr(subject, "program", None) is mission.program else []
-
-        run_checks(replace(robot, missions=missions, skills=known), report, find)
-    return report, sources
+    if (mission := read.get(name)) is None:
+        return None, report, sources
+    missions = {**robot.missions, name: mission}
+    known = skills_of(robot.components, [one.program for one in missions.values()], robot.outside)
+    return replace(robot, missions=missions, skills=known), report, sources
 
 
 def _with_used(robot: Robot, name: str) -> set[str]:

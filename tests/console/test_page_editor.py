@@ -319,6 +319,18 @@ def test_a_dry_run_tells_the_story_and_colours_the_outline(open_page: Callable[.
     expect(page.get_by_text("there are no tests of 'fetch'")).to_be_visible()
 
 
+def test_tests_run_with_the_text_that_is_not_saved(open_page: Callable[..., Page], project: Project) -> None:
+    test = "rbx: 1\nkind: Test\nname: it_fetches\nrobot: ../robots/fetcher/robot.yaml\nmission: fetch\n"
+    test += "expect:\n  outcome: success\n"
+    project.file.with_name("fetch.test.yaml").write_text(test, encoding="utf-8")
+    page = edits(open_page(page_name="mission"))
+    types(page, "wait: 2 s", "check: 1 > 2")
+    page.get_by_role("button", name="Test").click()
+    expect(page.get_by_text("0 of 1 test passed")).to_be_visible(timeout=20_000)
+    expect(page.get_by_text("They ran with the text as it is here")).to_be_visible()
+    assert project.text() == FETCH
+
+
 def test_a_robot_is_watched_paused_and_resumed_beside_the_editor_on_a_phone(
     open_page: Callable[..., Page], project: Project, gateway: FakeGateway
 ) -> None:

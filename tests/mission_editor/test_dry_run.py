@@ -46,10 +46,25 @@ def test_a_robot_that_starts_programs_is_not_tried(editor: MissionEditor, projec
 
 def test_the_tests_of_a_mission_run_with_coverage(editor: MissionEditor, project: Path) -> None:
     with pytest.raises(Refused, match="there are no tests of 'fetch'"):
-        ask(editor, "test")
+        ask(editor, "test", text=FETCH)
     test = "rbx: 1\nkind: Test\nname: it_fetches\nrobot: ../robots/fetcher/robot.yaml\nmission: fetch\n"
     test += "expect:\n  outcome: success\n"
     (project / "missions/fetch.test.yaml").write_text(test, encoding="utf-8")
-    told = ask(editor, "test")
+    told = ask(editor, "test", text=FETCH)
     assert [(one["passed"], one["problems"]) for one in told["tests"]] == [(True, [])]
     assert told["coverage"]["ways"] > told["coverage"]["taken"] > 0
+
+
+def test_tests_run_with_the_text_that_is_not_saved(editor: MissionEditor, project: Path) -> None:
+    test = "rbx: 1\nkind: Test\nname: it_fetches\nrobot: ../robots/fetcher/robot.yaml\nmission: fetch\n"
+    test += "expect:\n  outcome: success\n"
+    (project / "missions/fetch.test.yaml").write_text(test, encoding="utf-8")
+    (one,) = ask(editor, "test", text=FETCH.replace("wait: 2 s", "check: 1 > 2"))["tests"]
+    assert not one["passed"]
+    assert "failure" in str(one["problems"])
+    assert (project / "missions/fetch.yaml").read_text(encoding="utf-8") == FETCH
+    (one,) = ask(editor, "test", text=FETCH.replace("table", "tabel"))["tests"]
+    assert not one["passed"]
+    more = ask(editor, "test", text=FETCH + "  - fallback: [{check: 1 > 0}, {wait: 1 s}]\n")
+    assert more["tests"][0]["passed"]
+    assert more["coverage"]["ways"] > ask(editor, "test", text=FETCH)["coverage"]["ways"]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from rbxcompose.base.requests import Refused
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.tools.mission_editor.editor import MissionEditor
 from rbxcompose.tools.mission_editor.outline import kind_of
@@ -15,6 +17,7 @@ from rbxcompose.tools.mission_editor.yaml_places import placed
 from tests.mission_editor.test_editor import FETCH, ask, editor, project
 
 __all__ = ["editor", "project"]
+ROOT = Path(__file__).parents[2]
 
 TEXT = """rbx: 1
 kind: Mission
@@ -72,7 +75,11 @@ def test_a_step_has_the_options_of_its_kind_with_values_units_and_names(editor: 
     assert "wait" not in found
     log = fields(editor, "do", 1)
     assert (log["level"]["value"], log["level"]["only"]) == ("warn", True)
-    assert fields(editor, "do", 2)["log"]["is_fixed"]
+    assert (fields(editor, "do", 2)["log"]["shape"], fields(editor, "do", 2)["log"]["value"]) == (
+        "text",
+        "more\nlines\n",
+    )
+    assert found["save"]["shape"] == "line"
 
 
 def test_an_interrupt_has_a_form(editor: MissionEditor) -> None:
@@ -89,3 +96,36 @@ def test_what_has_no_options_is_refused(editor: MissionEditor, project: Path) ->
     for path in paths:
         with pytest.raises(Refused):
             ask(editor, "form", text=TEXT, path=path)
+
+
+def library_editor(robot: str) -> MissionEditor:
+    file = ROOT / robot
+
+    def compiled(unsaved: Any) -> Any:
+        return compile_robot(str(file), environment=os.environ, unsaved=unsaved, tries_profiles=False)
+
+    return MissionEditor(compiled, file)
+
+
+def test_what_there_is_to_choose_is_offered_places_joints_poses_topics_values_and_names() -> None:
+    """On a robot of the library, whose skills declare all of it."""
+    editor = library_editor("robots/pedestal_pi/robot.yaml")
+    head = "rbx: 1\nkind: Mission\nname: poses_and_gripper\ndo:\n"
+    steps = ("move_right_arm:", "right_gripper_controller: 1 cm", "publish: x", "call: x", "set_parameter:", "use: x")
+    text = head + "".join(f"  - {step}\n" for step in (*steps, "check: 1 > 0"))
+
+    def offered(turn: int) -> dict[str, Any]:
+        form = editor.answer({"do": "form", "mission": "poses_and_gripper", "text": text, "path": ["do", turn]})
+        return {".".join([*field["within"], field["key"]]): field for field in form["fields"]}
+
+    arm = offered(0)
+    assert {"resting", "wave"} <= set(arm["move_right_arm"]["choices"])
+    assert arm["move_right_arm.right_arm_elbow_flex_joint"]["units"] == ["rad", "deg"]
+    assert arm["move_right_arm.keep"]["shape"] == "lines"
+    assert offered(1)["right_gripper_controller"]["units"][:2] == ["m", "cm"]
+    assert "right_arm/servo/twist" in [one.strip("/") for one in offered(2)["publish"]["choices"]]
+    assert offered(3)["call"]["choices"][0]
+    assert "move_right_arm" not in offered(4)
+    assert offered(4)["set_parameter.component"]["choices"]
+    assert "poses_and_gripper" in offered(5)["use"]["choices"]
+    assert "$leading" in offered(6)["check"]["choices"]

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.requests import Refused
 from rbxcompose.tools.mission_editor.outline import Block, MissionOutline
-from rbxcompose.tools.mission_editor.patches import OPERATIONS, TextPatch, change
+from rbxcompose.tools.mission_editor.patch import TextPatch
+from rbxcompose.tools.mission_editor.patches import OPERATIONS, change
 
 HEAD = "# what it is for\nrbx: 1\nkind: Mission\nname: fetch\n"
 WORDS = (
@@ -22,6 +23,8 @@ WORDS = (
     "log: 'it is: so'",
     "recharge",
     "{wait: 2 s}",
+    "[{wait: 2 s}, recharge, {log: 'a, b', optional: true}]",
+    "{parallel: {a: recharge, b: {wait: 1 s}}, timeout: 5 s}",
     "log: |\n  # no comment\n    further\n\n  end",
     'log: "two\n  lines"',
     "wait_for: $battery > 50 %",
@@ -33,10 +36,11 @@ OPTIONS = ("timeout: 3 s", "optional: true  # it may fail", "# timeout: 5 s")
 @st.composite
 def steps(draw: st.DrawFn, depth: int = 0) -> list[str]:
     """Return the lines of one step."""
-    kind = draw(st.sampled_from(("word", "word", "sequence", "fallback", "repeat", "if", "list")))
+    kinds = ("word", "word", "sequence", "fallback", "repeat", "if", "list", "choose", "branches", "machine")
+    kind = draw(st.sampled_from(kinds))
     if kind == "word" or depth == 3:
         lines = draw(st.sampled_from(WORDS)).split("\n")
-        if ":" in lines[0] and not lines[0].startswith("{"):
+        if ":" in lines[0] and not lines[0].startswith(("{", "[")):
             lines += draw(st.lists(st.sampled_from(OPTIONS), max_size=2, unique=True))
         return lines
     inside = draw(st.lists(steps(depth + 1), min_size=1, max_size=3))
@@ -44,11 +48,39 @@ def steps(draw: st.DrawFn, depth: int = 0) -> list[str]:
     if kind == "list":
         return ["sequence:", *listed]
     if kind == "repeat":
-        is_one = draw(st.booleans()) and not inside[0][0].startswith("{") and ":" in inside[0][0]
+        is_one = draw(st.booleans()) and not inside[0][0].startswith(("{", "[")) and ":" in inside[0][0]
         return ["repeat: 2", "do:  # again", *((f"  {line}" for line in inside[0]) if is_one else indented(listed))]
+    if kind in ("choose", "branches"):
+        cases = [line for name, step in zip("xyz", inside, strict=False) for line in named(name, step)]
+        return ["choose: $room", "cases:", *indented(cases)] if kind == "choose" else ["parallel:", *indented(cases)]
+    if kind == "machine":
+        return ["machine:", *indented(draw(machine(inside)))]
     if kind == "if":
         return ["if: $battery > 3 %", "then:", *indented(listed), "else:", "  wait: 1 s"]
     return [f"{kind}:", *indented(listed)]
+
+
+def named(name: str, step: list[str]) -> list[str]:
+    """Return the lines of a step with a name."""
+    return [f"{name}:  # {name}", *indented([f"- {step[0]}", *indented(step[1:])])]
+
+
+@st.composite
+def machine(draw: st.DrawFn, inside: list[list[str]]) -> list[str]:
+    """Return the lines of a machine's start and states."""
+    lines, names = [], [name for name, _ in zip("pqr", inside, strict=False)]
+    for name, step in zip(names, inside, strict=True):
+        targets = st.sampled_from((*names, "finished"))
+        one, other = draw(targets), draw(targets)
+        forms: tuple[list[str], ...] = (
+            [f"next: {one}"],
+            ["next:", f"  success: {one}  # on", f"  failure: {other}"],
+            [f"next: {{success: {one}, failure: {other}}}"],
+            [],
+        )
+        body = ["do:", *indented([f"- {step[0]}", *indented(step[1:])])]
+        lines += [f"{name}:", *indented([*body, *draw(st.sampled_from(forms))])]
+    return [f"start: {draw(st.sampled_from(names))}", "states:", *indented(lines)]
 
 
 @st.composite
@@ -106,10 +138,16 @@ def changes(draw: st.DrawFn) -> tuple[str, dict[str, Any], TextPatch]:
         {"op": "set", "key": "timeout", "value": "7 s"},
         {"op": "set", "key": block.kind, "value": "a: 'b' # c"},
         {"op": "set", "key": "timeout", "value": ""},
+        {"op": "set", "key": "save", "value": "a: 1\n# why\nb: [2]\n", "shape": "lines"},
+        {"op": "set", "key": block.kind, "value": "one\n\n  two\n", "shape": "text"},
+        {"op": "set", "key": "speed", "value": "1 m/s", "within": [block.kind]},
+        {"op": "set", "key": "place", "value": "", "within": [block.kind]},
+        {"op": "rename", "name": draw(st.sampled_from(("renamed", "x", "a b")))},
     ]
     if slots:
         slot = draw(st.sampled_from(slots))
-        operations.append({"op": "move_to", "to": slot.path, "index": 0})
+        operations.append({"op": "move_to", "to": slot.path, "index": draw(st.integers(0, 3))})
+        operations.append({"op": "add", "path": slot.path, "index": draw(st.integers(0, 3))})
         operations.append({"op": "insert", "path": slot.path, "index": 1, "yaml": "log: new\noptional: true"})
     operation = {"path": block.path, **draw(st.sampled_from(operations))}
     try:
@@ -133,6 +171,9 @@ def test_what_moves_takes_its_comments_along_and_loses_nothing(given_: tuple[str
     text, operation, made = given_
     if operation["op"] in ("move", "move_to"):
         after = made.applied(text)
+        if MissionOutline(text).region(operation["path"]) is None:  # in brackets, where lines stay
+            assert sorted(after) == sorted(text)
+            return
         assert words(after) == words(text)
         for block in blocks(text):
             own = [line.strip(" -") for line in text[block.start : block.end].split("\n") if line.strip()]
@@ -149,7 +190,14 @@ def test_the_tree_afterwards_is_the_one_that_was_meant(given_: tuple[str, dict[s
     before, after = yaml.safe_load(text), yaml.safe_load(made.applied(text))
     if operation["op"] == "delete":
         *above, last = operation["path"]
+        if isinstance(last, int) and len(at(before, above)) == 1:  # `else` goes with the only one in it
+            *above, last = above
         del at(before, above)[last]
+        assert after == before
+    elif operation["op"] == "duplicate" and isinstance(operation["path"][-1], str):
+        *above, last = operation["path"]
+        copy = at(after, above).pop(made.chosen[-1])
+        assert copy == at(before, above)[last]
         assert after == before
     elif operation["op"] == "duplicate":
         *above, last = operation["path"]
@@ -160,6 +208,8 @@ def test_the_tree_afterwards_is_the_one_that_was_meant(given_: tuple[str, dict[s
         assert at(after, made.chosen) == moved
     elif operation["op"] == "insert":
         assert at(after, made.chosen) == {"log": "new", "optional": True}
+    elif operation["op"] == "set" and operation.get("shape"):
+        assert at(after, operation["path"])[operation["key"]] in ({"a": 1, "b": [2]}, "one\n\n  two\n")
 
 
 @given(changes())
@@ -176,6 +226,22 @@ def test_each_block_begins_and_ends_at_lines_and_holds_those_below_it(text: str)
         assert block.end in (len(text), 0) or text[block.end - 1] == "\n"
         for child in block.children:
             assert block.start <= child.start < child.end <= block.end
+
+
+ANYTHING: st.SearchStrategy[Any] = st.one_of(
+    st.integers(-3, 9), st.sampled_from(("do", "machine", "states", "a", "up", "", "x: [", "lines")), st.none(),
+    st.lists(st.sampled_from(("do", 0, 1, "then", "cases", "x", "machine", "states", "p", True, -1)), max_size=6),
+)  # fmt: skip
+KEYS = ("path", "to", "index", "way", "yaml", "name", "key", "value", "within", "shape")
+
+
+@given(missions(), st.sampled_from((*OPERATIONS,)), st.dictionaries(st.sampled_from(KEYS), ANYTHING))
+def test_whatever_is_asked_for_is_done_or_refused(text: str, name: str, given_: dict[str, Any]) -> None:
+    try:
+        made = change(text, {**given_, "op": name})
+    except Refused:
+        return
+    assert undone(text, made) == text
 
 
 def at(tree: Any, path: Any) -> Any:
@@ -229,6 +295,12 @@ def test_an_option_of_a_step_that_was_only_a_word() -> None:
 )
 def test_a_value_is_in_quotes_only_if_it_needs_them(value: str, written: str) -> None:
     assert f"go_to: {written}   # at once" in after(TEXT, op="set", path=["do", 0], key="go_to", value=value)
+
+
+def test_a_step_without_a_name_does_not_go_among_those_that_have_names() -> None:
+    text = f"{TEXT}  - parallel:\n      a: recharge\n      b: recharge\n"
+    with pytest.raises(Refused, match="has names"):
+        change(text, {"op": "move_to", "path": ["do", 0], "to": ["do", 3, "parallel"], "index": 1})
 
 
 def test_states_and_interrupts_have_names_and_move_among_themselves() -> None:

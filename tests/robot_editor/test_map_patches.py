@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.requests import Refused
-from rbxcompose.tools.mission_editor.patches import TextPatch
+from rbxcompose.tools.mission_editor.patch import TextPatch
 from rbxcompose.tools.robot_editor.map_patches import with_entry, with_name, with_values, without_entry
 
 NAMES = ("dock", "table", "hall", "seat_2", "'quoted'")

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from rbxcompose.base.config import Name
+from rbxcompose.base.config import NAMES, Name
 from rbxcompose.base.expressions.types import COUNT, FLAG, TYPES, Type, TypeKind, quantity_of
 from rbxcompose.base.units import TIME
 from rbxcompose.compiler.schema.robot import document
@@ -175,7 +175,12 @@ def _nodes(types: Iterable[str], skills: Mapping[str, Skill]) -> dict[str, Schem
 
 def schemas_of_keys(cls: type[Declared]) -> dict[str, Schema]:
     """Return the described schemas of the keys of a kind or a modifier."""
-    return {key: {**_of_field(field), "description": field.help} for key, field in cls.fields.items()}
+    return {key: _described(field) for key, field in cls.fields.items()}
+
+
+def _described(field: Field) -> Schema:
+    names = {NAMES: field.names} if field.names else {}
+    return {**_of_field(field), "description": field.help, **names}
 
 
 def _of_field(field: Field) -> Schema:
@@ -189,7 +194,7 @@ def _of_field(field: Field) -> Schema:
             pattern = "|".join([*(f"^{word}$" for word in words), str(count["pattern"])])
             return {**count, "pattern": pattern, "examples": [3, *words]}
         case Field(takes=Takes.RECORD, keys=keys):
-            inner = {key: {**_of_field(one), "description": one.help} for key, one in keys.items()}
+            inner = {key: _described(one) for key, one in keys.items()}
             return {"type": "object", "required": list(keys), "properties": inner, "additionalProperties": False}
     return _TAKEN[field.takes]
 

@@ -1445,6 +1445,7 @@ _ANSWERED = frozenset({"call_service", "send_action_goal"})  # operations whose 
 
 
 MISSION_TEXTS: Mapping[str, tuple[str, ...]] = {
+    "aloud": ("text",),
     "check": ("text",),
     "edit": ("text", "operation"),
     "form": ("text", "path"),
@@ -1454,7 +1455,7 @@ MISSION_TEXTS: Mapping[str, tuple[str, ...]] = {
     "read": (),
     "save": ("text", "hash"),
     "templates": (),
-    "test": (),
+    "test": ("text",),
     "try": ("text",),
 }
 """What can be asked about the text of a mission, with its arguments besides `mission`."""

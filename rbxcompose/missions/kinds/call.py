@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rbxcompose.base.config import SERVICE
 from rbxcompose.missions import sdk
 from rbxcompose.msgs import registry
 
@@ -45,7 +46,7 @@ class CallStep(sdk.LeafStep):
           timeout: 2 s
     """
 
-    message: sdk.MessageTemplate = sdk.message("request")
+    message: sdk.MessageTemplate = sdk.message("request", SERVICE)
     request = sdk.contents("The fields of the request; a single value stands for the only field.")
 
     waits = True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rbxcompose.base.config import PUBLISHED
 from rbxcompose.missions import sdk
 from rbxcompose.missions.engine.instant_actions import publish
 
@@ -34,7 +35,7 @@ class PublishStep(sdk.Deed):
               x: 0.1
     """
 
-    message: sdk.MessageTemplate = sdk.message("message")
+    message: sdk.MessageTemplate = sdk.message("message", PUBLISHED)
     body = sdk.contents("The fields of the message; a single value stands for the only field.", "message")
 
     may_end = sdk.ends(sdk.ANY)

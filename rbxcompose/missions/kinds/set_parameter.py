@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rbxcompose.base.config import RUNNING
 from rbxcompose.missions import sdk
 
 _ENCODED = {  # the number of `rcl_interfaces/ParameterType` and the field of the value, by the type of a setting
@@ -57,7 +58,7 @@ class SetParameterStep(sdk.LeafStep):
 
     given: tuple[sdk.ScalarNode, ...] = sdk.record(
         "a map with 'component', 'parameter' and 'value'",
-        component=sdk.new_name("the name of a component", "The component."),
+        component=sdk.new_name("the name of a component", "The component.", names=RUNNING),
         parameter=sdk.word("the name of a setting", "One of its settings that may change while it runs."),
         value=sdk.value("a value", "The new value, of the type of the setting."),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rbxcompose.base.config import MISSION
 from rbxcompose.missions import sdk
 from rbxcompose.missions.engine.resume_points import LAST
 
@@ -104,7 +105,7 @@ class UseStep(sdk.Straight):
               rounds: 1
     """
 
-    uses: sdk.ScalarNode = sdk.word("the name of a mission")
+    uses: sdk.ScalarNode = sdk.word("the name of a mission", names=MISSION)
     arguments: tuple[sdk.WrittenArgument, ...] = sdk.inputs("Values for the inputs of the mission.")
     history: str = sdk.history()
 

@@ -39,6 +39,7 @@ class Field:
     counted: str = ""  # what findings call the number
     keys: Mapping[str, Field] = dataclasses.field(default_factory=dict)  # of a record
     attribute: str = ""
+    names: str = ""  # the kind of existing things whose names it takes
 
     @property
     def slot(self) -> KeySlot:
@@ -190,22 +191,22 @@ def text(help: str = "", *, optional: bool = False) -> Any:
     return kept(Takes.TEXT, NodeReader.template, "a text", help, is_required=not optional)
 
 
-def word(what: str, help: str = "") -> Any:
+def word(what: str, help: str = "", **more: Any) -> Any:
     """Declare the name of something that exists."""
 
     def read(reader: NodeReader, key: str) -> ScalarNode:
         return reader.scalar(key, what) or ScalarNode("", reader.key_span(key))
 
-    return kept(Takes.WORD, read, what, help)
+    return kept(Takes.WORD, read, what, help, **more)
 
 
-def new_name(what: str, help: str = "") -> Any:
+def new_name(what: str, help: str = "", **more: Any) -> Any:
     """Declare a name for something new."""
 
     def read(reader: NodeReader, key: str) -> ScalarNode:
         return reader.name(key, what)
 
-    return kept(Takes.NAME, read, what, help)
+    return kept(Takes.NAME, read, what, help, **more)
 
 
 def record(what: str, **keys: Any) -> Any:
@@ -229,13 +230,13 @@ def inputs(help: str) -> Any:
     return kept(Takes.INPUTS, read, "a map from inputs to values", help, key="with", is_required=False, default=())
 
 
-def message(body: str) -> Any:
-    """Declare the target of a message whose contents are under the key `body`."""
+def message(body: str, names: str) -> Any:
+    """Declare the target of a message, one of a kind of names; its contents are under the key `body`."""
 
     def read(reader: NodeReader, key: str) -> Any:
         return reader.message(key, body)
 
-    return kept(Takes.WORD, read, "its name")
+    return kept(Takes.WORD, read, "its name", names=names)
 
 
 def contents(help: str, key: str = "") -> Field:

@@ -58,11 +58,8 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.filter not in written.name:
             unreadable.extend(() if written.root else written.report)
             continue
-        outcome = _outcome(written, reading, began)
+        outcome = outcome_of(written, reading, coverage, began)
         outcomes.append(outcome)
-        if outcome.verdict:
-            trial = outcome.verdict.trial
-            coverage.add(trial.linked, trial.names, outcome.verdict.seen.keys, trial.plan.robot)
         if not arguments.json:
             _tell(outcome, writer, arguments.verbose)
     write_report(_findings(reading, outcomes) if outcomes else unreadable, reading.sources)
@@ -72,13 +69,16 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if all(file_outcome.passed for file_outcome in outcomes) else FINDINGS
 
 
-def _outcome(written: WrittenTrial, reading: TrialReader, began: float) -> FileOutcome:
+def outcome_of(written: WrittenTrial, reading: TrialReader, coverage: Coverage, began: float) -> FileOutcome:
+    """Run a test, add the ways that it took to what is covered, and return what came of it."""
     trial = reading.understand(written)
     compiled = time.perf_counter()
     shown, findings = shown_name(written.path), tuple(written.report)
     if trial is None:
         return FileOutcome(shown, written.name, findings, took=compiled - began)
-    return FileOutcome(shown, written.name, findings, run_trial(trial), time.perf_counter() - compiled)
+    verdict = run_trial(trial)
+    coverage.add(verdict.trial.linked, verdict.trial.names, verdict.seen.keys, verdict.trial.plan.robot)
+    return FileOutcome(shown, written.name, findings, verdict, time.perf_counter() - compiled)
 
 
 def _tell(outcome: FileOutcome, writer: TrialWriter, verbose: bool) -> None:

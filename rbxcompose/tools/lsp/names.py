@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from rbxcompose.base.config import COMPONENT, PORT, PREFIXED, RUNNING, VALUE
+from rbxcompose.base.config import COMPONENT, PORT, PREFIXED, PUBLISHED, RUNNING, SERVICE, VALUE
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.sections.args import args
@@ -56,6 +56,8 @@ class KnownNames:
             RUNNING: lambda: {**self._in_text(COMPONENT), **self._parts()},
             OWN_PORT: lambda: dict(self._own_ports(str(below_profile(path)[1]))),
             SKILL: self._skills,
+            PUBLISHED: lambda: dict(self.robot.names.topics) if self.robot else {},
+            SERVICE: lambda: dict(self.robot.services) if self.robot else {},
             INPUT: lambda: self._inputs(str(below_profile(path)[1])),
             PART_ARGUMENT: lambda: self._part_arguments(str(below_profile(path)[1])),
         }

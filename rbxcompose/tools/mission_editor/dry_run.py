@@ -5,9 +5,11 @@ Nothing of the robot that is up takes part: its bus, its devices and its mission
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +22,7 @@ from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING
 from rbxcompose.sdk.capabilities import RunsProgram
 from rbxcompose.sdk.registry import declared
-from rbxcompose.tools.mission_editor.outline import Block, MissionOutline
+from rbxcompose.tools.mission_editor.outline import MissionOutline
 from rbxcompose.tools.mission_tests.coverage import SeenWays
 from rbxcompose.tools.mission_tests.finding_files import tests_of
 from rbxcompose.tools.mission_tests.model import RUNS, Expectations, Trial
@@ -30,6 +32,7 @@ LONGEST = 600.0  # [s] of robot time
 MOST_LINES = 500  # of the story
 MOST_TESTS = 50
 TESTING = 80.0  # [s]
+UNSAVED_TESTS = "rbxcompose.tools.mission_editor.unsaved_tests"
 
 
 class _Statuses(SeenWays):
@@ -88,22 +91,16 @@ def _by_block(outline: MissionOutline, file: str, nodes: Any, statuses: dict[int
     told: dict[tuple[str | int, ...], str] = {}
     for node in nodes:
         if node.number in statuses and node.span.file == file:
-            offset = outline.lines.starts[min(node.span.line, len(outline.lines.lines)) - 1] + node.span.column - 1
-            block = _innermost(outline.blocks, offset)
+            block = outline.written_at(node.span.line, node.span.column)
             if block is not None:
                 told[block.path] = NAMES[statuses[node.number]]
     return [{"path": list(path), "status": status} for path, status in told.items()]
 
 
-def _innermost(blocks: list[Block], offset: int) -> Block | None:
-    for block in blocks:
-        if block.start <= offset < block.end:
-            return _innermost(block.children, offset) or block
-    return None
-
-
-def run_tests(project: Path, mission: str) -> str:
+def run_tests(project: Path, mission: str, unsaved: Mapping[Path, str]) -> str:
     """Run the tests of a mission with coverage, as `rbxcompose test` does, and return its report in JSON.
+
+    `unsaved` are texts that count in place of files. The tests run in a process of their own, for a limited time.
 
     Raises:
         Refused: if there are none, or they take too long.
@@ -113,9 +110,12 @@ def run_tests(project: Path, mission: str) -> str:
     files = [file for file in (tests_of([folder]) if folder.is_dir() else ()) if named.search(_text(file))]
     if not files:
         raise Refused(f"there are no tests of '{mission}' in 'missions/'")
-    command = [sys.executable, "-m", "rbxcompose", "test", "--coverage", "--json", *map(str, files[:MOST_TESTS])]
+    given = {"files": [*map(str, files[:MOST_TESTS])], "unsaved": {str(path): text for path, text in unsaved.items()}}
+    command = [sys.executable, "-m", UNSAVED_TESTS]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=TESTING, check=False, cwd=project)
+        done = subprocess.run(
+            command, input=json.dumps(given), capture_output=True, text=True, timeout=TESTING, check=False, cwd=project
+        )
     except subprocess.TimeoutExpired as error:
         raise Refused(f"the tests take more than {TESTING:g} s: run 'rbxcompose test'") from error
     if not done.stdout.startswith("{"):

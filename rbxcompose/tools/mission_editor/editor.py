@@ -20,10 +20,12 @@ from rbxcompose.base.requests import Refused
 from rbxcompose.compiler.compile import Compilation, look_at_mission
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import project_of, shown_name
+from rbxcompose.tools.mission_editor.form import form
 from rbxcompose.tools.mission_editor.new_mission import make_mission, templates
 from rbxcompose.tools.mission_editor.outline import MissionOutline, told
-from rbxcompose.tools.mission_editor.palette import form, palette
-from rbxcompose.tools.mission_editor.patches import change, path_of
+from rbxcompose.tools.mission_editor.palette import palette
+from rbxcompose.tools.mission_editor.patch import path_of
+from rbxcompose.tools.mission_editor.patches import change
 from rbxcompose.tools.mission_editor.units import Utf16
 from rbxcompose.tools.project_texts import ProjectTexts, ReadText, hash_of, words_of
 
@@ -80,7 +82,7 @@ class MissionEditor:
         return palette(self._known, self._path(request["mission"]))
 
     def _form(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the values of a block that can be typed in one line."""
+        """Return the values of a block, and what they can be."""
         path = path_of(request["path"])
         return form(self._known, self._path(request["mission"]), request["text"], path)
 
@@ -104,11 +106,20 @@ class MissionEditor:
         return dry_run(self._simulated({path: text}), request["mission"], path, text)
 
     def _test(self, request: Mapping[str, Any]) -> Any:
-        """Run the tests of a mission as it is on disk."""
+        """Run the tests of a mission with a text in place of its file."""
         from rbxcompose.tools.mission_editor.dry_run import run_tests
 
-        self._path(request["mission"])
-        return json.loads(run_tests(self._project, request["mission"]))
+        path = self._path(request["mission"])
+        unsaved = {} if self._read_file(request["mission"]).text == request["text"] else {path: request["text"]}
+        return json.loads(run_tests(self._project, request["mission"], unsaved))
+
+    def _aloud(self, request: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Return what a text says, in sentences."""
+        from rbxcompose.tools.mission_editor.sentences import read_aloud
+
+        path = self._path(request["mission"])
+        with paused_collection():
+            return read_aloud(self._known, request["mission"], path, request["text"])
 
     def _check(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Return all that `check` finds with a text in place of a mission's file."""
@@ -190,6 +201,7 @@ class MissionEditor:
 
 REQUESTS: Mapping[str, Callable[[MissionEditor, Mapping[str, Any]], Any]] = MappingProxyType(
     {
+        "aloud": MissionEditor._aloud,
         "check": MissionEditor._check,
         "edit": MissionEditor._edit,
         "form": MissionEditor._form,

@@ -11,6 +11,7 @@ from functools import cache
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.missions.language.fields import Field
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.keys import anywhere
 from rbxcompose.missions.program.registry import kinds
@@ -20,16 +21,29 @@ ONE, SEVERAL, NAMED = "one", "several", "named"
 """What a slot holds: one step, a list of steps, or entries by their names."""
 LONGEST = 80  # characters of the text of a block
 STATE, INTERRUPT, SEQUENCE = "state", "interrupt", "sequence"
+INTERRUPTS, MACHINE = "interrupts", "machine"
 _INSIDE: Mapping[Takes, str] = {Takes.STEP: ONE, Takes.STEPS: SEVERAL, Takes.BRANCHES: SEVERAL, Takes.CASES: NAMED}
+_PARTS: Mapping[Takes, str] = {Takes.CASES: "case", Takes.BRANCHES: "branch"}
 
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """A place for blocks: the path of what is there, what it holds, and what the blocks are."""
+    """A place for blocks: the path of what is there, what it holds, and what the blocks are.
+
+    `part` is what one of them is called: a state, an interrupt, a case, else by the key of the place. `is_there` means
+    that something is written there, `has_names` that its parts have names, as they are written.
+    """
 
     path: Path
     holds: str
     of: str = "step"
+    part: str = ""
+    is_there: bool = True
+    has_names: bool = False
+    start: str = ""
+    """The first of its states, if it is a machine's."""
+    is_optional: bool = False
+    """Whether nothing need be there."""
 
 
 @dataclass(slots=True)
@@ -37,7 +51,7 @@ class Block:
     """A step, a state or an interrupt; `start` and `end` are the offsets of whole lines, comments included.
 
     `role` is what it is to the block around it: `then`, or the name of a branch. `is_fixed` means that it cannot be
-    moved by itself: it is the only step there, or written within a line.
+    moved by itself: it is the only step there, or the only one within brackets.
     """
 
     path: Path
@@ -48,7 +62,11 @@ class Block:
     start: int
     end: int
     is_fixed: bool
+    written: tuple[int, int]
+    """Where it is written itself: several can be in one line."""
     notes: list[str] = field(default_factory=list)
+    leads: list[tuple[str, str]] = field(default_factory=list)
+    """Where a state leads to: outcomes (empty: any), each with the name of a state or an end."""
     slots: list[Slot] = field(default_factory=list)
     children: list[Block] = field(default_factory=list)
 
@@ -60,11 +78,11 @@ class Block:
 
 
 @cache
-def _slots_of_kind(kind: str) -> tuple[tuple[str, str], ...]:
-    """Return the keys of a kind that take steps, each with what it holds."""
+def _slots_of_kind(kind: str) -> tuple[Field, ...]:
+    """Return the keys of a kind that take steps."""
     cls = kinds().get(kind)
     fields = cls.fields.values() if cls is not None else ()
-    return tuple((one.key, _INSIDE[one.takes]) for one in fields if one.takes in _INSIDE)
+    return tuple(one for one in fields if one.takes in _INSIDE)
 
 
 def kind_of(step: PlacedNode) -> str:
@@ -83,11 +101,30 @@ def slots_of(step: PlacedNode, path: Path) -> list[Slot]:
     if step.form == "list":
         return [Slot(path, SEVERAL)]
     kind = kind_of(step)
-    found = [Slot((*path, key), holds) for key, holds in _slots_of_kind(kind)]
-    machine = step.get("machine")
-    if machine is not None:
-        found.append(Slot((*path, "machine", "states"), NAMED, STATE))
+    found = [_slot_in(step, path, one) for one in _slots_of_kind(kind)]
+    if step.get(MACHINE) is not None:
+        found.append(_states_in(step, path))
     return found
+
+
+def _slot_in(step: PlacedNode, path: Path, of: Field) -> Slot:
+    there, holds, part = step.get(of.key), _INSIDE[of.takes], _PARTS.get(of.takes, of.key)
+    has_names = holds == NAMED or (holds == SEVERAL and there is not None and there.form == "map")
+    return Slot(
+        (*path, of.key),
+        holds,
+        part=part,
+        is_there=there is not None,
+        has_names=has_names,
+        is_optional=not of.is_required,
+    )
+
+
+def _states_in(node: PlacedNode, path: Path) -> Slot:
+    is_there = node.at((MACHINE, "states")) is not None
+    start = node.at((MACHINE, "start"))
+    first = start.text if start is not None else ""
+    return Slot((*path, MACHINE, "states"), NAMED, STATE, STATE, is_there, has_names=True, start=first)
 
 
 class MissionOutline:
@@ -102,6 +139,16 @@ class MissionOutline:
     def at(self, path: Path) -> Block | None:
         """Return the block at a path."""
         return next((block for top in self.blocks for block in top.all() if block.path == path), None)
+
+    def written_at(self, line: int, column: int) -> Block | None:
+        """Return the innermost block at a place of the text; both count from 1."""
+        offset = self.lines.starts[min(line, len(self.lines.lines)) - 1] + column - 1
+        return _innermost(self.blocks, offset)
+
+    def all_slots(self) -> list[Slot]:
+        """Return all places for blocks."""
+        within = [slot for top in self.blocks for block in top.all() for slot in block.slots]
+        return [*self.slots, *within]
 
     def region(self, path: Path) -> tuple[int, int, int] | None:
         """Return the lines of an item or an entry, and its column; None if it shares a line with something else."""
@@ -142,18 +189,19 @@ class MissionOutline:
         root = self.root
         if root is None:
             return
-        if (interrupts := root.get("interrupts")) is not None:
-            self.slots.append(Slot(("interrupts",), NAMED, INTERRUPT))
-            for key, value in interrupts.pairs if not interrupts.is_flow else ():
-                yield self._named(key.text, value, ("interrupts", key.text), INTERRUPT)
+        interrupts = root.get(INTERRUPTS)
+        is_there = interrupts is not None
+        self.slots.append(Slot((INTERRUPTS,), NAMED, INTERRUPT, INTERRUPT, is_there, has_names=True, is_optional=True))
+        for key, value in interrupts.pairs if interrupts is not None else ():
+            yield self._named(key.text, value, (INTERRUPTS, key.text), INTERRUPT)
         if (body := root.get("do")) is not None:
             self.slots.append(Slot(("do",), ONE))
             if body.form == "list":
                 yield from self._steps(body, ("do",))
             else:
                 yield self._step(body, ("do",), "")
-        elif root.get("machine") is not None:
-            self.slots.append(Slot(("machine", "states"), NAMED, STATE))
+        elif root.get(MACHINE) is not None:
+            self.slots.append(_states_in(root, ()))
             yield from self._states(root, ())
 
     def _steps(self, node: PlacedNode, path: Path) -> Iterator[Block]:
@@ -164,12 +212,15 @@ class MissionOutline:
         kind = kind_of(node)
         value = node.get(kind) if node.form == "map" else None
         block = self._block(node, path, kind, role, is_entry=is_entry)
-        block.text = _shown(value) if value is not None else ""
+        inside = {one.key for one in _slots_of_kind(kind)} | {MACHINE, "name", kind}
+        block.slots = slots_of(node, path)
+        if kind == MACHINE:
+            block.text = next((f"from {slot.start}" for slot in block.slots if slot.start), "")
+        elif value is not None and kind not in {one.key for one in _slots_of_kind(kind)}:  # its steps are below it
+            block.text = _shown(value)
         name = node.get("name")
         block.name = name.text if name is not None else ""
-        inside = {key for key, _ in _slots_of_kind(kind)} | {"machine", "name", kind}
         block.notes = [f"{key.text} {_shown(of)}".strip() for key, of in node.pairs if key.text not in inside]
-        block.slots = slots_of(node, path)
         block.children = list(self._inside(node, block.slots, kind))
         block.end = max([block.end, *(child.end for child in block.children)])  # with comments of the last one
         return block
@@ -200,20 +251,21 @@ class MissionOutline:
             yield block
 
     def _states(self, node: PlacedNode, path: Path) -> Iterator[Block]:
-        machine = node.get("machine")
+        machine = node.get(MACHINE)
         states = machine.get("states") if machine is not None else None
-        for key, value in states.pairs if states is not None and not states.is_flow else ():
-            yield self._named(key.text, value, (*path, "machine", "states", key.text), STATE)
+        for key, value in states.pairs if states is not None else ():
+            yield self._named(key.text, value, (*path, MACHINE, "states", key.text), STATE)
 
     def _named(self, name: str, node: PlacedNode, path: Path, kind: str) -> Block:
         """Return a state or an interrupt."""
         block = self._block(node, path, kind, "", is_entry=True)
         block.name = name
         if node.form == "map":
-            others = ((key, of) for key, of in node.pairs if key.text not in ("do", "machine"))
+            others = ((key, of) for key, of in node.pairs if key.text not in ("do", MACHINE))
             block.notes = [f"{key.text} {_shown(of)}".strip() for key, of in others]
+            block.leads = _leads(node.get("next"))
             body = node.get("do")
-            block.slots = [Slot((*path, "do"), ONE)] if node.get("machine") is None else slots_of(node, path)
+            block.slots = [Slot((*path, "do"), ONE)] if node.get(MACHINE) is None else slots_of(node, path)
             if body is not None and body.form == "list":
                 block.children = list(self._steps(body, (*path, "do")))
             elif body is not None:
@@ -230,7 +282,26 @@ class MissionOutline:
             start, end = self.lines.starts[lines[0]], self.lines.place(lines[1])
         else:
             start, end = self.lines.starts[region[0]], self.lines.place(region[1])
-        return Block(path, kind, "", "", role, start, end, region is None)
+        above = self.root.at(path[:-1]) if is_entry and self.root is not None else None
+        is_beside = above is not None and above.is_flow and len(above.items) + len(above.pairs) > 1
+        key = next((key for key, value in above.pairs if value is node), node) if above is not None else node
+        written = key.start, max(node.end, key.end)
+        return Block(path, kind, "", "", role, start, end, region is None and not is_beside, written)
+
+
+def _leads(following: PlacedNode | None) -> list[tuple[str, str]]:
+    if following is None:
+        return []
+    if following.form == "scalar":
+        return [("", following.text)] if following.text else []
+    return [(outcome.text, target.text) for outcome, target in following.pairs if target.text]
+
+
+def _innermost(blocks: list[Block], offset: int) -> Block | None:
+    there = [block for block in blocks if block.start <= offset < block.end]
+    exact = (block for block in there if block.written[0] <= offset < block.written[1])
+    block = next(exact, there[0] if there else None)
+    return block and (_innermost(block.children, offset) or block)
 
 
 def _shown(node: PlacedNode) -> str:
@@ -253,7 +324,16 @@ def told(outline: MissionOutline, at: Callable[[int], int]) -> dict[str, Any]:
 
 
 def _slot(slot: Slot) -> dict[str, Any]:
-    return {"path": list(slot.path), "holds": slot.holds, "of": slot.of}
+    return {
+        "path": list(slot.path),
+        "holds": slot.holds,
+        "of": slot.of,
+        "part": slot.part,
+        "is_there": slot.is_there,
+        "has_names": slot.has_names,
+        "start": slot.start,
+        "is_optional": slot.is_optional,
+    }
 
 
 def _block(block: Block, at: Callable[[int], int]) -> dict[str, Any]:
@@ -267,6 +347,7 @@ def _block(block: Block, at: Callable[[int], int]) -> dict[str, Any]:
         "to": at(block.end),
         "is_fixed": block.is_fixed,
         "notes": block.notes,
+        "leads": [{"outcome": outcome, "to": to} for outcome, to in block.leads],
         "slots": [_slot(slot) for slot in block.slots],
         "children": [_block(child, at) for child in block.children],
     }

@@ -496,11 +496,13 @@ class WrittenTrial:
 class TrialReader:
     """Reads the tests of one run; each robot is compiled once with each profile, and its findings are reported once.
 
-    `sources` are the texts of all files, `report` has the findings on robots.
+    `sources` are the texts of all files, `report` has the findings on robots; `unsaved` are texts that count instead of
+    those in the files of robots and missions.
     """
 
     environment: Mapping[str, str]
     sources: dict[str, str] = field(default_factory=dict)
+    unsaved: Mapping[Path, str] = field(default_factory=dict)
     report: Report = field(default_factory=Report)
     _robots: dict[tuple[str, str], Compilation] = field(default_factory=dict)
     _kept_back: dict[Finding, str] = field(default_factory=dict)  # the finding in a test of a robot with errors
@@ -578,7 +580,9 @@ class TrialReader:
         key = name, chosen.text if chosen is not None else ""
         if key not in self._robots:
             profiles = [chosen.text] if chosen is not None else []
-            self._robots[key] = compile_robot(shown, profiles=profiles, environment=self.environment)
+            self._robots[key] = compile_robot(
+                shown, profiles=profiles, environment=self.environment, unsaved=self.unsaved
+            )
             self.report.extend(finding for finding in self._robots[key].report if not _is_of_profile(finding))
             self.sources.update(self._robots[key].sources)
         if (robot := self._robots[key].robot) is not None:

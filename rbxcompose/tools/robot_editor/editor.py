@@ -22,7 +22,7 @@ from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import project_of
 from rbxcompose.manifest.tree import KeyPath
-from rbxcompose.tools.mission_editor.patches import TextPatch
+from rbxcompose.tools.mission_editor.patch import TextPatch
 from rbxcompose.tools.mission_editor.yaml_places import Path as TextPath
 from rbxcompose.tools.project_texts import ProjectTexts, ReadText, words_of
 from rbxcompose.tools.robot_editor.map_patches import with_entry, with_name, with_values, without_entry

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 from rbxcompose.base.requests import Refused
 from rbxcompose.manifest.yaml_nodes import compose
-from rbxcompose.tools.mission_editor.patches import TextEdit, TextPatch
+from rbxcompose.tools.mission_editor.patch import TextEdit, TextPatch
 from rbxcompose.tools.mission_editor.yaml_places import Path, PlacedNode, PlainTree, TextLines, placed
 
 INDENT = 2

@@ -1,0 +1,167 @@
+"""The form of a block: what it can be given, as kinds, modifiers and skills declare it, and what there is to choose."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path as FilePath
+from typing import Any
+
+from rbxcompose.base.config import PLACE
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.types import Type, TypeKind
+from rbxcompose.base.requests import Refused
+from rbxcompose.base.units import Dimension, units_of
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.compiler.schema.documents import schema_for
+from rbxcompose.compiler.schema.guide import Guide, GuidedValue
+from rbxcompose.compiler.schema.mission import ITEM_NAME
+from rbxcompose.manifest.tree import MappingNode
+from rbxcompose.missions.language.keys import anywhere
+from rbxcompose.missions.program.registry import kinds
+from rbxcompose.tools.lsp.answers import variables
+from rbxcompose.tools.lsp.document import Cursor, Document, Spot, quick_tree
+from rbxcompose.tools.lsp.names import KnownNames
+from rbxcompose.tools.lsp.project import MISSION
+from rbxcompose.tools.mission_editor.outline import INTERRUPT, STATE, MissionOutline, kind_of, slots_of
+from rbxcompose.tools.mission_editor.patches import change
+from rbxcompose.tools.mission_editor.values import LINE, LINES, shape_of, shown_value
+from rbxcompose.tools.mission_editor.yaml_places import Path, PlacedNode, TextLines
+
+_VALUES = frozenset(("string", "number", "integer", "boolean", "null"))
+_HAS_PARTS = (TypeKind.LIST, TypeKind.MAP)
+_MOST = 200  # names to choose from
+_UNKNOWN = Type(TypeKind.UNKNOWN)
+
+
+def guide_of(robot: Robot, file: FilePath, root: MappingNode) -> tuple[Guide, KnownNames]:
+    """Return what can be at each place of a mission, and the names that it can use."""
+    known = KnownNames(file, root, robot)
+    return Guide(schema_for(MISSION, known.skills), root, known.types), known
+
+
+def form(robot: Robot, file: FilePath, text: str, path: Path) -> dict[str, Any]:
+    """Return the values of the step, state or interrupt at a path, and its own name.
+
+    Raises:
+        Refused: if there is none.
+    """
+    outline = MissionOutline(text)
+    block, node = outline.at(path), outline.root.at(path) if outline.root is not None else None
+    if block is None or node is None or node.form not in ("map", "scalar"):
+        raise Refused("this block has no options")
+    kind = kind_of(node) if block.kind not in (STATE, INTERRUPT) else ""
+    if node.form == "scalar":  # as it would be with an option
+        text = change(text, {"op": "set", "path": path, "key": "name", "value": "x"}).applied(text)
+    root = quick_tree(text)
+    if not isinstance(root, MappingNode):
+        raise Refused("the text cannot be read")
+    guide, known = guide_of(robot, file, root)
+    drawn = _FormDrawing(Document(file, text, robot), root, guide, known, outline.lines)
+    fields = list(drawn.fields(path, node, kind))
+    fields.sort(key=lambda one: (not one["is_word"], not one["within"], not one["value"], one["shape"] != LINE))
+    name = str(path[-1]) if any(slot.path == path[:-1] and slot.has_names for slot in outline.all_slots()) else ""
+    about = guide.describe((*path, kind)) if kind else ""
+    return {"kind": block.kind, "name": name, "about": about, "fields": fields}
+
+
+@dataclass(frozen=True, slots=True)
+class _FormDrawing:
+    """What the fields of a form are drawn from; `lines` are of the text as it is."""
+
+    document: Document
+    root: MappingNode
+    guide: Guide
+    known: KnownNames
+    lines: TextLines
+
+    def fields(self, path: Path, node: PlacedNode, kind: str) -> Iterator[dict[str, Any]]:
+        """Yield the fields of a block, and those of the map behind its word."""
+        inside = {slot.path[len(path)] for slot in slots_of(node, path) if len(slot.path) > len(path)} | {
+            "do",
+            "machine",
+        }
+        keys = self.guide.keys(path)
+        own = {kind, *anywhere()} if kind and kind not in kinds() else keys  # a skill is one key of a step
+        for key, schema in keys.items():
+            if key not in own or key in inside:
+                continue
+            there = node.get(key) if node.form == "map" else None
+            parts = list(self._parts(path, key, there)) if key == kind else []
+            yield from parts
+            if not parts or (self._main(kind) is not None and (there is None or there.form != "map")):
+                yield self._field(path, (), key, schema, there, self._main(kind) if key == kind else None, kind)
+
+    def _parts(self, path: Path, kind: str, there: PlacedNode | None) -> Iterator[dict[str, Any]]:
+        """Yield the entries that the map behind a word can have, if a map is there, or nothing."""
+        if there is not None and there.form != "map" and (there.form != "scalar" or there.text):
+            return
+        skill = self.known.skills.get(kind)
+        for key, schema in self.guide.keys((*path, kind)).items():
+            of = skill.arguments.get(key, _UNKNOWN) if skill is not None else None
+            written = there.get(key) if there is not None and there.form == "map" else None
+            yield self._field(path, (kind,), key, schema, written, of, kind)
+
+    def _main(self, kind: str) -> Type | None:
+        """Return the type of the main argument of a skill."""
+        skill = self.known.skills.get(kind)
+        return skill.arguments.get(skill.main) if skill is not None and skill.main else None
+
+    def _field(
+        self,
+        path: Path,
+        within: Path,
+        key: str,
+        schema: Mapping[str, Any],
+        there: PlacedNode | None,
+        of: Type | None,
+        kind: str,
+    ) -> dict[str, Any]:
+        shape = shape_of(self.lines, there)
+        is_empty = there is None or (there.form == "scalar" and not there.text)
+        if is_empty and ((of is not None and of.kind in _HAS_PARTS) or not _takes_value(schema)):
+            shape = LINES
+        where = (*path, *within, key)
+        spot = Spot(self.document, Cursor(self.root, where, "", "", False), self.known, self.guide)
+        return {
+            "key": key,
+            "within": list(within),
+            "about": str(schema.get("description", "")),
+            "value": "" if there is None else shown_value(self.lines, there),
+            "shape": shape,
+            "is_word": key == kind and not within,
+            **(_choices(self.guide.value(where), spot, schema, of) if shape == LINE else _NO_CHOICES),
+        }
+
+
+_NO_CHOICES: Mapping[str, Any] = {"choices": [], "only": False, "units": [], "default": ""}
+
+
+def _choices(value: GuidedValue, spot: Spot, schema: Mapping[str, Any], of: Type | None) -> dict[str, Any]:
+    """Return what a field takes: its unit, and what can be chosen; `only` if it is nothing but one of these."""
+    only = [str(word) for word in schema.get("enum", ())]
+    kind = PLACE if of is not None and of.kind in (TypeKind.PLACE, TypeKind.POSE) else value.names
+    names = spot.known.of(kind, spot.cursor.path) if kind else {}
+    of_skill = of.choices if of is not None else ()
+    flags = ("true", "false") if of is not None and of.kind is TypeKind.FLAG else ()
+    is_name = schema.get("pattern") == ITEM_NAME["pattern"]
+    values = () if only or kind or is_name else (f"${name}" for name in variables(spot))
+    examples = (one for one in value.examples if one.lower() not in value.words)
+    found = [*only, *names, *of_skill, *flags, *value.words, *examples, *values]
+    dimension: Dimension | None = of.dimension if of is not None else value.dimension
+    default = "" if value.default is None else str(value.default)
+    return {
+        "choices": list(dict.fromkeys(found))[:_MOST],
+        "only": bool(only),
+        "units": list(units_of(dimension)) if dimension else [],
+        "default": default,
+    }
+
+
+def _takes_value(schema: Mapping[str, Any]) -> bool:
+    """Return whether a value in one line is possible."""
+    if "enum" in schema or "pattern" in schema:
+        return True
+    if "anyOf" in schema:
+        return any(map(_takes_value, schema["anyOf"]))
+    types = schema.get("type", ())
+    return not _VALUES.isdisjoint([types] if isinstance(types, str) else types)
