@@ -427,6 +427,21 @@ class Mission(Component[MissionConfig]):
         """Return all breakpoints."""
         return self.missions.breakpoints.listed()
 
+    @answers(requests.ListOutcomes)
+    def list_outcomes(self, request: requests.ListOutcomes) -> requests.OutcomesByNode:
+        """Return in which outcomes nodes may be forced to end."""
+        from rbxcompose.missions.execution.debug_views import outcomes_of
+
+        run = self.missions.running(request.mission)
+        return outcomes_of(run.engine.program, run.engine.robot)
+
+    @answers(requests.ListData)
+    def list_data(self, request: requests.ListData) -> tuple[requests.ListedDatum, ...]:
+        """Return the data of a mission that runs."""
+        from rbxcompose.missions.execution.debug_views import data_of
+
+        return tuple(data_of(self.missions.running(request.mission)))
+
     def arm(self, missions: Iterable[str]) -> None:
         """Let missions stop at their breakpoints, and keep these over a crash."""
         for run in self.missions:

@@ -12,7 +12,7 @@ from rbxcompose.base.levels import Level
 from rbxcompose.missions.engine import logbook
 from rbxcompose.missions.engine.debugger import named
 from rbxcompose.missions.engine.engine import Engine
-from rbxcompose.missions.engine.events import MissionEnded, MissionEvent, Transition
+from rbxcompose.missions.engine.events import Intervened, MissionEnded, MissionEvent, Transition
 from rbxcompose.missions.engine.interventions import Intervention, SetBreakpoints
 from rbxcompose.missions.engine.logbook import LoggedWorld, LogRecord
 from rbxcompose.missions.engine.snapshot import carry_on, restore
@@ -85,6 +85,7 @@ class MissionRun:
         self.began: float | None = None  # [s] of robot time
         self.patient_until: float | None = None  # [s] of the next warning while it waits for its first values
         self.story = MissionStory(name)
+        self.by_hand = 0  # what people did to it: it cannot be reproduced without that
         self.transitions: deque[dict[str, Any]] = deque(maxlen=LAST)
         self.breakpoints = SetBreakpoints()
         self.goes_on = False  # it was restored, and is resumed when every value that it reads has arrived
@@ -203,10 +204,16 @@ class MissionRun:
 
     @property
     def stopped_at(self) -> list[dict[str, Any]]:
-        """Return the nodes at which a breakpoint or a step has stopped it: number, file and line, and what it is."""
-        nodes = self.engine.program.nodes
+        """Return the nodes at which a breakpoint or a step has stopped it: number, file and line, and what it is.
+
+        `after` is the outcome with which a state was left; it is empty before the start of a node.
+        """
+        nodes, after = self.engine.program.nodes, self.engine.debugger.outcomes()
         stops = () if self.is_over else self.engine.stops
-        return [{"node": at, "place": nodes[at].span.place, "text": named(nodes[at])} for at in stops]
+        return [
+            {"node": at, "place": nodes[at].span.place, "text": named(nodes[at]), "after": after.get(at, "")}
+            for at in stops
+        ]
 
     def abort(self, now: float) -> None:
         """End it from outside."""
@@ -219,7 +226,8 @@ class MissionRun:
     def seen(self, since: int = 0) -> dict[str, Any]:
         """Return what has changed since the version that a viewer has; 0 gives the full state."""
         more = {"state": self.state, "began": self.began, "transitions": list(self.transitions)}
-        return {"mission": self.name, **self.mirror.look(since), **more, "stopped_at": self.stopped_at}
+        debugging = {"stopped_at": self.stopped_at, "by_hand": self.by_hand}
+        return {"mission": self.name, **self.mirror.look(since), **more, **debugging}
 
     def _do(self, what: str, call: Callable[[], object], now: float, intervention: Intervention | None = None) -> None:
         """Call the engine, and log what it read during the call."""
@@ -235,6 +243,8 @@ class MissionRun:
         level, text = self.story.line(event)
         if isinstance(event, MissionEnded):
             self.end = event
+        if isinstance(event, Intervened):
+            self.by_hand += 1
         if isinstance(event, Transition):
             self.transitions.append(
                 {

@@ -126,13 +126,14 @@ class RunningMissions:
         return self._begun(name).seen(since)
 
     def picture(self, name: str) -> PictureData:
-        """Return the picture of a mission, as data.
+        """Return the picture of a mission, as data; of one that has not been running, as it would run.
 
         Raises:
-            Refused: if it has not been running.
+            Refused: if there is none.
         """
-        engine = self._begun(name).engine
-        return picture_to_data(picture_of(engine.program, engine.robot))
+        run = self.runs.get(name)
+        program, robot = (run.engine.program, run.engine.robot) if run else (self._program(name), self._equipment.names)
+        return picture_to_data(picture_of(program, robot))
 
     def running(
         self, name: str, what: Callable[[MissionRun], bool] = lambda one: True, word: str = "running"
@@ -218,7 +219,7 @@ class RunningMissions:
 
 
 PATH = "missions"
-_TOLD = "version", "state", "transitions", "began", "stopped_at"  # what is news
+_TOLD = "version", "state", "transitions", "began", "stopped_at", "by_hand"  # what is news
 _ALWAYS = frozenset({"mission", "version", "whole", "state"})  # what is in all updates
 
 Open = Callable[[str, Query[Any]], Window]  # takes a path and the query that is made there

@@ -109,12 +109,16 @@ class ClearBreakpoints(Command):
 
 @dataclass(frozen=True, slots=True)
 class ListedBreakpoint:
-    """A breakpoint: the mission, how it was written, its file and line, and what is there."""
+    """A breakpoint: the mission, how it was written, its file and line, and what is there.
+
+    `spots` are the nodes that it concerns, by number, each with the outcome of the transition that is meant, if any.
+    """
 
     mission: str
     where: str
     place: str
     text: str
+    spots: tuple[tuple[int, str | None], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,6 +169,37 @@ class JumpMission(Command):
     def words(self) -> str:
         """Return it as written on the command line."""
         return shlex.join(["jump", self.state, *_in(self.mission)])
+
+
+OutcomesByNode = Mapping[str, Sequence[str]]
+"""The outcomes in which nodes may end, by number as text."""
+
+
+@dataclass(frozen=True, slots=True)
+class ListOutcomes(Query[OutcomesByNode]):
+    """Query in which outcomes the nodes of a mission may be forced to end."""
+
+    about = MISSION
+    mission: str
+
+
+@dataclass(frozen=True, slots=True)
+class ListedDatum:
+    """A datum of a mission that runs: what may be written for it, and what is now, as it would be written."""
+
+    name: str
+    about: str
+    choices: tuple[str, ...]
+    text: str | None
+    """None if its value cannot be written, as a list of steps."""
+
+
+@dataclass(frozen=True, slots=True)
+class ListData(Query[tuple[ListedDatum, ...]]):
+    """Query the data of a mission that runs, as `SetMissionData` takes them."""
+
+    about = MISSION
+    mission: str
 
 
 def _in(mission: str) -> list[str]:
@@ -230,7 +265,7 @@ class ListTriggers(Query[tuple[ListedTrigger, ...]]):
 
 @dataclass(frozen=True, slots=True)
 class ShowPicture(Query[PictureData]):
-    """Ask for the picture of a mission that has been running."""
+    """Ask for the picture of a mission."""
 
     about = MISSION
     mission: str
