@@ -15,8 +15,8 @@ const WORDS: Record<Status, string> = {
 const KEYS = "The circles are breakpoints. Choose a step to see what can be done with it. Keys: arrows, Enter, b for a breakpoint.";
 const USUAL = ["success", "failure"];
 
-/** Sends a request about the mission, and tells the person what came of it. */
-export type AskMission = (request: { type: string; [key: string]: Json }, button?: HTMLButtonElement) => Promise<void>;
+/** Sends a request about the mission, tells the person what came of it, and returns whether it was done. */
+export type AskMission = (request: { type: string; [key: string]: Json }, button?: HTMLButtonElement) => Promise<boolean>;
 /** Returns the outcomes in which nodes may be forced to end, by number. */
 export type LearnOutcomes = () => Promise<Record<string, string[]>>;
 

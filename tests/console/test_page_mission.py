@@ -83,6 +83,37 @@ def test_a_person_pauses_cancels_and_starts_a_mission(open_page: Callable[..., P
     assert violations(page) == []
 
 
+def left_over(**more: Any) -> list[dict[str, Any]]:
+    plain = {"doing": "go_to corner", "inputs": {"rounds": "5"}, "changed": "", "waits": False}
+    return [{"mission": "patrol", "at": 1.8e9, **plain, **more}]
+
+
+def test_a_run_that_did_not_end_goes_on_or_starts_again(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
+    for name in ("ResumeMission", "CancelMission", "RunMission", "RestoreMission"):
+        patrol.answers[f"mission.{name}"] = lambda given: f"{given['type']} is done"
+    patrol.windows["mission/ListMissions"] = listed("paused")
+    patrol.windows["mission/ListSnapshots"] = left_over(waits=True)
+    page = open_page(page_name="mission")
+    expect(page.get_by_text("This run did not end")).to_contain_text("at: go_to corner")
+    assert violations(page) == []
+    page.get_by_role("button", name="Go on from where it was").click()
+    expect(page.get_by_text("mission.ResumeMission is done")).to_be_visible()
+    page.get_by_role("button", name="Start again").click()
+    expect(page.get_by_text("mission.RunMission is done")).to_be_visible()
+    assert len(patrol.asked("mission.CancelMission")) == 1
+    assert patrol.asked("mission.RunMission")[0]["inputs"] == {"rounds": "5"}
+    patrol.show("mission/ListMissions", listed("success"))
+    patrol.show("mission/ListSnapshots", left_over())
+    page.get_by_role("button", name="Go on from where it was").click()
+    expect(page.get_by_text("mission.RestoreMission is done")).to_be_visible()
+    patrol.show("mission/ListSnapshots", left_over(changed="the mission 'patrol' and the robot's places"))
+    expect(
+        page.get_by_text("It cannot go on, because the mission 'patrol' and the robot's places changed since.")
+    ).to_be_visible()
+    expect(page.get_by_role("button", name="Go on from where it was")).to_have_count(0)
+    expect(page.get_by_role("button", name="Start again")).to_be_visible()
+
+
 def test_what_no_test_has_tried_is_marked(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
     missing = [{"node": 1, "text": "do.repeat.go_to: failure"}, {"node": 1, "text": "do.repeat.go_to: timeout"}]
     known = {"at": 1.8e9, "tests": 2, "ways": 5, "count": 3, "missing": missing}

@@ -2,6 +2,7 @@
 import { byHandText, stoppedText, type Breakpoint, type Datum } from "../debugging";
 import { h, emptyCard, icon, type Icon } from "../dom";
 import { formatName } from "../format";
+import { showLeftOver, type LeftOver } from "../left_over";
 import { ACTIVE, isSeen, unseen, type Listed, type Seen, type Tested } from "../mission";
 import { MissionData } from "../mission_data";
 import { MissionEditor } from "../mission_editor";
@@ -12,6 +13,7 @@ import { isMessage, type Json } from "../rosbridge";
 import "./mission.css";
 
 const LOOK = 250; // [ms] between two looks at a mission, and at the breakpoints
+const SELDOM = 2_000; // [ms] between two looks at what changes seldom
 const STORY = 200; // lines that are kept
 
 export const page: Page = {
@@ -66,6 +68,7 @@ class MissionView {
   #tested: Tested | null = null;
   #tree: MissionTree | null = null;
   #breakpoints: Breakpoint[] = [];
+  #leftOver: LeftOver[] = [];
   #headOf = "";
   #controls: Controls | null = null;
   #editor: MissionEditor | null = null;
@@ -93,6 +96,15 @@ class MissionView {
           this.#tree?.mark(this.#breakpoints);
         },
         LOOK,
+      ),
+      robot.link.watch(
+        "mission/ListSnapshots",
+        (answer) => {
+          this.#leftOver = Array.isArray(answer) ? (answer as unknown as LeftOver[]) : [];
+          this.#headOf = "";
+          this.#showHead();
+        },
+        SELDOM,
       ),
     );
   }
@@ -195,6 +207,8 @@ class MissionView {
       edit.hidden = this.#editor !== null;
       const title = h("div", { class: "mission-title" }, h("h2", {}, formatName(mission.name)), this.#controls.chip, edit);
       this.#head.replaceChildren(title, h("p", { class: "label" }, mission.about), this.#controls.says);
+      const left = this.#leftOver.find((one) => one.mission === mission.name);
+      if (left) this.#head.append(showLeftOver(left, isActive, this.#mayOperate, (request, button) => this.#ask(request, button)));
       if (isActive) this.#head.append(this.#controls.buttons);
       else if (this.#mayOperate) this.#head.append(this.#startForm(mission));
     }
@@ -230,14 +244,16 @@ class MissionView {
     return form;
   }
 
-  async #ask(request: { type: string; [key: string]: Json }, button?: HTMLButtonElement): Promise<void> {
+  async #ask(request: { type: string; [key: string]: Json }, button?: HTMLButtonElement): Promise<boolean> {
     const had = button !== undefined && document.activeElement === button;
     if (button) button.disabled = true;
     try {
       const answer = await this.#robot.link.ask(request);
       if (typeof answer === "string") this.#robot.notify(answer);
+      return true;
     } catch (error) {
       this.#robot.notify((error as Error).message);
+      return false;
     } finally {
       if (button) button.disabled = false;
       if (had && document.activeElement === document.body) button.focus(); // a button that is disabled loses it

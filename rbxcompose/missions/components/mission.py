@@ -170,6 +170,7 @@ class Mission(Component[MissionConfig]):
         self.kept: dict[str, requests.RunMission] = {}  # requests by people that began missions that still run
         self.repeated: tuple[Command, ...] = ()  # those, and the breakpoints
         self.trouble = ""  # with snapshots
+        self.restored: dict[str, float] = {}  # wall-clock time of the snapshots of missions that wait for people [s]
         self.shown = ""  # the last reported status
         self.planned: float | None = None  # the last requested wake [s]
         self.misfits: set[str] = set()  # values whose messages have another shape
@@ -223,11 +224,14 @@ class Mission(Component[MissionConfig]):
         snapshot = self.snapshots.read(name, is_latest=True) if policy != RESTART else None
         if snapshot is None:
             return None
+        found = self.snapshots.left_over(name, runs=False)
         try:
             run = self.missions.resumed(name, snapshot, self.now)
         except Refused as refusal:
             self.warn(f"{refusal}; it starts again")
             return None
+        self.snapshots.take_up(name)
+        self.restored[name] = found[0] if found else 0.0
         self.continue_with(run, is_asked=policy == ASK or bool(snapshot["is_paused"]))
         return run
 
@@ -342,6 +346,7 @@ class Mission(Component[MissionConfig]):
         level = Level.ERROR if end.result == "failure" else Level.WARN if end.doubt else Level.OK
         self.show(level, ": ".join(filter(None, (name, end.result, end.doubt))))
         self.snapshots.drop(name)
+        self.restored.pop(name, None)
         self.keep()
         self.triggering.ended(name, end)
         if name == self.config.start:
@@ -404,6 +409,7 @@ class Mission(Component[MissionConfig]):
         if not run.is_paused:
             raise Refused(f"mission {run.name} is not paused")
         run.resume(self.now)
+        self.restored.pop(run.name, None)
         self.look_soon()
         return self.announce(f"mission {run.name} resumed")
 
@@ -460,6 +466,7 @@ class Mission(Component[MissionConfig]):
         run.intervene(TakeStep(), self.now)
         if run.is_paused:
             run.resume(self.now)
+        self.restored.pop(run.name, None)
         self.look_soon()
         return f"mission {run.name} goes on to its next step"
 
@@ -515,8 +522,27 @@ class Mission(Component[MissionConfig]):
             raise Refused(several if found else "there is no snapshot of a mission that was cut short")
         name, snapshot = next(iter(found.items()))
         run = self.missions.resumed(name, snapshot, self.now)
+        self.snapshots.take_up(name)
         self.keep(requests.RunMission(name, is_repeated=True))
         return self.continue_with(run, is_asked=False)
+
+    @answers(requests.ListSnapshots)
+    def list_snapshots(self, request: requests.ListSnapshots) -> tuple[requests.ListedSnapshot, ...]:
+        """Return the runs that did not end, by a crash or a loss of power."""
+        return tuple(one for name in self.config.programs if (one := self.left_over(name)))
+
+    def left_over(self, name: str) -> requests.ListedSnapshot | None:
+        """Return what is left of a run that did not end, unless it goes on."""
+        from rbxcompose.missions.engine.snapshot import save
+        from rbxcompose.missions.execution.snapshots import described
+
+        program, is_active = self.missions.breakpoints.linked(name), name in self.missions.names
+        if is_active and name in self.restored and (run := self.missions.runs[name]).is_paused and not run.goes_on:
+            return described(name, self.restored[name], save(run.engine), program, waits=True)
+        if (found := self.snapshots.left_over(name, runs=is_active)) is None:
+            return None
+        at, snapshot = found
+        return described(name, at, snapshot["state"], program, changed=self.missions.changed_since(name, snapshot))
 
     @answers(requests.ListMissions)
     def listed(self, request: requests.ListMissions) -> tuple[requests.ListedMission, ...]:

@@ -92,13 +92,17 @@ class RunningMissions:
         if name in self.names:
             raise Refused(f"mission {name} is running: cancel it first")
         linked = link(program, self._equipment.names.missions)
-        if changed := differences(snapshot["identity"], identity_of(linked, self._equipment.names)):
+        if changed := self.changed_since(name, snapshot):
             raise Refused(f"mission {name} cannot go on from its snapshot: {changed} changed since")
         if clash := self._clash(linked, frozenset()):
             raise Refused(clash)
         run = self._made(name, program, from_plain(snapshot["state"]["runs"][0]["inputs"]), PLAIN)
         run.restore(snapshot["state"], now)
         return run
+
+    def changed_since(self, name: str, snapshot: Mapping[str, Any]) -> str:
+        """Return in words what has changed since the snapshot of a mission; empty if it can go on."""
+        return differences(snapshot["identity"], identity_of(self.breakpoints.linked(name), self._equipment.names))
 
     def _made(self, name: str, program: Program, inputs: Mapping[str, Value], settings: Settings) -> MissionRun:
         self._counts[name] = self._counts.get(name, 0) + 1

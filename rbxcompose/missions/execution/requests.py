@@ -240,6 +240,29 @@ class ListMissions(Query[tuple[ListedMission, ...]]):
 
 
 @dataclass(frozen=True, slots=True)
+class ListedSnapshot:
+    """A run that did not end since its process crashed or the machine lost power, from the snapshot that is left of it.
+
+    `at` is the wall-clock time of the snapshot [s since the Unix epoch], `doing` what ran then, `inputs` what it was
+    given, and `changed` what has changed since, so that it cannot go on. It `waits` if it is restored and paused.
+    """
+
+    mission: str
+    at: float
+    doing: str
+    inputs: Mapping[str, str]
+    changed: str = ""
+    waits: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ListSnapshots(Query[tuple[ListedSnapshot, ...]]):
+    """Query the runs that did not end and may go on."""
+
+    about = MISSION
+
+
+@dataclass(frozen=True, slots=True)
 class ListedTrigger:
     """A trigger: its cause in words, when a wall clock shows its next time and showed its last start, if any.
 
