@@ -83,6 +83,38 @@ def test_a_person_pauses_cancels_and_starts_a_mission(open_page: Callable[..., P
     assert violations(page) == []
 
 
+def trigger(name: str, cause: str, **more: Any) -> dict[str, Any]:
+    plain = {
+        "priority": 0,
+        "running": "skip",
+        "next": "",
+        "last": "",
+        "waits": False,
+        "fired": "",
+        "came": "",
+        "off": "",
+    }
+    return {"name": name, "mission": "patrol", "cause": cause, **plain, **more}
+
+
+def test_what_starts_missions_is_seen_live(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
+    nightly = trigger("nightly", "at 22:00 on mon, fri", next="Fri 2026-11-27 22:00")
+    empty = trigger("empty", "when $battery < 15 %", priority=10, running="interrupt")
+    patrol.windows["mission/ListTriggers"] = [nightly, empty]
+    page = open_page(page_name="mission")
+    triggers = page.get_by_label("Triggers")
+    expect(triggers).to_contain_text("Nightly starts Patrol at 22:00 on mon, fri")
+    expect(triggers).to_contain_text("On; next: Fri 2026-11-27 22:00; left out if another mission is in the way.")
+    expect(triggers).to_contain_text("On; ends missions that are in the way; priority 10.")
+    came = {"fired": "Thu 2026-11-26 09:00", "came": "not started: the robot is stopped"}
+    patrol.show("mission/ListTriggers", [nightly, empty | came | {"off": "the robot is stopped"}])
+    expect(triggers).to_contain_text("Last fired Thu 2026-11-26 09:00: not started: the robot is stopped.")
+    expect(triggers).to_contain_text("Off: the robot is stopped")
+    assert violations(page) == []
+    patrol.show("mission/ListTriggers", [])
+    expect(triggers).to_be_hidden()
+
+
 def left_over(**more: Any) -> list[dict[str, Any]]:
     plain = {"doing": "go_to corner", "inputs": {"rounds": "5"}, "changed": "", "waits": False}
     return [{"mission": "patrol", "at": 1.8e9, **plain, **more}]

@@ -101,6 +101,26 @@ def test_the_list_has_the_next_time_and_the_last_start(tmp_path: Path) -> None:
     assert (listed.next, listed.last) == ("Mon 1970-01-05 22:00", "Fri 1970-01-02 22:00")
 
 
+def test_the_list_has_what_came_of_the_last_time_and_why_one_is_off(tmp_path: Path) -> None:
+    triggers = """
+    empty: {when: $battery < 15 %, mission: home}
+    begin: {at_start: true, mission: clean}
+    after: {ends: clean, mission: greet, running: queue}
+    """
+    robot = Triggered(tmp_path, triggers, is_alone=True)
+    robot.bench.advance(1.0)
+    robot.battery(10.0)
+    mission = robot.bench.component("mission")
+    assert [(one.came, one.off) for one in mission.handle(ListTriggers())] == [
+        ("not started: mission clean is in the way", ""),
+        ("mission clean started", ""),
+        ("", ""),
+    ]
+    assert mission.handle(ListTriggers())[0].fired == "Thu 1970-01-01 00:00"
+    robot.bench.host.stop()
+    assert mission.handle(ListTriggers())[0].off == "the robot is stopped"
+
+
 def test_a_value_starts_one_that_interrupts_and_the_other_does_not_go_on(tmp_path: Path) -> None:
     robot = Triggered(
         tmp_path, "empty: {when: $battery < 15 %, mission: home, priority: 10, running: interrupt}", "start: clean\n"

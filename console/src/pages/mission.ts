@@ -10,6 +10,7 @@ import { MissionTree } from "../mission_tree";
 import { newMission } from "../new_mission";
 import type { Page, Robot } from "../page";
 import { isMessage, type Json } from "../rosbridge";
+import { TriggerList, type Trigger } from "../triggers";
 import "./mission.css";
 
 const LOOK = 250; // [ms] between two looks at a mission, and at the breakpoints
@@ -57,6 +58,7 @@ class MissionView {
   readonly #side = h("div", { class: "mission-side" });
   readonly #data: MissionData;
   readonly #moves = h("div", {});
+  readonly #triggers = new TriggerList();
   readonly #story = h("section", { class: "card mission-story", "aria-label": "Story" }, h("h2", {}, "Story"));
   readonly #lines = h("ol", { class: "lines" });
   readonly #closers: (() => void)[] = [];
@@ -85,7 +87,7 @@ class MissionView {
       },
     });
     const data = h("section", { class: "card", "aria-label": "Data" }, h("h2", {}, "Data"), this.#data.element, this.#moves);
-    this.#side.append(data, this.#story);
+    this.#side.append(data, this.#triggers.element, this.#story);
     this.element.append(this.#list, this.#head, this.#side);
     this.#closers.push(
       robot.link.subscribe("/rosout", (log) => this.#tell(log.name, log.msg, log.stamp), { type: "rcl_interfaces/msg/Log" }),
@@ -96,6 +98,11 @@ class MissionView {
           this.#tree?.mark(this.#breakpoints);
         },
         LOOK,
+      ),
+      robot.link.watch(
+        "mission/ListTriggers",
+        (answer) => this.#triggers.show(Array.isArray(answer) ? (answer as unknown as Trigger[]) : []),
+        SELDOM,
       ),
       robot.link.watch(
         "mission/ListSnapshots",

@@ -266,7 +266,8 @@ class ListSnapshots(Query[tuple[ListedSnapshot, ...]]):
 class ListedTrigger:
     """A trigger: its cause in words, when a wall clock shows its next time and showed its last start, if any.
 
-    It waits if it has fired and missions that run are in the way of its own.
+    It waits if it has fired and missions that run are in the way of its own. `fired` is when it last did, also if it
+    started nothing, and `came` what came of that. `off` is why it starts nothing now; empty if it does.
     """
 
     name: str
@@ -277,6 +278,9 @@ class ListedTrigger:
     next: str = ""
     last: str = ""
     waits: bool = False
+    fired: str = ""
+    came: str = ""
+    off: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -74,6 +74,7 @@ class Triggering:
         self._scopes = {name: _scope(one, names, values) for name, one in triggers.items() if one.when}
         self._reported: set[str] = set()  # triggers whose condition could not be evaluated
         self._is_begun = False
+        self._came: dict[str, tuple[float, str]] = {}  # wall-clock time at which each last fired [s], what came of it
 
     @property
     def _wall(self) -> float:
@@ -154,9 +155,13 @@ class Triggering:
 
     def _listed(self, one: Trigger) -> ListedTrigger:
         due, last = self.core.next_time(one.name, self._wall), self.core.started.get(one.name)
-        is_waiting = one.name in self.core.waiting
+        fired, came = self._came.get(one.name, (None, ""))
         return ListedTrigger(
-            one.name, one.mission, one.cause, one.priority, one.running, self._shown(due), self._shown(last), is_waiting
+            *(one.name, one.mission, one.cause, one.priority, one.running, self._shown(due), self._shown(last)),
+            waits=one.name in self.core.waiting,
+            fired=self._shown(fired),
+            came=came,
+            off="the robot is stopped" if self._executive.context.is_stopped else "",
         )
 
     def _shown(self, wall: float | None) -> str:
@@ -175,6 +180,7 @@ class Triggering:
             self._executive.run(RunMission(trigger.mission, trigger.inputs))
         except Refused as refusal:
             return str(refusal)
+        self._came[trigger.name] = self._wall, f"mission {trigger.mission} started"
         return ""
 
     def cancel(self, mission: str, trigger: Trigger, /) -> None:
@@ -184,11 +190,14 @@ class Triggering:
 
     def leave_out(self, trigger: Trigger, why: str, /) -> None:
         """Log why a trigger starts nothing."""
+        self._came[trigger.name] = self._wall, f"not started: {why}"
         self._executive.info(f"trigger {trigger.name} does not start mission {trigger.mission}: {why}")
 
     def wait(self, trigger: Trigger, missions: Sequence[str], /) -> None:
         """Log what a trigger waits for."""
-        self._executive.info(f"trigger {trigger.name} waits for the end of {' and '.join(missions)}")
+        words = f"waits for the end of {' and '.join(missions)}"
+        self._came[trigger.name] = self._wall, words
+        self._executive.info(f"trigger {trigger.name} {words}")
 
 
 def _scope(trigger: Trigger, names: RobotNames, values: RobotValues) -> SinceScope:
