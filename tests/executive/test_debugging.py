@@ -100,7 +100,7 @@ def test_a_breakpoint_pauses_the_mission_and_says_where() -> None:
     robot.advance(0.0)
     arrive(robot)
     assert robot.lines[-1] == "60 mission test: success"
-    assert "0 stopped at mission.yaml:21, before go_home" in robot.lines
+    assert "0 stopped at mission.yaml:21, before 1.2.1 go_home: Go to dock" in robot.lines
     assert is_reproducible(robot)
 
 
@@ -117,7 +117,7 @@ def test_a_timeout_stands_still_while_a_mission_is_stopped_and_what_moved_is_sen
     robot.mission.handle(StepMission())
     robot.advance(0.0)
     assert state(robot) == ("paused", "mission.yaml:10")
-    assert robot.lines[-1] == "69.5 stopped at mission.yaml:10, after away: success, on to home"
+    assert robot.lines[-1] == "69.5 stopped at mission.yaml:10, after 1.1 State away: success, on to home"
     assert is_reproducible(robot)
 
 

@@ -96,7 +96,7 @@ def test_a_mission_that_should_continue_goes_on_at_its_leaf() -> None:
     assert (goals(robot), robot.mission.missions.runs["test"].engine.data["rounds"]) == ([0.5], 1.0)
     assert robot.lines == [
         "1 mission test is restored from its snapshot; it goes on as soon as its values have arrived",
-        "1 go_to dock",
+        "1 1.1.3 Go to dock",
     ]
     robot.go_to.end(Outcome.SUCCEEDED)
     robot.advance(10.0)

@@ -214,7 +214,7 @@ def test_after_a_release_a_paused_mission_is_in_the_way_like_one_that_runs(tmp_p
     assert robot.told[-3:] == [
         "0 trigger visitor does not start mission home: mission clean is in the way",
         "0 mission clean resumed",
-        "0 work",
+        "0 1 Work",
     ]
 
 

@@ -21,7 +21,7 @@ from rbxcompose.missions.engine.world import PLAIN, POSE, Settings, World
 from rbxcompose.missions.execution.world import RobotWorld
 from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING, Result
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
-from rbxcompose.missions.view.picture import picture_of
+from rbxcompose.missions.view.picture import Drawn, heading_of, picture_of
 from rbxcompose.missions.view.replica import Mirror
 
 BLOCK = 200  # records that are packed together, into about a tenth of their memory
@@ -84,7 +84,7 @@ class MissionRun:
         self.end: MissionEnded | None = None
         self.began: float | None = None  # [s] of robot time
         self.patient_until: float | None = None  # [s] of the next warning while it waits for its first values
-        self.story = MissionStory(name)
+        self.story = MissionStory(name, self._heading)
         self.by_hand = 0  # what people did to it: it cannot be reproduced without that
         self.transitions: deque[dict[str, Any]] = deque(maxlen=LAST)
         self.breakpoints = SetBreakpoints()
@@ -105,10 +105,18 @@ class MissionRun:
         return {"time": self._now, "mission": self.name, **record, **step}
 
     @cached_property
-    def _sentences(self) -> Mapping[int, str]:
+    def _drawn(self) -> Mapping[int, Drawn]:
         picture = picture_of(self.engine.program, self.engine.robot)
         drawn = (one for root in picture.roots for one in root.all())
-        return {one.number: f"{one.place} {one.sentence}" for one in drawn if one.number is not None}
+        return {one.number: one for one in drawn if one.number is not None}
+
+    @cached_property
+    def _sentences(self) -> Mapping[int, str]:
+        return {number: f"{one.place} {one.sentence}" for number, one in self._drawn.items()}
+
+    def _heading(self, number: int) -> str:
+        """Return how the story names a node: as `mission show` does."""
+        return heading_of(self._drawn[number], self.engine.program.nodes[number])
 
     @property
     def is_over(self) -> bool:
