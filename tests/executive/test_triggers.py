@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from rbxcompose.missions.components.mission import MissionConfig
 from rbxcompose.missions.execution.requests import CancelMission, ListMissions, ListTriggers, ResumeMission, RunMission
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import Bool, Empty, Float32
@@ -246,3 +248,55 @@ def test_a_condition_reads_back_as_it_was_written(tmp_path: Path) -> None:
     robot = check_text(text, tmp_path, others=others).compilation.robot
     assert robot is not None
     assert 'when: "$battery < 15 %"' in dump_robot(robot.manifest)
+
+
+AGAIN = """
+begin: {at_start: true, mission: greet}
+empty: {when: $battery < 15 %, mission: home}
+"""
+
+
+def starts(robot: Triggered) -> list[str]:
+    return [text.split()[2] for text in robot.told if " starts mission " in text]
+
+
+def low(robot: Triggered) -> None:
+    robot.bench.advance(20.0)
+    robot.battery(10.0)
+    assert starts(robot) == ["begin", "empty"]
+    robot.ask(CancelMission("home"))
+
+
+def test_an_executive_that_failed_does_not_start_again_what_it_had_started(tmp_path: Path) -> None:
+    robot = Triggered(tmp_path, AGAIN)
+    low(robot)
+    robot.bench.host.failed("mission", RuntimeError("broken"))
+    robot.bench.advance(5.0)
+    robot.battery(10.0)
+    assert starts(robot) == ["begin", "empty"]
+    robot.battery(30.0)
+    robot.battery(10.0)
+    assert starts(robot) == ["begin", "empty", "empty"]
+
+
+def test_an_executive_that_replaces_another_one_starts_only_what_is_new(tmp_path: Path) -> None:
+    robot = Triggered(tmp_path, AGAIN)
+    low(robot)
+    hosted = robot.bench.host.hosted["mission"].instance
+    config = hosted.config
+    assert isinstance(config, MissionConfig)
+    empty = config.triggers["empty"]
+    more = {**config.triggers, "other": replace(empty, name="other", mission="greet", cause="another one")}
+    made = replace(hosted, config=config.model_copy(update={"triggers": more}))
+    robot.bench.host.prepare([made])
+    robot.bench.host.activate(["mission"])
+    robot.bench.advance(1.0)
+    assert starts(robot) == ["begin", "empty"]
+    robot.battery(10.0)
+    assert starts(robot) == ["begin", "empty", "other"]
+    listed = {one.name: one.came for one in robot.bench.component("mission").handle(ListTriggers())}
+    assert [listed[name] for name in ("begin", "empty", "other")] == [
+        "mission greet started",
+        "mission home started",
+        "mission greet started",
+    ]

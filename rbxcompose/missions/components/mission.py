@@ -152,7 +152,7 @@ class Mission(Component[MissionConfig]):
         from rbxcompose.missions.execution.ordered import OrderedMission
         from rbxcompose.missions.execution.snapshots import SnapshotStore
         from rbxcompose.missions.execution.topic_skills import Desks
-        from rbxcompose.missions.execution.triggers import Triggering
+        from rbxcompose.missions.execution.triggers import Triggering, TriggerMemory
         from rbxcompose.missions.execution.world import Arrivals, RobotWorld
 
         self.arrivals, self.desks = Arrivals(self.config.values), Desks(self)
@@ -165,11 +165,12 @@ class Mission(Component[MissionConfig]):
             lambda name: programs[name].inputs if name in programs else (), self.begin, self.end
         )
         seen = RobotWorld(self, self.arrivals, self.desks, lambda leaf, result: None, lambda event: None)
-        self.triggering = Triggering(self.config.triggers, self.config.names, seen, self)
+        memory = TriggerMemory(self.snapshots.triggers_file)
+        self.triggering = Triggering(self.config.triggers, self.config.names, seen, self, memory)
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
         self.kept: dict[str, requests.RunMission] = {}  # requests by people that began missions that still run
         self.repeated: tuple[Command, ...] = ()  # those, and the breakpoints
-        self.trouble = ""  # with snapshots
+        self.trouble = ""  # with what is kept on disk
         self.restored: dict[str, float] = {}  # wall-clock time of the snapshots of missions that wait for people [s]
         self.shown = ""  # the last reported status
         self.planned: float | None = None  # the last requested wake [s]
@@ -280,9 +281,10 @@ class Mission(Component[MissionConfig]):
             wakes += self.turn(mission)
             if (due := self.snapshots.keep(mission, self.now)) is not None:
                 wakes.append(due)
-        if self.snapshots.trouble != self.trouble and self.snapshots.trouble:
-            self.warn(self.snapshots.trouble)
-        self.trouble = self.snapshots.trouble
+        trouble = self.snapshots.trouble or self.triggering.trouble
+        if trouble != self.trouble and trouble:
+            self.warn(trouble)
+        self.trouble = trouble
         if wakes:
             self.plan(min(wakes))
         self.broadcast.publish(self.missions)
@@ -338,8 +340,9 @@ class Mission(Component[MissionConfig]):
         return any(mission.claims for mission in self.missions)
 
     def take_over(self, old: Mission) -> None:
-        """Stay held if the missions were."""
+        """Stay held if the missions were, and start nothing again that triggers have started."""
         self.is_held = old.is_held  # as the start mission was held
+        self.triggering.take_over(old.triggering)
 
     def finish(self, name: str, end: MissionEnded) -> None:
         """Report that a mission has ended; after the start mission, the robot may go down."""

@@ -96,6 +96,11 @@ class SnapshotStore:
             with suppress(OSError):
                 os.replace(self._path(mission), self._path(mission, _ASIDE))
 
+    @property
+    def triggers_file(self) -> Path | None:
+        """Return where what is known of triggers is kept; no mission has this name."""
+        return None if self._folder is None else self._folder / "-triggers.json"
+
     def _path(self, mission: str, aside: str = "") -> Path:
         return (self._folder or Path()) / f"{mission}{aside}.json"
 
