@@ -81,8 +81,8 @@ def _told(heading: str, text: str) -> str:
     """Return the sentence of a step, and the step itself if it says more, as what a name stands for now."""
     if not heading:
         return text
-    is_same = _plain(heading.partition(" ")[2]) == _plain(text)
-    return heading if is_same else f"{heading}: {text}"
+    words = _plain(heading.partition(" ")[2])  # perhaps with a name, or with what the step is to the one around it
+    return heading if f": {words}".endswith(f": {_plain(text)}") else f"{heading}: {text}"
 
 
 def _plain(text: str) -> str:
