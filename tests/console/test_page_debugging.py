@@ -231,3 +231,18 @@ def test_debugging_fits_the_window_and_the_finger(open_page: Callable[..., Page]
     for size in (WIDE, PHONE):
         page.set_viewport_size(size)
         expect_fit(page)
+
+
+def test_a_phone_is_enough_to_watch_and_to_hold_a_mission(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
+    for name in ("PauseMission", "CancelMission"):
+        patrol.answers[f"mission.{name}"] = lambda given: f"{given['type']} is done"
+    page = open_page(page_name="mission", viewport=PHONE, has_touch=True)
+    expect(row(page, "go_to corner")).to_contain_text("running")
+    page.get_by_role("button", name="Pause").tap()
+    done(page, "PauseMission")
+    show(patrol, "paused")
+    page.get_by_role("button", name="Resume").tap()
+    done(page, "ResumeMission")
+    page.get_by_role("button", name="Cancel").tap()
+    done(page, "CancelMission")
+    expect_fit(page)
