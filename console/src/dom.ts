@@ -36,6 +36,7 @@ const ICONS = {
   down: "M6 9.500l6 6 6-6",
   alarm: "M8 3h8l5 5v8l-5 5H8l-5-5V8zM12 8v5M12 16h.010",
   check: "M4.500 12.500l5 5 10-11",
+  step: "M6 4.500v15l9-7.500zM18.500 5v14",
   play: "M7 4.500v15l12-7.500z",
 } as const;
 

@@ -1,4 +1,5 @@
 /** A mission as its page shows it: rows of its picture, with the status of each node. */
+import type { Stop } from "./debugging";
 import { isMessage, type Json, type Message } from "./rosbridge";
 
 /** One node of the picture; an interrupt is a node without a number. */
@@ -31,11 +32,13 @@ export interface Transition {
   outcome: string;
 }
 
-/** What a look at a mission shows; statuses are by node number. */
+/** What a look at a mission shows; statuses are by node number. `by_hand` is what people changed while it ran. */
 export interface Seen {
   mission: string;
   state: string;
-  began: number;
+  began: number | null;
+  stopped_at?: Stop[];
+  by_hand?: number;
   statuses: Record<string, number>;
   data: Record<string, Json>;
   transitions: Transition[];
@@ -120,6 +123,12 @@ function fields(value: Message): string {
 
 export function isSeen(answer: Json): answer is Message & Seen {
   return isMessage(answer) && isMessage(answer.picture) && isMessage(answer.statuses);
+}
+
+/** Returns what is seen of a mission that has not run: its picture alone. */
+export function unseen(picture: Message): Seen {
+  const nothing = { began: null, statuses: {}, data: {}, transitions: [] };
+  return { mission: String(picture.name), state: "idle", ...nothing, picture: picture as unknown as Picture };
 }
 
 /** What tests have tried of a mission: `rbxcompose test --coverage` keeps it. */

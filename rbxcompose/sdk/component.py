@@ -46,6 +46,11 @@ class Context(Protocol):
         ...
 
     @property
+    def is_again(self) -> bool:
+        """Return whether it was already started since the robot came up: it, or its process, has failed since."""
+        ...
+
+    @property
     def is_over(self) -> bool:
         """Return whether nobody waits any more for the call that runs: one that may block should return soon."""
         ...

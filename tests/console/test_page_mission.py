@@ -83,6 +83,69 @@ def test_a_person_pauses_cancels_and_starts_a_mission(open_page: Callable[..., P
     assert violations(page) == []
 
 
+def trigger(name: str, cause: str, **more: Any) -> dict[str, Any]:
+    plain = {
+        "priority": 0,
+        "running": "skip",
+        "next": "",
+        "last": "",
+        "waits": False,
+        "fired": "",
+        "came": "",
+        "off": "",
+    }
+    return {"name": name, "mission": "patrol", "cause": cause, **plain, **more}
+
+
+def test_what_starts_missions_is_seen_live(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
+    nightly = trigger("nightly", "at 22:00 on mon, fri", next="Fri 2026-11-27 22:00")
+    empty = trigger("empty", "when $battery < 15 %", priority=10, running="interrupt")
+    patrol.windows["mission/ListTriggers"] = [nightly, empty]
+    page = open_page(page_name="mission")
+    triggers = page.get_by_label("Triggers")
+    expect(triggers).to_contain_text("Nightly starts Patrol at 22:00 on mon, fri")
+    expect(triggers).to_contain_text("On; next: Fri 2026-11-27 22:00; left out if another mission is in the way.")
+    expect(triggers).to_contain_text("On; ends missions that are in the way; priority 10.")
+    came = {"fired": "Thu 2026-11-26 09:00", "came": "not started: the robot is stopped"}
+    patrol.show("mission/ListTriggers", [nightly, empty | came | {"off": "the robot is stopped"}])
+    expect(triggers).to_contain_text("Last fired Thu 2026-11-26 09:00: not started: the robot is stopped.")
+    expect(triggers).to_contain_text("Off: the robot is stopped")
+    assert violations(page) == []
+    patrol.show("mission/ListTriggers", [])
+    expect(triggers).to_be_hidden()
+
+
+def left_over(**more: Any) -> list[dict[str, Any]]:
+    plain = {"doing": "go_to corner", "inputs": {"rounds": "5"}, "changed": "", "waits": False}
+    return [{"mission": "patrol", "at": 1.8e9, **plain, **more}]
+
+
+def test_a_run_that_did_not_end_goes_on_or_starts_again(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
+    for name in ("ResumeMission", "CancelMission", "RunMission", "RestoreMission"):
+        patrol.answers[f"mission.{name}"] = lambda given: f"{given['type']} is done"
+    patrol.windows["mission/ListMissions"] = listed("paused")
+    patrol.windows["mission/ListSnapshots"] = left_over(waits=True)
+    page = open_page(page_name="mission")
+    expect(page.get_by_text("This run did not end")).to_contain_text("at: go_to corner")
+    assert violations(page) == []
+    page.get_by_role("button", name="Go on from where it was").click()
+    expect(page.get_by_text("mission.ResumeMission is done")).to_be_visible()
+    page.get_by_role("button", name="Start again").click()
+    expect(page.get_by_text("mission.RunMission is done")).to_be_visible()
+    assert len(patrol.asked("mission.CancelMission")) == 1
+    assert patrol.asked("mission.RunMission")[0]["inputs"] == {"rounds": "5"}
+    patrol.show("mission/ListMissions", listed("success"))
+    patrol.show("mission/ListSnapshots", left_over())
+    page.get_by_role("button", name="Go on from where it was").click()
+    expect(page.get_by_text("mission.RestoreMission is done")).to_be_visible()
+    patrol.show("mission/ListSnapshots", left_over(changed="the mission 'patrol' and the robot's places"))
+    expect(
+        page.get_by_text("It cannot go on, because the mission 'patrol' and the robot's places changed since.")
+    ).to_be_visible()
+    expect(page.get_by_role("button", name="Go on from where it was")).to_have_count(0)
+    expect(page.get_by_role("button", name="Start again")).to_be_visible()
+
+
 def test_what_no_test_has_tried_is_marked(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
     missing = [{"node": 1, "text": "do.repeat.go_to: failure"}, {"node": 1, "text": "do.repeat.go_to: timeout"}]
     known = {"at": 1.8e9, "tests": 2, "ways": 5, "count": 3, "missing": missing}

@@ -167,7 +167,7 @@ class Robot:
     def __init__(self, text: str, start: str | None = "test", **others: str) -> None:
         self.stepped = SteppedClock()
         self.clock: Clock = self.stepped
-        self.is_stopped = self.is_over = False
+        self.is_stopped = self.is_over = self.is_again = False
         self.lines: list[str] = []
         self.levels: list[Level] = []
         self.events: list[RobotEvent] = []

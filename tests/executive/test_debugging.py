@@ -16,12 +16,15 @@ from rbxcompose.missions.execution.requests import (
     ForceNode,
     JumpMission,
     ListBreakpoints,
+    ListData,
     ListMissions,
+    ListOutcomes,
     PauseMission,
     ResumeMission,
     RunMission,
     SetBreakpoint,
     SetMissionData,
+    ShowPicture,
     StepMission,
 )
 from rbxcompose.sdk import Outcome
@@ -90,14 +93,14 @@ def test_a_breakpoint_pauses_the_mission_and_says_where() -> None:
     arrive(robot)
     assert state(robot) == ("paused", "mission.yaml:21")
     seen = robot.mission.missions.seen("test")
-    assert seen["stopped_at"] == [{"node": 6, "place": "mission.yaml:21", "text": "go_home"}]
+    assert seen["stopped_at"] == [{"node": 6, "place": "mission.yaml:21", "text": "go_home", "after": ""}]
     assert len(robot.go_to.goals) == 1
     robot.advance(60.0)
     robot.mission.handle(ResumeMission())
     robot.advance(0.0)
     arrive(robot)
     assert robot.lines[-1] == "60 mission test: success"
-    assert "0 stopped at mission.yaml:21, before go_home" in robot.lines
+    assert "0 stopped at mission.yaml:21, before 1.2.1 go_home: Go to dock" in robot.lines
     assert is_reproducible(robot)
 
 
@@ -114,7 +117,7 @@ def test_a_timeout_stands_still_while_a_mission_is_stopped_and_what_moved_is_sen
     robot.mission.handle(StepMission())
     robot.advance(0.0)
     assert state(robot) == ("paused", "mission.yaml:10")
-    assert robot.lines[-1] == "69.5 stopped at mission.yaml:10, after away: success, on to home"
+    assert robot.lines[-1] == "69.5 stopped at mission.yaml:10, after 1.1 State away: success, on to home"
     assert is_reproducible(robot)
 
 
@@ -231,3 +234,50 @@ def test_nothing_can_be_done_to_a_mission_that_has_not_begun() -> None:
     robot.start()
     with pytest.raises(Refused, match="mission test has not begun"):
         robot.mission.handle(StepMission())
+
+
+def test_a_viewer_sees_where_breakpoints_are_and_sets_them_by_the_numbers_that_it_sees() -> None:
+    robot = robot_at(SetBreakpoint("6", "test"), SetBreakpoint("1->home", "test"), SetBreakpoint("mission.yaml:14"))
+    listed = robot.mission.handle(ListBreakpoints())
+    assert [(one.where, one.spots) for one in listed] == [
+        ("6", ((6, None),)),
+        ("1->home", ((1, "success"),)),
+        ("mission.yaml:14", ((4, None),)),
+    ]
+
+
+def test_a_viewer_sees_on_which_side_of_a_node_a_mission_was_stopped_and_how_often_people_changed_it() -> None:
+    robot = robot_at(SetBreakpoint("away->home"))
+    robot.mission.handle(SetMissionData({"rounds": "3", "mode": "fast"}))
+    arrive(robot)
+    seen = robot.mission.missions.seen("test")
+    assert seen["stopped_at"] == [{"node": 1, "place": "mission.yaml:10", "text": "away", "after": "success"}]
+    assert seen["by_hand"] == 2
+
+
+def test_a_viewer_sees_how_nodes_may_be_forced_to_end_and_where_breakpoints_may_be_before_the_first_run() -> None:
+    robot = robot_at()
+    assert robot.mission.handle(ListOutcomes("test"))["3"] == ("success", "failure")
+    assert robot.mission.handle(ShowPicture("rest"))["count"] == 4
+    with pytest.raises(Refused, match="mission rest is not running"):
+        robot.mission.handle(ListOutcomes("rest"))
+
+
+def test_what_is_listed_of_the_data_can_be_written_back() -> None:
+    text = PATROL.replace("mode: slow", "mode: slow\n  left: 25 %\n  seen: {hall: 2 m, kitchen: 30 cm}\n  said: 'a: b'")
+    robot = Robot(text)
+    robot.start()
+    before = dict(robot.mission.missions.runs["test"].engine.data)
+    listed = robot.mission.handle(ListData("test"))
+    given = {one.name: one.text for one in listed if one.text is not None}
+    assert given == {
+        "rounds": "0",
+        "corners": "[corner, dock]",
+        "goal": "dock",
+        "mode": "slow",
+        "left": "25 %",
+        "seen": "{hall: 2 m, kitchen: 0.3 m}",
+        "said": "a: b",
+    }
+    robot.mission.handle(SetMissionData(given))
+    assert robot.mission.missions.runs["test"].engine.data == before

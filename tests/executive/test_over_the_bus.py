@@ -99,7 +99,7 @@ def test_an_executive_that_crashed_runs_again_what_people_had_begun() -> None:
     robot.advance(0.5)
     robot.host.failed("mission", RuntimeError("broken"))
     robot.advance(4.0)
-    assert lines(robot).count("0 scan") == 1
+    assert lines(robot).count("0 1 Scan") == 1
     assert lines(robot)[-1].endswith("mission test: success")
 
 

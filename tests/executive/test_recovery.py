@@ -12,6 +12,7 @@ from rbxcompose.missions.engine.log_replay import OtherInterventionError, replay
 from rbxcompose.missions.execution.requests import (
     CancelMission,
     ListMissions,
+    ListSnapshots,
     PauseMission,
     RestoreMission,
     ResumeMission,
@@ -95,7 +96,7 @@ def test_a_mission_that_should_continue_goes_on_at_its_leaf() -> None:
     assert (goals(robot), robot.mission.missions.runs["test"].engine.data["rounds"]) == ([0.5], 1.0)
     assert robot.lines == [
         "1 mission test is restored from its snapshot; it goes on as soon as its values have arrived",
-        "1 go_to dock",
+        "1 1.1.3 Go to dock",
     ]
     robot.go_to.end(Outcome.SUCCEEDED)
     robot.advance(10.0)
@@ -236,3 +237,45 @@ def test_a_mission_that_was_paused_stays_paused() -> None:
     robot.start()
     robot.advance(1.0)
     assert (state(robot), goals(robot)) == ("paused", [])
+
+
+def left(robot: Robot) -> list[tuple[str, str, bool]]:
+    return [(one.doing, one.changed, one.waits) for one in robot.mission.handle(ListSnapshots())]
+
+
+def test_people_see_what_did_not_end_until_it_goes_on() -> None:
+    crashed()
+    robot = Real(policy="ask")
+    robot.start()
+    assert left(robot) == [("go_to dock", "", True)]
+    assert robot.mission.handle(ListSnapshots())[0].at > 1e9
+    robot.mission.handle(ResumeMission())
+    robot.advance(2.0)
+    assert left(robot) == []
+
+
+def test_a_run_that_was_replaced_by_another_one_can_go_on_once() -> None:
+    crashed()
+    robot = Real()
+    robot.start()
+    robot.advance(2.0)
+    assert left(robot) == [("go_to dock", "", False)]
+    robot.mission.handle(CancelMission())
+    robot.mission.handle(RestoreMission())
+    robot.advance(2.0)
+    assert left(robot) == []
+    robot.mission.handle(CancelMission())
+    assert left(robot) == []
+
+
+def test_people_see_what_has_changed_since_and_which_inputs_there_were() -> None:
+    crashed()
+    robot = Real(PATROL.replace("10 s", "20 s"), policy="ask")
+    robot.start()
+    assert left(robot) == [("", "the mission ''", False)]
+    text = "inputs:\n  place: {type: place}\n  room: {type: text, default: hall}\ndo: {go_to: $place}"
+    first = Real(other=text)
+    first.mission.handle(RunMission("other", {"place": "corner"}))
+    first.advance(2.0)
+    again = Real(other=text, policy="ask")
+    assert again.mission.handle(ListSnapshots())[-1].inputs == {"place": "corner", "room": "hall"}

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from rbxcompose.missions.components.mission import MissionConfig
 from rbxcompose.missions.execution.requests import CancelMission, ListMissions, ListTriggers, ResumeMission, RunMission
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import Bool, Empty, Float32
@@ -99,6 +101,26 @@ def test_the_list_has_the_next_time_and_the_last_start(tmp_path: Path) -> None:
     robot.bench.advance(2 * DAY)
     [listed] = robot.bench.component("mission").handle(ListTriggers())
     assert (listed.next, listed.last) == ("Mon 1970-01-05 22:00", "Fri 1970-01-02 22:00")
+
+
+def test_the_list_has_what_came_of_the_last_time_and_why_one_is_off(tmp_path: Path) -> None:
+    triggers = """
+    empty: {when: $battery < 15 %, mission: home}
+    begin: {at_start: true, mission: clean}
+    after: {ends: clean, mission: greet, running: queue}
+    """
+    robot = Triggered(tmp_path, triggers, is_alone=True)
+    robot.bench.advance(1.0)
+    robot.battery(10.0)
+    mission = robot.bench.component("mission")
+    assert [(one.came, one.off) for one in mission.handle(ListTriggers())] == [
+        ("not started: mission clean is in the way", ""),
+        ("mission clean started", ""),
+        ("", ""),
+    ]
+    assert mission.handle(ListTriggers())[0].fired == "Thu 1970-01-01 00:00"
+    robot.bench.host.stop()
+    assert mission.handle(ListTriggers())[0].off == "the robot is stopped"
 
 
 def test_a_value_starts_one_that_interrupts_and_the_other_does_not_go_on(tmp_path: Path) -> None:
@@ -194,7 +216,7 @@ def test_after_a_release_a_paused_mission_is_in_the_way_like_one_that_runs(tmp_p
     assert robot.told[-3:] == [
         "0 trigger visitor does not start mission home: mission clean is in the way",
         "0 mission clean resumed",
-        "0 work",
+        "0 1 Work",
     ]
 
 
@@ -226,3 +248,55 @@ def test_a_condition_reads_back_as_it_was_written(tmp_path: Path) -> None:
     robot = check_text(text, tmp_path, others=others).compilation.robot
     assert robot is not None
     assert 'when: "$battery < 15 %"' in dump_robot(robot.manifest)
+
+
+AGAIN = """
+begin: {at_start: true, mission: greet}
+empty: {when: $battery < 15 %, mission: home}
+"""
+
+
+def starts(robot: Triggered) -> list[str]:
+    return [text.split()[2] for text in robot.told if " starts mission " in text]
+
+
+def low(robot: Triggered) -> None:
+    robot.bench.advance(20.0)
+    robot.battery(10.0)
+    assert starts(robot) == ["begin", "empty"]
+    robot.ask(CancelMission("home"))
+
+
+def test_an_executive_that_failed_does_not_start_again_what_it_had_started(tmp_path: Path) -> None:
+    robot = Triggered(tmp_path, AGAIN)
+    low(robot)
+    robot.bench.host.failed("mission", RuntimeError("broken"))
+    robot.bench.advance(5.0)
+    robot.battery(10.0)
+    assert starts(robot) == ["begin", "empty"]
+    robot.battery(30.0)
+    robot.battery(10.0)
+    assert starts(robot) == ["begin", "empty", "empty"]
+
+
+def test_an_executive_that_replaces_another_one_starts_only_what_is_new(tmp_path: Path) -> None:
+    robot = Triggered(tmp_path, AGAIN)
+    low(robot)
+    hosted = robot.bench.host.hosted["mission"].instance
+    config = hosted.config
+    assert isinstance(config, MissionConfig)
+    empty = config.triggers["empty"]
+    more = {**config.triggers, "other": replace(empty, name="other", mission="greet", cause="another one")}
+    made = replace(hosted, config=config.model_copy(update={"triggers": more}))
+    robot.bench.host.prepare([made])
+    robot.bench.host.activate(["mission"])
+    robot.bench.advance(1.0)
+    assert starts(robot) == ["begin", "empty"]
+    robot.battery(10.0)
+    assert starts(robot) == ["begin", "empty", "other"]
+    listed = {one.name: one.came for one in robot.bench.component("mission").handle(ListTriggers())}
+    assert [listed[name] for name in ("begin", "empty", "other")] == [
+        "mission greet started",
+        "mission home started",
+        "mission greet started",
+    ]

@@ -95,6 +95,27 @@ def test_a_mission_leads_to_services_and_topics_and_to_nobody_for_skills_in_pyth
     golden.check("skills.mmd", mermaid(diagram_of(found.robot)))
 
 
+STARTED = """
+triggers:
+  nightly: {at: "22:00", mission: work, priority: 2}
+  again: {ends: work, outcome: failure, mission: work}
+  empty: {when: $charge < 15 %, mission: work}
+  button: {message: pressed, type: std_msgs/Empty, mission: work}
+values: {charge: {topic: battery_level, unit: "%", type: ratio}}
+"""
+
+
+def test_triggers_lead_to_what_they_start_and_need(tmp_path: Path, golden: Golden) -> None:
+    (tmp_path / "work.yaml").write_text(WORKING)
+    found = check_text(f"{WORKER}{STARTED}", tmp_path).compilation
+    assert found.robot
+    assert not found.report.has_errors, list(found.report)
+    drawn = diagram_of(found.robot)
+    golden.check("triggers.mmd", mermaid(drawn))
+    golden.check("triggers.dot", dot(drawn))
+    assert "<td>at 22:00" in html(drawn)
+
+
 def test_a_mux_shows_the_priorities_of_its_inputs() -> None:
     wires = {wire.name: wire for wire in diagram("turtlebot").wires}
     assert (wires["/cmd_vel/navigation"].note, wires["/cmd_vel/teleop"].note) == ("priority 10", "priority 100")

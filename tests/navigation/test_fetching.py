@@ -72,7 +72,7 @@ class Errand:
         self.seen = len(self.bench.records)
         if "right_arm" in self.step:
             self.swayed = max(self.swayed, abs(self.engine.base_velocity.linear))
-        elif self.step == "go_to at_counter" and self.states:
+        elif self.step.endswith(" Go to at counter") and self.states:
             self.carrying.append(self.states[-1])
         return self.outcome != ""
 

@@ -74,12 +74,12 @@ def test_it_docks_when_the_battery_is_low_and_resumes_at_the_corner_that_was_cut
     assert cut_short in {f"go_to {corner}" for corner in CORNERS}
     assert told[start + 1 : start + 9] == [
         f"{cut_short}: halted",
-        "go_to dock",
+        "2.1.1 Go to dock",
         "go_to dock: success",
-        "recharge",
+        "2.1.2 Recharge",
         "recharge: success",
         f"interrupt battery_low done, back to {cut_short}",
-        cut_short,
+        f"1.1.1 Go to the corner: {cut_short}",
         f"{cut_short}: success",
     ]
 
@@ -94,12 +94,15 @@ def test_a_corner_that_was_moved_is_visited_where_it_is_now() -> None:
 
 
 def test_the_threshold_decides_how_often_it_docks() -> None:
-    assert sum(text == "recharge" for text in done(ran("missions.patrol.with.low=10 %", "battery.runtime=2 min"))) == 0
-    assert sum(text == "recharge" for text in done(ran("missions.patrol.with.low=70 %"))) >= 2
+    assert (
+        sum(text == "2.1.2 Recharge" for text in done(ran("missions.patrol.with.low=10 %", "battery.runtime=2 min")))
+        == 0
+    )
+    assert sum(text == "2.1.2 Recharge" for text in done(ran("missions.patrol.with.low=70 %"))) >= 2
 
 
 def test_a_profile_changes_the_robot() -> None:
-    docked = [sum(text == "recharge" for text in done(ran(profiles=profiles))) for profiles in ((), ("tired",))]
+    docked = [sum(text == "2.1.2 Recharge" for text in done(ran(profiles=profiles))) for profiles in ((), ("tired",))]
     assert docked[1] > docked[0]
 
 

@@ -28,7 +28,7 @@ def ran(*sets: str, profiles: tuple[str, ...] = ()) -> Ran:
 
 def charged(run: Ran) -> dict[str, int]:
     said = [record.text for record in run.bench.records if record.source == "mission"]
-    return {name: said.count(f"recharge_{name}") for name in ("drive", "lift")}
+    return {name: sum(text.endswith(f" Recharge {name}") for text in said) for name in ("drive", "lift")}
 
 
 @pytest.mark.parametrize("profiles", [(), ("tired",)])

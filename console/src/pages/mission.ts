@@ -1,37 +1,21 @@
-/** Mission: what the robot is doing and why, live; start, pause, resume and cancel. */
-import { h, emptyCard, icon, setText, type Icon } from "../dom";
+/** Mission: what the robot is doing and why, live; start, pause, resume, cancel and debug. */
+import { byHandText, stoppedText, type Breakpoint, type Datum } from "../debugging";
+import { h, emptyCard, icon, type Icon } from "../dom";
 import { formatName } from "../format";
-import {
-  ACTIVE,
-  activeNode,
-  isSeen,
-  shownValue,
-  statusOf,
-  testedText,
-  titleOf,
-  untried,
-  type Drawn,
-  type Listed,
-  type Seen,
-  type Status,
-  type Tested,
-} from "../mission";
+import { showLeftOver, type LeftOver } from "../left_over";
+import { ACTIVE, isSeen, unseen, type Listed, type Seen, type Tested } from "../mission";
+import { MissionData } from "../mission_data";
 import { MissionEditor } from "../mission_editor";
+import { MissionTree } from "../mission_tree";
 import { newMission } from "../new_mission";
 import type { Page, Robot } from "../page";
 import { isMessage, type Json } from "../rosbridge";
+import { TriggerList, type Trigger } from "../triggers";
 import "./mission.css";
 
-const LOOK = 250; // [ms] between two looks at a mission
+const LOOK = 250; // [ms] between two looks at a mission, and at the breakpoints
+const SELDOM = 2_000; // [ms] between two looks at what changes seldom
 const STORY = 200; // lines that are kept
-const ICONS: Record<Status, Icon> = { idle: "dot", running: "play", success: "check", failure: "cross", skipped: "skip" };
-const WORDS: Record<Status, string> = {
-  idle: "not yet",
-  running: "running",
-  success: "done",
-  failure: "failed",
-  skipped: "skipped",
-};
 
 export const page: Page = {
   name: "mission",
@@ -68,11 +52,13 @@ export const page: Page = {
 class MissionView {
   readonly element = h("div", { class: "mission-view" });
   readonly #robot: Robot;
+  readonly #mayOperate: boolean;
   readonly #list = h("nav", { class: "card mission-list", "aria-label": "Missions" });
   readonly #head = h("section", { class: "card mission-head", "aria-label": "Control" });
-  readonly #tree = h("section", { class: "card mission-tree", "aria-label": "Steps" });
   readonly #side = h("div", { class: "mission-side" });
-  readonly #data = h("section", { class: "card", "aria-label": "Data" });
+  readonly #data: MissionData;
+  readonly #moves = h("div", {});
+  readonly #triggers = new TriggerList();
   readonly #story = h("section", { class: "card mission-story", "aria-label": "Story" }, h("h2", {}, "Story"));
   readonly #lines = h("ol", { class: "lines" });
   readonly #closers: (() => void)[] = [];
@@ -82,20 +68,51 @@ class MissionView {
   #look: () => void = () => undefined;
   #seen: Seen | null = null;
   #tested: Tested | null = null;
-  #drawn = "";
-  #rows = new Map<Drawn, HTMLElement>();
-  #folded = new Set<string>();
-  #untried = new Map<number, string[]>();
+  #tree: MissionTree | null = null;
+  #breakpoints: Breakpoint[] = [];
+  #leftOver: LeftOver[] = [];
   #headOf = "";
+  #controls: Controls | null = null;
   #editor: MissionEditor | null = null;
 
   constructor(robot: Robot) {
     this.#robot = robot;
+    this.#mayOperate = robot.config.role !== "view";
     this.#story.append(this.#lines);
-    this.#side.append(this.#data, this.#story);
-    this.element.append(this.#list, this.#head, this.#tree, this.#side);
+    this.#data = new MissionData({
+      list: async () => (await robot.link.ask({ type: "mission.ListData", mission: this.#chosen })) as unknown as Datum[],
+      set: async (name, text) => {
+        const answer = await robot.link.ask({ type: "mission.SetMissionData", values: { [name]: text }, mission: this.#chosen });
+        robot.notify(String(answer));
+      },
+    });
+    const data = h("section", { class: "card", "aria-label": "Data" }, h("h2", {}, "Data"), this.#data.element, this.#moves);
+    this.#side.append(data, this.#triggers.element, this.#story);
+    this.element.append(this.#list, this.#head, this.#side);
     this.#closers.push(
       robot.link.subscribe("/rosout", (log) => this.#tell(log.name, log.msg, log.stamp), { type: "rcl_interfaces/msg/Log" }),
+      robot.link.watch(
+        "mission/ListBreakpoints",
+        (answer) => {
+          this.#breakpoints = Array.isArray(answer) ? (answer as unknown as Breakpoint[]) : [];
+          this.#tree?.mark(this.#breakpoints);
+        },
+        LOOK,
+      ),
+      robot.link.watch(
+        "mission/ListTriggers",
+        (answer) => this.#triggers.show(Array.isArray(answer) ? (answer as unknown as Trigger[]) : []),
+        SELDOM,
+      ),
+      robot.link.watch(
+        "mission/ListSnapshots",
+        (answer) => {
+          this.#leftOver = Array.isArray(answer) ? (answer as unknown as LeftOver[]) : [];
+          this.#headOf = "";
+          this.#showHead();
+        },
+        SELDOM,
+      ),
     );
   }
 
@@ -138,23 +155,47 @@ class MissionView {
     this.#edit("");
     this.#chosen = name;
     this.#seen = null;
-    this.#drawn = "";
-    this.#tree.replaceChildren(h("p", { class: "label" }, "It has not run yet since the robot came up."));
-    this.#data.replaceChildren(h("h2", {}, "Data"), h("p", { class: "label" }, "Nothing yet"));
+    this.#tree?.element.remove();
+    this.#tree = new MissionTree(
+      name,
+      this.#mayOperate,
+      (request, button) => this.#ask(request, button),
+      async () => {
+        const outcomes = await this.#robot.link.ask({ type: "mission.ListOutcomes", mission: name }).catch(() => null);
+        return isMessage(outcomes) ? (outcomes as unknown as Record<string, string[]>) : {};
+      },
+    );
+    this.#tree.mark(this.#breakpoints);
+    this.#head.after(this.#tree.element);
+    this.#data.forget("Nothing yet");
+    this.#moves.replaceChildren();
     this.#tested = null;
     void this.#learnTested(name);
-    this.#look = this.#robot.link.watch(`mission/LookAtAll/mission/${name}`, (answer) => this.#show(answer), LOOK);
+    this.#look = this.#robot.link.watch(
+      `mission/LookAtAll/mission/${name}`,
+      (answer, refused) => {
+        if (refused) void this.#showIdle(name);
+        else this.#show(answer);
+      },
+      LOOK,
+    );
     for (const button of this.#list.children) {
       button.setAttribute("aria-pressed", String(button.firstChild?.textContent === formatName(name)));
     }
     this.#showHead();
   }
 
+  /** Shows the steps of a mission that has not run, so that breakpoints can be set. */
+  async #showIdle(name: string): Promise<void> {
+    const picture = await this.#robot.link.ask({ type: "mission.ShowPicture", mission: name }).catch(() => null);
+    if (name !== this.#chosen || this.#seen || !isMessage(picture)) return;
+    this.#tree?.show(unseen(picture), this.#tested);
+  }
+
   async #learnTested(name: string): Promise<void> {
     const values = await this.#robot.link.call("/console/tested", { mission: name }).catch(() => null);
     if (name !== this.#chosen || !isMessage(values) || !isMessage(values.answer)) return;
     this.#tested = values.answer as unknown as Tested;
-    this.#drawn = "";
     if (this.#seen) this.#show(this.#seen as unknown as Json);
   }
 
@@ -164,27 +205,21 @@ class MissionView {
     const mission = this.#missions.find(({ name }) => name === this.#chosen);
     if (!mission) return;
     const isActive = ACTIVE.has(mission.state);
-    const key = `${mission.name} ${isActive} ${mission.state}`;
-    if (key === this.#headOf) return;
-    this.#headOf = key;
-    const edit = h("button", { type: "button" }, icon("edit"), "Edit");
-    edit.onclick = () => this.#edit(mission.name);
-    edit.hidden = this.#editor !== null;
-    const title = h("div", { class: "mission-title" }, h("h2", {}, formatName(mission.name)), stateChip(mission.state), edit);
-    this.#head.replaceChildren(title, h("p", { class: "label" }, mission.about));
-    if (isActive) {
-      const paused = mission.state === "paused";
-      this.#head.append(
-        h(
-          "div",
-          { class: "row" },
-          this.#button(paused ? "play" : "pause", paused ? "Resume" : "Pause", paused ? "ResumeMission" : "PauseMission"),
-          this.#button("cross", "Cancel", "CancelMission"),
-        ),
-      );
-    } else {
-      this.#head.append(this.#startForm(mission));
+    const key = `${mission.name} ${isActive}`;
+    if (key !== this.#headOf) {
+      this.#headOf = key;
+      this.#controls = new Controls(this.#mayOperate, (request, button) => void this.#ask({ type: `mission.${request}`, mission: mission.name }, button));
+      const edit = h("button", { type: "button" }, icon("edit"), "Edit");
+      edit.onclick = () => this.#edit(mission.name);
+      edit.hidden = this.#editor !== null;
+      const title = h("div", { class: "mission-title" }, h("h2", {}, formatName(mission.name)), this.#controls.chip, edit);
+      this.#head.replaceChildren(title, h("p", { class: "label" }, mission.about), this.#controls.says);
+      const left = this.#leftOver.find((one) => one.mission === mission.name);
+      if (left) this.#head.append(showLeftOver(left, isActive, this.#mayOperate, (request, button) => this.#ask(request, button)));
+      if (isActive) this.#head.append(this.#controls.buttons);
+      else if (this.#mayOperate) this.#head.append(this.#startForm(mission));
     }
+    this.#controls!.show(mission.state, this.#seen?.mission === mission.name ? this.#seen : null);
   }
 
   /** Shows the editor of a mission in place of its steps; without a name, the steps again. */
@@ -194,16 +229,11 @@ class MissionView {
     this.#editor = name ? new MissionEditor(this.#robot, name, () => this.#edit("")) : null;
     if (this.#editor) this.element.append(this.#editor.element);
     this.#isChosenByHand ||= this.#editor !== null; // another mission that starts does not take the text away
-    this.#tree.hidden = this.#side.hidden = this.#editor !== null;
+    this.#side.hidden = this.#editor !== null;
+    if (this.#tree) this.#tree.element.hidden = this.#editor !== null;
     this.element.classList.toggle("edits", this.#editor !== null);
     this.#headOf = "";
     this.#showHead();
-  }
-
-  #button(picture: Icon, text: string, request: string): HTMLElement {
-    const button = h("button", { type: "button" }, icon(picture), text);
-    button.onclick = () => void this.#ask({ type: `mission.${request}`, mission: this.#chosen }, button);
-    return button;
   }
 
   #startForm(mission: Listed): HTMLElement {
@@ -221,110 +251,30 @@ class MissionView {
     return form;
   }
 
-  async #ask(request: { type: string; [key: string]: Json }, button: HTMLButtonElement): Promise<void> {
-    button.disabled = true;
+  async #ask(request: { type: string; [key: string]: Json }, button?: HTMLButtonElement): Promise<boolean> {
+    const had = button !== undefined && document.activeElement === button;
+    if (button) button.disabled = true;
     try {
       const answer = await this.#robot.link.ask(request);
       if (typeof answer === "string") this.#robot.notify(answer);
+      return true;
     } catch (error) {
       this.#robot.notify((error as Error).message);
+      return false;
     } finally {
-      button.disabled = false;
+      if (button) button.disabled = false;
+      if (had && document.activeElement === document.body) button.focus(); // a button that is disabled loses it
     }
   }
-
-  // The tree
 
   #show(answer: Json): void {
     if (!isSeen(answer)) return;
     const seen = (this.#seen = answer as unknown as Seen);
-    const picture = JSON.stringify(seen.picture);
-    if (picture !== this.#drawn) {
-      this.#drawn = picture;
-      this.#rows.clear();
-      const tested = this.#tested;
-      this.#untried = tested && tested.count === seen.picture.count ? untried(tested) : new Map();
-      const roots = [seen.picture.main, ...seen.picture.interrupts].map((root, turn) => this.#row(root, String(turn)));
-      this.#tree.replaceChildren(h("ul", { role: "tree", "aria-label": "Steps of the mission" }, ...roots));
-      if (tested) this.#tree.append(h("p", { class: "label tested" }, testedText(tested, seen.picture)));
-    }
-    this.#paint();
-    this.#showData();
-  }
-
-  #row(node: Drawn, path: string): HTMLElement {
-    const { role, name, what } = titleOf(node);
-    const row = h("div", { class: "node" });
-    const mark = h("span", { class: "mark" });
-    const words = h("span", { class: "node-words" });
-    if (role) words.append(h("span", { class: "label" }, `${role}: `));
-    if (name) words.append(h("strong", {}, name), " ");
-    words.append(what);
-    if (node.is_start) words.append(h("span", { class: "note" }, "start"));
-    words.append(...node.notes.map((note) => h("span", { class: "note" }, note)));
-    const untried = this.#untried.get(node.number ?? node.children[0]?.number ?? -1);
-    const isReaction = node.number === null && node.children.length > 0; // its own row says it
-    if (untried && !isReaction) {
-      words.append(h("span", { class: "note untried" }, icon("warning"), ` not tested: ${untried.join(", ")}`));
-    }
-    row.append(mark, words, h("span", { class: "node-status" }));
-    const item = h("li", { role: "treeitem", "data-form": node.number === null ? "interrupt" : node.form }, row);
-    this.#rows.set(node, item);
-    if (node.children.length > 0) {
-      const inner = h("ul", { role: "group" }, ...node.children.map((child, turn) => this.#row(child, `${path}.${turn}`)));
-      const fold = h("button", { type: "button", class: "fold" }, icon("down"));
-      const show = () => {
-        const folded = this.#folded.has(path);
-        inner.hidden = folded;
-        item.setAttribute("aria-expanded", String(!folded));
-        fold.setAttribute("aria-label", `${folded ? "Show" : "Hide"} the steps of ${name || what}`);
-      };
-      fold.onclick = () => {
-        if (!this.#folded.delete(path)) this.#folded.add(path);
-        show();
-      };
-      show();
-      row.prepend(fold);
-      item.append(inner);
-    }
-    if (node.arrows.length > 0) {
-      item.append(
-        h("ul", { class: "arrows" }, ...node.arrows.map(({ outcome, to }) => h("li", {}, `${outcome || "then"} \u2192 ${to}`))),
-      );
-    }
-    return item;
-  }
-
-  #paint(): void {
-    const seen = this.#seen;
-    if (!seen) return;
-    const active = activeNode(seen.picture, seen.statuses);
-    for (const [node, item] of this.#rows) {
-      const status = statusOf(node, seen.statuses);
-      const isActive = node === active && ACTIVE.has(seen.state);
-      if (item.dataset.status !== status) {
-        item.dataset.status = status;
-        item.querySelector(":scope > .node > .mark")!.replaceChildren(icon(ICONS[status]));
-        setText(item.querySelector(":scope > .node > .node-status")!, WORDS[status]);
-      }
-      if (item.classList.toggle("active", isActive) && isActive && item.dataset.wasActive !== "yes") {
-        item.scrollIntoView({ block: "nearest" });
-      }
-      item.dataset.wasActive = isActive ? "yes" : "";
-    }
-  }
-
-  #showData(): void {
-    const seen = this.#seen!;
-    const rows = Object.entries(seen.data).map(([name, value]) =>
-      h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, shownValue(value))),
-    );
+    this.#tree?.show(seen, this.#tested);
+    this.#data.show(seen.data, this.#mayOperate && ACTIVE.has(seen.state) && seen.state !== "waiting");
     const moves = seen.transitions.slice(-5).map(({ state, to, outcome }) => h("li", {}, `${state} \u2192 ${to} (${outcome})`));
-    this.#data.replaceChildren(
-      h("h2", {}, "Data"),
-      rows.length > 0 ? h("table", {}, ...rows) : h("p", { class: "label" }, "This mission keeps no data."),
-      ...(moves.length > 0 ? [h("h2", {}, "Last transitions"), h("ol", { class: "lines" }, ...moves)] : []),
-    );
+    this.#moves.replaceChildren(...(moves.length > 0 ? [h("h2", {}, "Last transitions"), h("ol", { class: "lines" }, ...moves)] : []));
+    this.#showHead();
   }
 
   #tell(name: Json | undefined, text: Json | undefined, stamp: Json | undefined): void {
@@ -336,9 +286,54 @@ class MissionView {
   }
 }
 
-function stateChip(state: string): HTMLElement {
-  const picture: Icon = state === "paused" ? "pause" : ACTIVE.has(state) ? "play" : state === "failure" ? "cross" : state === "success" ? "check" : "dot";
-  return h("span", { class: "chip", "data-state": state, role: "status" }, icon(picture), formatName(state));
+/** The state of a mission, with what is to be said of it, and the buttons while it runs. They stay: a key may be on one. */
+class Controls {
+  readonly chip = h("span", { class: "chip", role: "status" });
+  readonly says = h("div", { class: "mission-says", role: "status" });
+  readonly buttons = h("div", { class: "row" });
+  readonly #stopped = h("p", { class: "mission-stopped" });
+  readonly #byHand = h("p", {});
+  readonly #hold = h("button", { type: "button" });
+  readonly #step = h("button", { type: "button", title: "Go on to the next step or transition, and stop there" });
+  #isPaused = false;
+  #shown = "";
+
+  constructor(mayOperate: boolean, ask: (request: string, button: HTMLButtonElement) => void) {
+    const cancel = h("button", { type: "button" }, icon("cross"), "Cancel");
+    this.#step.append(icon("step"), "Step");
+    this.#hold.onclick = () => ask(this.#isPaused ? "ResumeMission" : "PauseMission", this.#hold);
+    this.#step.onclick = () => ask("StepMission", this.#step);
+    cancel.onclick = () => ask("CancelMission", cancel);
+    this.buttons.append(this.#hold, this.#step, cancel);
+    this.buttons.hidden = !mayOperate;
+    this.says.append(this.#stopped, this.#byHand);
+  }
+
+  show(state: string, seen: Seen | null): void {
+    const stops = state === "paused" ? (seen?.stopped_at ?? []) : [];
+    const byHand = byHandText(seen?.by_hand ?? 0);
+    const key = JSON.stringify([state, stops, byHand]);
+    if (key === this.#shown) return;
+    this.#shown = key;
+    this.#isPaused = state === "paused";
+    this.chip.dataset.state = state;
+    const word = stops.length > 0 ? "Stopped" : formatName(state);
+    this.chip.replaceChildren(icon(pictureOf(state)), word);
+    this.#stopped.replaceChildren(...(stops.length > 0 ? [icon("pause"), stoppedText(stops)] : []));
+    this.#byHand.replaceChildren(...(byHand ? [icon("warning"), byHand] : []));
+    this.#stopped.hidden = stops.length === 0;
+    this.#byHand.hidden = byHand === "";
+    this.says.hidden = stops.length === 0 && byHand === "";
+    const hold = stops.length > 0 ? "Continue" : this.#isPaused ? "Resume" : "Pause";
+    this.#hold.replaceChildren(icon(this.#isPaused ? "play" : "pause"), hold);
+    this.#step.disabled = state === "waiting";
+  }
+}
+
+function pictureOf(state: string): Icon {
+  if (state === "paused") return "pause";
+  if (ACTIVE.has(state)) return "play";
+  return state === "failure" ? "cross" : state === "success" ? "check" : "dot";
 }
 
 function inputField(name: string, about: string, choices: string[], value: string | null, title = formatName(name)): HTMLElement {

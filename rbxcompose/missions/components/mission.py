@@ -153,7 +153,7 @@ class Mission(Component[MissionConfig]):
         from rbxcompose.missions.execution.ordered import OrderedMission
         from rbxcompose.missions.execution.snapshots import SnapshotStore
         from rbxcompose.missions.execution.topic_skills import Desks
-        from rbxcompose.missions.execution.triggers import Triggering
+        from rbxcompose.missions.execution.triggers import Triggering, TriggerMemory
         from rbxcompose.missions.execution.world import Arrivals, RobotWorld
 
         self.arrivals, self.desks = Arrivals(self.config.values), Desks(self)
@@ -167,12 +167,14 @@ class Mission(Component[MissionConfig]):
             self.end,
         )
         seen = RobotWorld(self, self.arrivals, self.desks, lambda leaf, result: None, lambda event: None)
-        self.triggering = Triggering(self.config.triggers, self.config.names, seen, self)
+        memory = TriggerMemory(self.snapshots.triggers_file)
+        self.triggering = Triggering(self.config.triggers, self.config.names, seen, self, memory)
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
         self.kept: dict[str, requests.RunMission] = {}  # requests by people that began missions that still run
         self.repeated: tuple[Command, ...] = ()  # those, and the breakpoints
         self.left: list[LeftMission] = []  # those that were paused when another executive took over
-        self.trouble = ""  # with snapshots
+        self.trouble = ""  # with what is kept on disk
+        self.restored: dict[str, float] = {}  # wall-clock time of the snapshots of missions that wait for people [s]
         self.shown = ""  # the last reported status
         self.planned: float | None = None  # the last requested wake [s]
         self.misfits: set[str] = set()  # values whose messages have another shape
@@ -228,11 +230,14 @@ class Mission(Component[MissionConfig]):
         snapshot = self.snapshots.read(name, is_latest=True) if policy != RESTART else None
         if snapshot is None:
             return None
+        found = self.snapshots.left_over(name, runs=False)
         try:
             run = self.missions.resumed(name, snapshot, self.now)
         except Refused as refusal:
             self.warn(f"{refusal}; it starts again")
             return None
+        self.snapshots.take_up(name)
+        self.restored[name] = found[0] if found else 0.0
         self.continue_with(run, is_asked=policy == ASK or bool(snapshot["is_paused"]))
         return run
 
@@ -281,9 +286,10 @@ class Mission(Component[MissionConfig]):
             wakes += self.turn(mission)
             if (due := self.snapshots.keep(mission, self.now)) is not None:
                 wakes.append(due)
-        if self.snapshots.trouble != self.trouble and self.snapshots.trouble:
-            self.warn(self.snapshots.trouble)
-        self.trouble = self.snapshots.trouble
+        trouble = self.snapshots.trouble or self.triggering.trouble
+        if trouble != self.trouble and trouble:
+            self.warn(trouble)
+        self.trouble = trouble
         if wakes:
             self.plan(min(wakes))
         self.broadcast.publish(self.missions)
@@ -357,8 +363,9 @@ class Mission(Component[MissionConfig]):
         self.look_soon()
 
     def take_over(self, old: Mission) -> None:
-        """Stay held if the missions were; those that were paused stay where they are."""
+        """Be held if the missions were, leave those that were paused where they are, start nothing that was started."""
         self.is_held = old.is_held  # as the start mission was held
+        self.triggering.take_over(old.triggering)
         self.missions.breakpoints.take_over(old.missions.breakpoints)
         for left in old.left:
             try:
@@ -373,6 +380,7 @@ class Mission(Component[MissionConfig]):
         level = Level.ERROR if end.result == "failure" else Level.WARN if end.doubt else Level.OK
         self.show(level, ": ".join(filter(None, (name, end.result, end.doubt))))
         self.snapshots.drop(name)
+        self.restored.pop(name, None)
         self.keep()
         self.triggering.ended(name, end)
         if name == self.config.start:
@@ -436,6 +444,7 @@ class Mission(Component[MissionConfig]):
         if not run.is_paused:
             raise Refused(f"mission {run.name} is not paused")
         run.resume(self.now)
+        self.restored.pop(run.name, None)
         self.look_soon()
         return self.announce(f"mission {run.name} resumed")
 
@@ -459,6 +468,21 @@ class Mission(Component[MissionConfig]):
         """Return all breakpoints."""
         return self.missions.breakpoints.listed()
 
+    @answers(requests.ListOutcomes)
+    def list_outcomes(self, request: requests.ListOutcomes) -> requests.OutcomesByNode:
+        """Return in which outcomes nodes may be forced to end."""
+        from rbxcompose.missions.execution.debug_views import outcomes_of
+
+        run = self.missions.running(request.mission)
+        return outcomes_of(run.engine.program, run.engine.robot)
+
+    @answers(requests.ListData)
+    def list_data(self, request: requests.ListData) -> tuple[requests.ListedDatum, ...]:
+        """Return the data of a mission that runs."""
+        from rbxcompose.missions.execution.debug_views import data_of
+
+        return tuple(data_of(self.missions.running(request.mission)))
+
     def arm(self, missions: Iterable[str]) -> None:
         """Let missions stop at their breakpoints, and keep these over a crash."""
         for run in self.missions:
@@ -477,6 +501,7 @@ class Mission(Component[MissionConfig]):
         run.intervene(TakeStep(), self.now)
         if run.is_paused:
             run.resume(self.now)
+        self.restored.pop(run.name, None)
         self.look_soon()
         return f"mission {run.name} goes on to its next step"
 
@@ -532,8 +557,27 @@ class Mission(Component[MissionConfig]):
             raise Refused(several if found else "there is no snapshot of a mission that was cut short")
         name, snapshot = next(iter(found.items()))
         run = self.missions.resumed(name, snapshot, self.now)
+        self.snapshots.take_up(name)
         self.keep(requests.RunMission(name, is_repeated=True))
         return self.continue_with(run, is_asked=False)
+
+    @answers(requests.ListSnapshots)
+    def list_snapshots(self, request: requests.ListSnapshots) -> tuple[requests.ListedSnapshot, ...]:
+        """Return the runs that did not end, by a crash or a loss of power."""
+        return tuple(one for name in self.config.programs if (one := self.left_over(name)))
+
+    def left_over(self, name: str) -> requests.ListedSnapshot | None:
+        """Return what is left of a run that did not end, unless it goes on."""
+        from rbxcompose.missions.engine.snapshot import save
+        from rbxcompose.missions.execution.snapshots import described
+
+        program, is_active = self.missions.breakpoints.linked(name), name in self.missions.names
+        if is_active and name in self.restored and (run := self.missions.runs[name]).is_paused and not run.goes_on:
+            return described(name, self.restored[name], save(run.engine), program, waits=True)
+        if (found := self.snapshots.left_over(name, runs=is_active)) is None:
+            return None
+        at, snapshot = found
+        return described(name, at, snapshot["state"], program, changed=self.missions.changed_since(name, snapshot))
 
     @answers(requests.ListMissions)
     def listed(self, request: requests.ListMissions) -> tuple[requests.ListedMission, ...]:

@@ -70,7 +70,11 @@ def _only(where: str, found: list[NodeAddress], what: str, valid: dict[str, None
 
 def _transition(program: Program, state: str, to: str) -> tuple[NodeAddress, ...]:
     every = [
-        (f"{node.name}{ARROW}{target}", node.name == state and target == to, _leaving(node, outcome))
+        (
+            f"{node.name}{ARROW}{target}",
+            state in (node.name, str(node.number)) and target == to,
+            _leaving(node, outcome),
+        )
         for node in program.nodes
         if node.step.leads_to
         for outcome, target in node.step.leads_to.to.items()

@@ -163,6 +163,11 @@ class Debugger:
             if probe.is_pending
         ]
 
+    def outcomes(self) -> dict[int, str]:
+        """Return the outcomes of the nodes that have ended, and whose mission was stopped before it took notice."""
+        probes = self._engine.probes.items()
+        return {number: probe.result[1] or result_word(probe.result[0]) for number, probe in probes if probe.result}
+
     def take_up(self, pending: Sequence[Sequence[Any]]) -> None:
         """Restore what `pending` returned; there are no breakpoints then."""
         if not pending and not self._engine.probes:

@@ -1,7 +1,7 @@
 """The story of a mission: one line of text per event, and how often each skill ended with each result."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import assert_never
 
 from rbxcompose.base.levels import Level
@@ -15,10 +15,14 @@ RESULTS = {"success": Level.OK, "halted": Level.OK, "failure": Level.WARN}
 
 
 class MissionStory:
-    """Tells the story of one mission."""
+    """Tells the story of one mission.
 
-    def __init__(self, mission: str) -> None:
-        self._mission = mission
+    `heading` returns the number and the sentence by which people know a node: `1.2 Go to dock`; empty if it has none.
+    """
+
+    def __init__(self, mission: str, heading: Callable[[int], str] = lambda node: "") -> None:
+        self._mission, self._heading = mission, heading
+        self._named: set[int] = set()  # nodes that were told by their sentence before their skill was started
         self._labels: dict[int, str] = {}  # what each leaf did last: `go_to corner_1`
         self._results: dict[str, Counter[str]] = {}
 
@@ -31,7 +35,7 @@ class MissionStory:
         match event:
             case events.SkillStarted(leaf=leaf, text=text):
                 self._labels[leaf] = text
-                return Level.OK, text
+                return Level.OK, text if leaf in self._named else _told(self._heading(leaf), text)
             case events.SkillEnded(leaf=leaf, skill=skill, result=result, duration=duration, message=message):
                 self._results.setdefault(skill, Counter())[result] += 1
                 text = f"{self._labels.get(leaf, skill)}: {result} ({format_number(round(duration, 1))} s)"
@@ -42,8 +46,9 @@ class MissionStory:
             case events.InterruptEnded(name=name, afterwards=afterwards, back_to=leaves, restarted=restarted):
                 back = " and ".join(self._labels[leaf] for leaf in leaves if leaf in self._labels)
                 return Level.OK, f"interrupt {name} done" + _afterwards(afterwards, back, restarted)
-            case events.NodeStarted(name=name, is_state=is_state):
-                return Level.OK, f"state {name}" if is_state else f"{name} begins"
+            case events.NodeStarted(node=node, name=name, is_state=is_state):
+                self._named.add(node)
+                return Level.OK, self._heading(node) or (f"state {name}" if is_state else f"{name} begins")
             case events.NodeEnded(name=name, result=result, is_state=is_state):
                 return Level.OK, "" if is_state else f"{name}: {result}"
             case events.BranchEnded(name=name, result=result):
@@ -56,7 +61,8 @@ class MissionStory:
                 return LEVELS[level], text
             case events.Reported(place=place, message=message):
                 return Level.WARN, f"{place}: {message}"
-            case events.Stopped(place=place, text=text, after=after):
+            case events.Stopped(node=node, place=place, text=name, after=after):
+                text = self._heading(node) or name
                 return Level.OK, f"stopped at {place}, {f'after {text}: {after}' if after else f'before {text}'}"
             case events.Intervened(text=text):
                 return Level.WARN, f"by hand: {text}; the run cannot be reproduced without this"
@@ -73,6 +79,18 @@ class MissionStory:
             each = ", ".join(f"{results[result]} {result}" for result in sorted(results, key=_usual_first))
             counted.append(f"{skill} {results.total()} ({each})")
         return ", ".join(counted)
+
+
+def _told(heading: str, text: str) -> str:
+    """Return the sentence of a step, and the step itself if it says more, as what a name stands for now."""
+    if not heading:
+        return text
+    words = _plain(heading.partition(" ")[2])  # perhaps with a name, or with what the step is to the one around it
+    return heading if f": {words}".endswith(f": {_plain(text)}") else f"{heading}: {text}"
+
+
+def _plain(text: str) -> str:
+    return text.replace("_", " ").replace("'", "").casefold()
 
 
 def _usual_first(result: str) -> tuple[int, str]:

@@ -47,7 +47,10 @@ class Breakpoints:
     def listed(self) -> tuple[ListedBreakpoint, ...]:
         """Return all of them."""
         return tuple(
-            ListedBreakpoint(mission, where, spots[0].span.place, self._text(mission, spots[0]))
+            ListedBreakpoint(
+                *(mission, where, spots[0].span.place, self._text(mission, spots[0])),
+                spots=tuple((spot.node, spot.outcome) for spot in spots),
+            )
             for mission, found in self._set.items()
             for where, spots in found.items()
         )

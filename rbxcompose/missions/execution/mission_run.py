@@ -25,7 +25,7 @@ from rbxcompose.missions.engine.world import PLAIN, POSE, Settings, World
 from rbxcompose.missions.execution.world import RobotWorld
 from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING, Result
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
-from rbxcompose.missions.view.picture import picture_of
+from rbxcompose.missions.view.picture import Drawn, heading_of, picture_of
 from rbxcompose.missions.view.replica import Mirror
 
 BLOCK = 200  # records that are packed together, into about a tenth of their memory
@@ -112,7 +112,8 @@ class MissionRun:
         self.end: MissionEnded | None = None
         self.began: float | None = None  # [s] of robot time
         self.patient_until: float | None = None  # [s] of the next warning while it waits for its first values
-        self.story = MissionStory(name)
+        self.story = MissionStory(name, self._heading)
+        self.by_hand = 0  # what people did to it: it cannot be reproduced without that
         self.transitions: deque[dict[str, Any]] = deque(maxlen=LAST)
         self.breakpoints = SetBreakpoints()
         self.edition = 0  # how often it was changed while it ran
@@ -133,10 +134,18 @@ class MissionRun:
         return {"time": self._now, "mission": self.name, **record, **step}
 
     @cached_property
-    def _sentences(self) -> Mapping[int, str]:
+    def _drawn(self) -> Mapping[int, Drawn]:
         picture = picture_of(self.engine.program, self.engine.robot)
         drawn = (one for root in picture.roots for one in root.all())
-        return {one.number: f"{one.place} {one.sentence}" for one in drawn if one.number is not None}
+        return {one.number: one for one in drawn if one.number is not None}
+
+    @cached_property
+    def _sentences(self) -> Mapping[int, str]:
+        return {number: f"{one.place} {one.sentence}" for number, one in self._drawn.items()}
+
+    def _heading(self, number: int) -> str:
+        """Return how the story names a node: as `mission show` does."""
+        return heading_of(self._drawn[number], self.engine.program.nodes[number])
 
     @property
     def is_over(self) -> bool:
@@ -244,7 +253,8 @@ class MissionRun:
         self.claims = claims_of(engine.program, engine.robot.skills)
         self.mirror = Mirror(engine, self.mirror.version)
         self._states = (engine.robot.values.keys() | {POSE}) - engine.robot.events
-        self.__dict__.pop("_sentences", None)
+        for cached in ("_drawn", "_sentences"):
+            self.__dict__.pop(cached, None)
         self.edition += 1
         if self.began is not None:
             self._changed(found, breakpoints, now)
@@ -288,10 +298,16 @@ class MissionRun:
 
     @property
     def stopped_at(self) -> list[dict[str, Any]]:
-        """Return the nodes at which a breakpoint or a step has stopped it: number, file and line, and what it is."""
-        nodes = self.engine.program.nodes
+        """Return the nodes at which a breakpoint or a step has stopped it: number, file and line, and what it is.
+
+        `after` is the outcome with which a state was left; it is empty before the start of a node.
+        """
+        nodes, after = self.engine.program.nodes, self.engine.debugger.outcomes()
         stops = () if self.is_over else self.engine.stops
-        return [{"node": at, "place": nodes[at].span.place, "text": named(nodes[at])} for at in stops]
+        return [
+            {"node": at, "place": nodes[at].span.place, "text": named(nodes[at]), "after": after.get(at, "")}
+            for at in stops
+        ]
 
     def abort(self, now: float) -> None:
         """End it from outside."""
@@ -303,13 +319,9 @@ class MissionRun:
 
     def seen(self, since: int = 0) -> dict[str, Any]:
         """Return what has changed since the version that a viewer has; 0 gives the full state."""
-        more = {
-            "state": self.state,
-            "began": self.began,
-            "edition": self.edition,
-            "transitions": list(self.transitions),
-        }
-        return {"mission": self.name, **self.mirror.look(since), **more, "stopped_at": self.stopped_at}
+        run = {"mission": self.name, "state": self.state, "began": self.began, "edition": self.edition}
+        told = {"transitions": list(self.transitions), "stopped_at": self.stopped_at, "by_hand": self.by_hand}
+        return {**run, **self.mirror.look(since), **told}
 
     def _do(self, what: str, call: Callable[[], object], now: float, intervention: Intervention | None = None) -> None:
         """Call the engine, and log what it read during the call."""
@@ -325,6 +337,8 @@ class MissionRun:
         level, text = self.story.line(event)
         if isinstance(event, MissionEnded):
             self.end = event
+        if isinstance(event, Intervened):
+            self.by_hand += 1
         if isinstance(event, Transition):
             self.transitions.append(
                 {

@@ -106,13 +106,17 @@ class RunningMissions:
         if name in self.names:
             raise Refused(f"mission {name} is running: cancel it first")
         linked = link(program, self._equipment.names.missions)
-        if changed := differences(snapshot["identity"], identity_of(linked, self._equipment.names)):
+        if changed := self.changed_since(name, snapshot):
             raise Refused(f"mission {name} cannot go on from its snapshot: {changed} changed since")
         if clash := self._clash(linked, frozenset()):
             raise Refused(clash)
         run = self._made(name, program, from_plain(snapshot["state"]["runs"][0]["inputs"]), PLAIN)
         run.restore(snapshot["state"], now)
         return run
+
+    def changed_since(self, name: str, snapshot: Mapping[str, Any]) -> str:
+        """Return in words what has changed since the snapshot of a mission; empty if it can go on."""
+        return differences(snapshot["identity"], identity_of(self.breakpoints.linked(name), self._equipment.names))
 
     # Other missions and places
 
@@ -199,12 +203,15 @@ class RunningMissions:
         return self._begun(name).seen(since)
 
     def picture(self, name: str) -> PictureData:
-        """Return the picture of a mission, as data.
+        """Return the picture of a mission, as data; of one that has not been running, as it would run.
 
         Raises:
-            Refused: if it has not been running.
+            Refused: if there is none.
         """
-        return _picture(self._begun(name).engine)
+        run = self.runs.get(name)
+        if run is not None:
+            return _picture(run.engine)
+        return picture_to_data(picture_of(self._program(name), self._equipment.names))
 
     def running(
         self, name: str, what: Callable[[MissionRun], bool] = lambda one: True, word: str = "running"
@@ -290,7 +297,7 @@ class RunningMissions:
 
 
 PATH = "missions"
-_TOLD = "version", "state", "transitions", "began", "stopped_at"  # what is news
+_TOLD = "version", "state", "transitions", "began", "stopped_at", "by_hand"  # what is news
 _ALWAYS = frozenset({"mission", "version", "whole", "state"})  # what is in all updates
 
 Open = Callable[[str, Query[Any]], Window]  # takes a path and the query that is made there

@@ -109,12 +109,16 @@ class ClearBreakpoints(Command):
 
 @dataclass(frozen=True, slots=True)
 class ListedBreakpoint:
-    """A breakpoint: the mission, how it was written, its file and line, and what is there."""
+    """A breakpoint: the mission, how it was written, its file and line, and what is there.
+
+    `spots` are the nodes that it concerns, by number, each with the outcome of the transition that is meant, if any.
+    """
 
     mission: str
     where: str
     place: str
     text: str
+    spots: tuple[tuple[int, str | None], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +171,37 @@ class JumpMission(Command):
         return shlex.join(["jump", self.state, *_in(self.mission)])
 
 
+OutcomesByNode = Mapping[str, Sequence[str]]
+"""The outcomes in which nodes may end, by number as text."""
+
+
+@dataclass(frozen=True, slots=True)
+class ListOutcomes(Query[OutcomesByNode]):
+    """Query in which outcomes the nodes of a mission may be forced to end."""
+
+    about = MISSION
+    mission: str
+
+
+@dataclass(frozen=True, slots=True)
+class ListedDatum:
+    """A datum of a mission that runs: what may be written for it, and what is now, as it would be written."""
+
+    name: str
+    about: str
+    choices: tuple[str, ...]
+    text: str | None
+    """None if its value cannot be written, as a list of steps."""
+
+
+@dataclass(frozen=True, slots=True)
+class ListData(Query[tuple[ListedDatum, ...]]):
+    """Query the data of a mission that runs, as `SetMissionData` takes them."""
+
+    about = MISSION
+    mission: str
+
+
 def _in(mission: str) -> list[str]:
     return ["--mission", mission] if mission else []
 
@@ -205,10 +240,34 @@ class ListMissions(Query[tuple[ListedMission, ...]]):
 
 
 @dataclass(frozen=True, slots=True)
+class ListedSnapshot:
+    """A run that did not end since its process crashed or the machine lost power, from the snapshot that is left of it.
+
+    `at` is the wall-clock time of the snapshot [s since the Unix epoch], `doing` what ran then, `inputs` what it was
+    given, and `changed` what has changed since, so that it cannot go on. It `waits` if it is restored and paused.
+    """
+
+    mission: str
+    at: float
+    doing: str
+    inputs: Mapping[str, str]
+    changed: str = ""
+    waits: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ListSnapshots(Query[tuple[ListedSnapshot, ...]]):
+    """Query the runs that did not end and may go on."""
+
+    about = MISSION
+
+
+@dataclass(frozen=True, slots=True)
 class ListedTrigger:
     """A trigger: its cause in words, when a wall clock shows its next time and showed its last start, if any.
 
-    It waits if it has fired and missions that run are in the way of its own.
+    It waits if it has fired and missions that run are in the way of its own. `fired` is when it last did, also if it
+    started nothing, and `came` what came of that. `off` is why it starts nothing now; empty if it does.
     """
 
     name: str
@@ -219,6 +278,9 @@ class ListedTrigger:
     next: str = ""
     last: str = ""
     waits: bool = False
+    fired: str = ""
+    came: str = ""
+    off: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,7 +292,7 @@ class ListTriggers(Query[tuple[ListedTrigger, ...]]):
 
 @dataclass(frozen=True, slots=True)
 class ShowPicture(Query[PictureData]):
-    """Ask for the picture of a mission that has been running."""
+    """Ask for the picture of a mission."""
 
     about = MISSION
     mission: str

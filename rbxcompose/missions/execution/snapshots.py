@@ -7,16 +7,19 @@ It is not flushed to disk, which would take longer than all the rest: a power fa
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from rbxcompose.base.files import TEMPORARY, state_folder
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.missions.engine.debugger import named
 from rbxcompose.missions.engine.engine import Engine
-from rbxcompose.missions.engine.snapshot import save, to_plain
+from rbxcompose.missions.engine.snapshot import from_plain, save, to_plain
+from rbxcompose.missions.execution.debug_views import written
 from rbxcompose.missions.execution.mission_run import MissionRun
+from rbxcompose.missions.execution.requests import ListedSnapshot
 from rbxcompose.missions.program.outcomes import RUNNING
 from rbxcompose.missions.program.program import Program, RobotNames
 
@@ -56,12 +59,19 @@ class SnapshotStore:
 
     def read(self, mission: str, *, is_latest: bool = False) -> Mapping[str, Any] | None:
         """Return the snapshot of a mission that did not end: of the latest run, else of one before."""
-        for aside in ("",) if is_latest else ("", _ASIDE):
+        found = next(self._found(mission, ("",) if is_latest else ("", _ASIDE)), None)
+        return found[1] if found else None
+
+    def left_over(self, mission: str, *, runs: bool) -> tuple[float, Mapping[str, Any]] | None:
+        """Return the time and the content of the snapshot of a run that did not end; that of one that runs is none."""
+        return next(self._found(mission, (_ASIDE,) if runs else ("", _ASIDE)), None)
+
+    def _found(self, mission: str, asides: Iterable[str]) -> Iterator[tuple[float, Mapping[str, Any]]]:
+        for path in (self._path(mission, aside) for aside in asides if self._folder):
             with suppress(OSError, ValueError):
-                content = json.loads(self._path(mission, aside).read_bytes()) if self._folder else None
+                content = json.loads(path.read_bytes())
                 if isinstance(content, dict) and content.get("version") == VERSION:
-                    return content
-        return None
+                    yield path.stat().st_mtime, content
 
     def drop(self, mission: str) -> None:
         """Forget the snapshot of a mission that has ended."""
@@ -71,11 +81,26 @@ class SnapshotStore:
             with suppress(OSError):
                 self._path(mission).unlink()
 
+    def take_up(self, mission: str) -> None:
+        """Let the snapshot that a mission goes on from be that of its run, so that nobody goes on from it twice."""
+        if self._folder:
+            latest, aside = self._path(mission), self._path(mission, _ASIDE)
+            with suppress(OSError):
+                if latest.exists():
+                    aside.unlink()
+                else:
+                    os.replace(aside, latest)
+
     def set_aside(self, mission: str) -> None:
         """Keep the snapshot of a run that did not end for whoever asks for it, since a new run begins."""
         if self._folder:
             with suppress(OSError):
                 os.replace(self._path(mission), self._path(mission, _ASIDE))
+
+    @property
+    def triggers_file(self) -> Path | None:
+        """Return where what is known of triggers is kept; no mission has this name."""
+        return None if self._folder is None else self._folder / "-triggers.json"
 
     def _path(self, mission: str, aside: str = "") -> Path:
         return (self._folder or Path()) / f"{mission}{aside}.json"
@@ -89,6 +114,18 @@ class SnapshotStore:
             self.trouble = ""
         except OSError as error:
             self.trouble = f"snapshots cannot be written: {error.strerror}"
+
+
+def described(
+    mission: str, at: float, state: Mapping[str, Any], program: Program, *, changed: str = "", waits: bool = False
+) -> ListedSnapshot:
+    """Return what people are told of the state of a run that did not end; `program` is the linked mission."""
+    given = {} if changed else from_plain(state["runs"][0]["inputs"])
+    texts = {name: written(value, program.inputs[name].type) for name, value in given.items() if name in program.inputs}
+    running = zip(program.nodes, () if changed else state["statuses"], strict=False)
+    leaves = dict.fromkeys(named(node) for node, status in running if status == RUNNING and not node.children)
+    inputs = {name: text for name, text in texts.items() if text is not None}
+    return ListedSnapshot(mission, at, " and ".join(leaves), inputs, changed, waits)
 
 
 def identity_of(program: Program, robot: RobotNames) -> dict[str, str]:

@@ -66,6 +66,7 @@ class Triggers:
         self._done: dict[str, deque[float]] = {name: deque(maxlen=_REMEMBERED) for name in triggers}
         self._next_due: dict[str, tuple[float, float | None]] = {}  # by trigger: a time, and what is due next after it
         self._held: dict[str, bool] = {}  # whether the condition of a trigger held
+        self._holds_at_first = False  # whether a condition of which nothing is known counts as one that has held
         self._fired_at: dict[str, float] = {}  # robot time
         self._hasty: set[str] = set()  # those of which it was told that they fired too soon again
         self._open: dict[str, _Fired] = {}
@@ -76,6 +77,22 @@ class Triggers:
     def waiting(self) -> list[str]:
         """Return the triggers whose missions wait for their turn, in the order in which they get it."""
         return [one.trigger.name for one in sorted(self._open.values(), key=lambda one: one.order)]
+
+    # When it takes the place of others
+
+    @property
+    def held(self) -> Mapping[str, bool]:
+        """Return whether the conditions of triggers held, by name."""
+        return self._held
+
+    def recall(self, held: Mapping[str, bool], started: Mapping[str, float]) -> None:
+        """Go on from what others knew, so that what they have answered to causes nothing again."""
+        self._held.update(held)
+        self.started.update(started)
+
+    def begin_again(self) -> None:
+        """Take a condition of which nothing is known for one that held before: better late than twice."""
+        self._holds_at_first = True
 
     # What happens
 
@@ -106,7 +123,7 @@ class Triggers:
 
     def condition(self, name: str, holds: bool, now: float, effects: Effects, *, after: bool | None = None) -> None:
         """Fire a trigger whose condition has begun to hold; `after` is whether it still does, if that may differ."""
-        before, self._held[name] = self._held.get(name, False), holds if after is None else after
+        before, self._held[name] = self._held.get(name, self._holds_at_first), holds if after is None else after
         if holds and not before:
             self._fire((self._triggers[name],), now, effects)
 

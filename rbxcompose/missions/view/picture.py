@@ -158,6 +158,13 @@ def _sentence(sketch: _Sketch, node: MissionNode, before: str, name: str) -> str
     return ": ".join(f"{part[0].upper()}{part[1:]}" if part is said else part for part in (before, title, said) if part)
 
 
+def heading_of(drawn: Drawn, node: MissionNode) -> str:
+    """Return the number and the sentence of a node without its modifiers, and of a state without where it leads."""
+    clauses = sum(bool(modifier.clause()) for modifier in node.modifiers.values())
+    words = drawn.sentence.rsplit("; ", clauses)[0] if clauses else drawn.sentence
+    return f"{drawn.place} {words.partition(' (')[0] if node.step.look.form == Form.STATE else words}"
+
+
 def _roles(linked: Program, node: MissionNode) -> Sequence[str]:
     """Return what each child is to its node: the key under which it was written, where that is worth showing."""
     written = [linked.nodes[child].path.removeprefix(node.path).strip(".").partition(".")[0] for child in node.children]

@@ -177,6 +177,8 @@ class Host:
         self.has_started = True
         self._deliveries.start()
         self._each_active("start")
+        for hosted in self.hosted.values():
+            hosted.note_start()
 
     def shutdown(self) -> None:
         """Deactivate and clean up in reverse order; a component that raises does not affect the others."""

@@ -246,6 +246,7 @@ class InstanceHome(Protocol):
     is_stopped: bool
     is_held: bool
     is_braking: bool
+    is_restart: bool
     has_started: bool
     doing: str
 
@@ -297,6 +298,8 @@ class Hosted:
         self._ends: dict[str, Any] = {}  # of the ports, on the bus
         self._claiming: list[Any] = []  # those ports that serve an action which claims a part of the robot
         self._repeated: Sequence[Command] = ()  # requests that it gets again after a restart in place
+        self.is_again = False  # the component was already started since the robot came up
+        self._was_started = False
         self._wakes: set[float] = set()  # robot times [s] at which to wake the component
 
     @property
@@ -310,6 +313,7 @@ class Hosted:
         """Create the component, bind its ports, and configure it."""
         cls = component_type(self.instance.type)
         self.worker = self.host.worker(self.instance.name, cls.configures_within) if cls.blocking else None
+        self.is_again = self.host.is_restart or self._was_started
         made = cls(self.instance.name, self.config, self if self.worker is None else HandedOver(self, self.worker))
         self.component = made
         self.host.statuses.forget_tasks(self.instance.name)
@@ -365,9 +369,14 @@ class Hosted:
             self.do("brake", component.brake)
         if self.host.has_started:
             self.do("start", component.start)
+            self.note_start()
             for request in self._repeated:
                 self.do("command", partial(self._repeat, component, request))
         self.host.bus.open(self.instance.name)  # those who found it before it was active have waited
+
+    def note_start(self) -> None:
+        """Note that the component, if it is active, was told of the start."""
+        self._was_started = self._was_started or self.state is Lifecycle.ACTIVE
 
     def _step_with(self, component: Component[Any], rate: float) -> None:
         scheduler, owner, period, step = self.host.scheduler, self.instance.name, 1.0 / rate, component.step

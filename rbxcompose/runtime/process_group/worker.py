@@ -285,6 +285,11 @@ class HandedOver:
         return self._context.is_stopped
 
     @property
+    def is_again(self) -> bool:
+        """Return whether the component was already started since the robot came up."""
+        return self._context.is_again
+
+    @property
     def is_over(self) -> bool:
         """Return whether nobody waits any more for the call that runs."""
         return self._worker.is_closed

@@ -88,7 +88,7 @@ class Conductor:
         member = self.members[name]
         member.forked(self._scheduler.now)
         member.is_stopped = self.is_stopped
-        self._effects.fork(name, is_restart=member.restarts > 0, is_stopped=self.is_stopped)
+        self._effects.fork(name, is_restart=member.was_started, is_stopped=self.is_stopped)
         if self.generation:  # the pre-fork parent knows only the first plan
             self._effects.send(name, messages.Adopt(text_of(self.plan, self.plan.of_group(name))))
         if name == self._router or self.endpoint is not None:
@@ -130,7 +130,7 @@ class Conductor:
 
     def _start(self, member: Member) -> None:
         if not member.is_started and not member.is_given_up:
-            member.is_started = True
+            member.is_started = member.was_started = True
             self._effects.send(member.name, messages.Start())
             for text, request in self.kept.repeated(self.plan.of_group(member.name) if member.restarts else ()):
                 self._effects.send(member.name, messages.Ask(0, text, request))  # nobody waits for the answer

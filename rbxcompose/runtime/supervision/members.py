@@ -89,6 +89,7 @@ class Member:
     is_there: bool = False
     is_configured: bool = False
     is_started: bool = False
+    was_started: bool = False  # before it was restarted, too
     is_at_rest: bool = False
     is_reported_lost: bool = False
     is_closing: bool = False

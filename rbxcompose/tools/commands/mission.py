@@ -189,14 +189,15 @@ def _triggers(arguments: argparse.Namespace) -> int:
     if arguments.json:
         emit(json.dumps(to_data(found)))
         return 0
-    head = ("trigger", "cause", "mission", "priority", "if one runs", "next", "last start")
+    head = ("trigger", "cause", "mission", "priority", "if one runs", "next", "last start", "what came of it")
     rows = [(*(one.name, one.cause, one.mission, str(one.priority), one.running), *_times_of(one)) for one in found]
     emit(table([head, *rows]) if rows else "this robot has no triggers")
     return 0
 
 
-def _times_of(one: requests.ListedTrigger) -> tuple[str, str]:
-    return ("waits for its turn" if one.waits else one.next or "-"), one.last or "-"
+def _times_of(one: requests.ListedTrigger) -> tuple[str, str, str]:
+    due = f"off: {one.off}" if one.off else "waits for its turn" if one.waits else one.next or "-"
+    return due, one.last or "-", one.came or "-"
 
 
 def _chosen(arguments: argparse.Namespace) -> str:

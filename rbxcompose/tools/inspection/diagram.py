@@ -10,11 +10,13 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.bus.names import ActionNames, data_key, resolve
 from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, RobotMission
+from rbxcompose.compiler.model.triggers import triggers_of
 from rbxcompose.compiler.plan.model import BusPlan
 from rbxcompose.domains.muxes.sections.muxes import muxes
 from rbxcompose.missions.analysis.effects import sent_by
 from rbxcompose.missions.engine.world import POSE
 from rbxcompose.missions.sources import SkillWay
+from rbxcompose.missions.triggers.trigger import Trigger
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalStatusArray
 from rbxcompose.msgs.types import Interface
 from rbxcompose.sdk.capabilities import Forwards
@@ -91,6 +93,7 @@ class WireContent(StrEnum):
     SERVICE = "service"
     ACTION = "action"
     LOOK_UP = "look-up"
+    TRIGGER = "trigger"
 
 
 # How a mission reaches its skills; those in Python run inside it.
@@ -119,7 +122,10 @@ class Tip:
 
 @dataclass(frozen=True, slots=True)
 class DiagramWire:
-    """A topic, service or action: from those that send or request to those that receive or respond."""
+    """A topic, service or action: from those that send or request to those that receive or respond.
+
+    A trigger leads to the mission that it starts, from the one whose end does so, if any; its type is its cause.
+    """
 
     name: str
     kind: WireContent
@@ -132,7 +138,7 @@ class DiagramWire:
     @property
     def short_type(self) -> str:
         """Return the type without its package."""
-        return self.type.rpartition("/")[2]
+        return self.type if self.kind is WireContent.TRIGGER else self.type.rpartition("/")[2]
 
     @property
     def note(self) -> str:
@@ -254,9 +260,13 @@ def _wires(robot: Robot) -> Iterator[DiagramWire]:
                 _add(robot, component, end, found)
     for name in _programs(robot):
         _add_mission(robot, robot.missions[name], key_of(name), found)
+    if MISSION in robot.components:
+        for trigger in triggers_of(robot).values():
+            _add_trigger(robot, trigger, found)
     _add_look_ups(robot, found)
     for (kind, topic), wire in sorted(found.items(), key=lambda item: ([*WireContent].index(item[0][0]), item[0][1])):
         about = "every component reports its status here" if topic == STATUSES else ""
+        about = "by itself" if kind is WireContent.TRIGGER else about
         yield DiagramWire(topic, kind, wire.type, wire.qos, tuple(wire.sources), tuple(wire.targets), about)
 
 
@@ -319,6 +329,22 @@ def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tupl
         receive(value.topic, value.message, f"${name}")
 
 
+def _add_trigger(robot: Robot, trigger: Trigger, found: dict[tuple[WireContent, str], _Open]) -> None:
+    """Add a line to the mission that a trigger starts, and let the topics that it needs end there, too."""
+    key = key_of(trigger.mission)
+    sources = [Tip(key_of(trigger.ends))] if trigger.ends else []
+    note = f"priority {trigger.priority}" if trigger.priority else ""
+    line = _Open(WireContent.TRIGGER, trigger.cause, sources=sources, targets=[Tip(key, note)])
+    found[WireContent.TRIGGER, trigger.name] = line
+    needed = [(robot.values[name].topic, robot.values[name].message) for name in sorted(trigger.reads)]
+    if trigger.topic:
+        needed.append((resolve(trigger.topic, robot.manifest.bus.namespace or ""), trigger.message))
+    for topic, message in needed:
+        wire = found.setdefault((WireContent.TOPIC, topic), _Open(WireContent.TOPIC, message))
+        if key not in [tip.box for tip in wire.targets]:
+            wire.targets.append(Tip(key, f"trigger {trigger.name}"))
+
+
 def _add_look_ups(robot: Robot, found: dict[tuple[WireContent, str], _Open]) -> None:
     """Draw a line of its own kind from each topic of transforms to those that look something up."""
     boxes = [
@@ -339,6 +365,7 @@ _DOT_STYLES = {
     WireContent.SERVICE: 'style=dashed color="#1a7f37"',
     WireContent.ACTION: 'style=bold penwidth=2.2 color="#8250df"',
     WireContent.LOOK_UP: 'style=dotted color="#6e7781" arrowhead=odot',
+    WireContent.TRIGGER: 'style=solid color="#bf3989" arrowhead=dot',
 }
 _DOT_SHAPES = {BoxShape.COMPONENT: "box", BoxShape.MUX: "hexagon", BoxShape.PROGRAM: "note"}
 
@@ -350,7 +377,7 @@ def dot(diagram: Diagram) -> str:
 
 def _dot_lines(diagram: Diagram) -> Iterator[str]:
     yield f"digraph {_quoted(diagram.robot)} {{"
-    yield "  // topics solid, services dashed, actions bold, look-ups of transforms dotted"
+    yield "  // topics solid, services dashed, actions bold, look-ups of transforms dotted, triggers with a dot"
     yield '  graph [rankdir=LR fontname="sans-serif" nodesep=0.35 ranksep=0.7]'
     yield '  node [fontname="sans-serif" fontsize=11 style=rounded]'
     yield '  edge [fontname="sans-serif" fontsize=9]'
@@ -402,6 +429,7 @@ _MERMAID_ARROWS = {
     WireContent.SERVICE: "-.->",
     WireContent.ACTION: "==>",
     WireContent.LOOK_UP: "-.-o",
+    WireContent.TRIGGER: "--o",
 }
 _MERMAID_SHAPES = {BoxShape.COMPONENT: ("[", "]"), BoxShape.MUX: ("{{", "}}"), BoxShape.PROGRAM: ("([", "])")}
 
@@ -414,7 +442,7 @@ def mermaid(diagram: Diagram) -> str:
 def _mermaid_lines(diagram: Diagram) -> Iterator[str]:
     ids = {box.key: f"b{index}" for index, box in enumerate(diagram.boxes)}
     yield "flowchart LR"
-    yield "  %% topics -->, services -.->, actions ==>, look-ups of transforms -.-o"
+    yield "  %% topics -->, services -.->, actions ==>, look-ups of transforms -.-o, triggers --o"
     for index, group in enumerate(diagram.groups):
         yield f'  subgraph p{index}["process {group}"]'
         yield from (f"    {_mermaid_box(box, ids, diagram.start)}" for box in diagram.of_group(group))
@@ -435,7 +463,8 @@ def _mermaid_box(box: Box, ids: dict[str, str], start: str) -> str:
 
 def _mermaid_wire(wire: DiagramWire, key: str, ids: dict[str, str]) -> Iterator[str]:
     """Yield an arrow with a label; a wire with several ends, or none at one side, has a node of its own."""
-    arrow, label = _MERMAID_ARROWS[wire.kind], f"{wire.name}<br/>{wire.short_type}"
+    shown = wire.short_type.replace('"', "#quot;").replace("<", "#lt;")  # of a condition
+    arrow, label = _MERMAID_ARROWS[wire.kind], f"{wire.name}<br/>{shown}"
     if wire.is_pair:
         [source], [target] = wire.sources, wire.targets
         note = f"<br/>{target.note}" if target.note else ""

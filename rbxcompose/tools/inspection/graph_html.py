@@ -8,9 +8,9 @@ from rbxcompose.tools.inspection.diagram import Box, BoxShape, Diagram, DiagramW
 
 STYLE = """
 :root{--page:#fff;--text:#1f2328;--soft:#59636e;--edge:#d0d7de;--group:#f6f8fa;--body:#fff;
---topic:#0969da;--service:#1a7f37;--action:#8250df;--look:#818b98;--mux:#bc4c00}
+--topic:#0969da;--service:#1a7f37;--action:#8250df;--look:#818b98;--trigger:#bf3989;--mux:#bc4c00}
 @media(prefers-color-scheme:dark){:root{--page:#0d1117;--text:#e6edf3;--soft:#9198a1;--edge:#3d444d;--group:#151b23;
---body:#212830;--topic:#4493f8;--service:#3fb950;--action:#ab7df8;--look:#818b98;--mux:#f0883e}}
+--body:#212830;--topic:#4493f8;--service:#3fb950;--action:#ab7df8;--look:#818b98;--trigger:#f778ba;--mux:#f0883e}}
 *{box-sizing:border-box}body{margin:0;padding:20px 24px;background:var(--page);color:var(--text);
 font:14px/1.45 system-ui,sans-serif}
 h1{margin:0;font-size:22px}h2{font-size:16px;margin:24px 0 8px}header p{margin:2px 0 10px;color:var(--soft)}
@@ -29,9 +29,10 @@ svg text.topic{font-size:11.5px}svg text.process{text-anchor:start;fill:var(--so
 .pill{fill:var(--page);stroke:var(--edge)}.open .pill{stroke-dasharray:4 3}
 .line{fill:none;stroke-width:1.5}.run{stroke:var(--soft)}
 .topic .pill{stroke:var(--topic)}.service .pill{stroke:var(--service)}.action .pill{stroke:var(--action)}
-.look-up .pill{stroke:var(--look)}
+.look-up .pill{stroke:var(--look)}.trigger .pill{stroke:var(--trigger)}
 .line.topic{stroke:var(--topic)}.line.service{stroke:var(--service);stroke-dasharray:7 4}
 .line.action{stroke:var(--action);stroke-width:2.6}.line.look-up{stroke:var(--look);stroke-dasharray:1.5 4}
+.line.trigger{stroke:var(--trigger)}
 .box{cursor:pointer;outline:none}.box:focus .body{stroke-width:2.6}
 .faded .wire:not(.near),.faded .box:not(.near),.faded .run:not(.near){opacity:.13}
 .hidden{display:none}
