@@ -20,6 +20,7 @@ import { activeStates, machinesAround } from "./machines";
 import { isSeen, type Seen } from "./mission";
 import { OutlineView, type Operation } from "./outline";
 import type { Robot } from "./page";
+import { LiveChanges } from "./live_changes";
 import { LostError, type Message } from "./rosbridge";
 import { ReadView, type Sentence } from "./read_view";
 import { Palette, StepForm, type Form, type Offered } from "./step_form";
@@ -60,6 +61,7 @@ export class MissionEditor {
   readonly #try = button("play", "Dry run", () => void this.#run("try"));
   readonly #test = button("check", "Test", () => void this.#run("test"));
   readonly #trial = h("div", {});
+  readonly #live: LiveChanges;
   readonly #closers: (() => void)[] = [];
   readonly #outline = new OutlineView(
     (operation) => void this.#change(operation),
@@ -98,6 +100,7 @@ export class MissionEditor {
 
   constructor(robot: Robot, mission: string, done: () => void) {
     this.#robot = robot;
+    this.#live = new LiveChanges(robot);
     this.#mission = mission;
     this.#done = done;
     this.element.append(emptyCard("wait", "Reading the mission\u2026"));
@@ -138,6 +141,7 @@ export class MissionEditor {
       setText(this.#file, `${this.#mission} in ${read.file}${why ? `: ${why}` : ""}`);
       this.#draw();
       void this.#fillPalette();
+      void this.#live.look();
       if (!draft) this.#show(read);
       this.#mayUndo();
     } catch (error) {
@@ -154,7 +158,7 @@ export class MissionEditor {
   #draw(): void {
     const close = button("cross", "Close", this.#done);
     const bar = h("div", { class: "editor-bar" }, this.#undo, this.#redo, this.#save, this.#try, this.#test, this.#verdict, close);
-    this.element.replaceChildren(bar, this.#file, this.#says, this.#panes, this.#list, this.#trial, this.#tools);
+    this.element.replaceChildren(bar, this.#file, this.#says, this.#live.element, this.#panes, this.#list, this.#trial, this.#tools);
     this.#tools.replaceChildren(this.#palette.element, this.#form.element);
     const views = (Object.keys(VIEWS) as View[]).map((view) => {
       const choose = h("button", { type: "button" }, VIEWS[view]);
@@ -422,7 +426,8 @@ export class MissionEditor {
     this.#hash = done.hash;
     this.#saved = text;
     this.#keepDraft();
-    setText(this.#says, `Saved in '${done.file}'. The robot runs it after 'rbxcompose apply', or when it comes up again.`);
+    setText(this.#says, `Saved in '${done.file}'.`);
+    void this.#live.look();
   }
 
   #notSaved(error: Error): void {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,38 @@ from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.console.models import CandidateModels
 from rbxcompose.tools.robot_editor.editor import ROBOT_REQUESTS, RobotEditor
 from tests.console.fake_gateway import CONFIG, FakeGateway
+
+
+class LiveText:
+    """A robot that runs with a text, and what a page asks about it; `text` is what is saved."""
+
+    def __init__(self, gateway: FakeGateway, text: Callable[[], str]) -> None:
+        self.text, self.runs_with = text, text()
+        self.why_not = ""  # why it cannot be changed now
+        for name, what in (("compare", self.compare), ("apply", self.apply), ("revert", self.revert)):
+            gateway.answers[f"/console/robot/{name}"] = what
+
+    def compare(self, given: dict[str, Any]) -> dict[str, Any]:
+        reasons = [{"key": "places.dock.x", "before": "0 m", "after": "0.5 m"}]
+        mission = {"name": "mission", "fate": "changed live", "reasons": reasons}
+        is_same = self.runs_with == self.text()
+        answer = {
+            "generation": 3,
+            "is_empty": is_same,
+            "why_not": "" if is_same else self.why_not,
+            "components": [] if is_same else [mission],
+            "said": [] if is_same else ["mission patrol goes on where it is"],
+        }
+        return {"success": True, "message": "", "answer": answer}
+
+    def apply(self, given: dict[str, Any]) -> dict[str, Any]:
+        assert given == {"generation": 3}
+        self.before, self.runs_with = self.runs_with, self.text()
+        return {"success": True, "message": "", "answer": {"text": "mission changed live", "generation": 3}}
+
+    def revert(self, given: dict[str, Any]) -> dict[str, Any]:
+        self.runs_with = self.before
+        return {"success": True, "message": "", "answer": {"text": "mission changed live"}}
 
 
 class EditedProject:
@@ -27,38 +60,13 @@ class EditedProject:
         gateway.config = {**CONFIG, **gateway.config, "role": "configure"}
         for name in ROBOT_REQUESTS:
             gateway.answers[f"/console/robot/{name}"] = self._answering(name)
-        self.runs_with = robot  # the text that the running robot was compiled from
-        self.why_not = ""  # why the running robot cannot be changed now
-        for name, what in (("compare", self._compare), ("apply", self._apply), ("revert", self._revert)):
-            gateway.answers[f"/console/robot/{name}"] = what
+        self.live = LiveText(gateway, self.text)
 
     def compiled(self, unsaved: Any) -> Any:
         return compile_robot(str(self.robot), environment=os.environ, unsaved=unsaved, tries_profiles=False)
 
     def text(self, file: str = "robots/fetcher/robot.yaml") -> str:
         return (self.folder / file).read_text(encoding="utf-8")
-
-    def _compare(self, given: dict[str, Any]) -> dict[str, Any]:
-        reasons = [{"key": "places.dock.x", "before": "0 m", "after": "0.5 m"}]
-        mission = {"name": "mission", "fate": "changed live", "reasons": reasons}
-        is_same = self.runs_with == self.text()
-        answer = {
-            "generation": 3,
-            "is_empty": is_same,
-            "why_not": "" if is_same else self.why_not,
-            "components": [] if is_same else [mission],
-            "said": [] if is_same else ["mission patrol goes on where it is"],
-        }
-        return {"success": True, "message": "", "answer": answer}
-
-    def _apply(self, given: dict[str, Any]) -> dict[str, Any]:
-        assert given == {"generation": 3}
-        self.before, self.runs_with = self.runs_with, self.text()
-        return {"success": True, "message": "", "answer": {"text": "mission changed live", "generation": 3}}
-
-    def _revert(self, given: dict[str, Any]) -> dict[str, Any]:
-        self.runs_with = self.before
-        return {"success": True, "message": "", "answer": {"text": "mission changed live"}}
 
     def _answering(self, name: str) -> Any:
         def answer(given: dict[str, Any]) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from rbxcompose.base.requests import Refused
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.tools.mission_editor.editor import REQUESTS, MissionEditor
 from tests.console.browser import CHROMIUM
+from tests.console.edited_robot import LiveText
 from tests.console.fake_gateway import CONFIG, FakeGateway
 from tests.console.looks import PHONE, WIDE, expect_fit, violations
 from tests.mission_editor.test_editor import FETCH, ROBOT
@@ -38,6 +39,7 @@ class Project:
             file.parent.mkdir(parents=True)
             file.write_text(text, encoding="utf-8")
         self.editor = MissionEditor(self.compiled, self.robot)
+        self.live = LiveText(gateway, self.text)
         for do in REQUESTS:
             gateway.answers[f"/console/mission/{do}"] = partial(self.answer, do)
         plain = {"about": "Fetch it.", "claims": [], "inputs": [], "starts": []}
@@ -361,3 +363,18 @@ def test_a_new_mission_is_made_from_a_template_and_opened(open_page: Callable[..
     expect(page.get_by_text("bring in missions/bring.yaml")).to_be_visible()
     expect(block(page, "Delivered")).to_be_visible()
     expect(page.get_by_text("No mistakes")).to_be_visible()
+
+
+def test_a_mission_that_was_saved_is_brought_to_the_robot_while_it_runs(
+    open_page: Callable[..., Page], project: Project
+) -> None:
+    page = edits(open_page(page_name="mission"))
+    types(page, "2 s", "3 s")
+    page.get_by_role("button", name="Save").click()
+    page.get_by_role("button", name="Write it").click()
+    page.get_by_role("button", name="Change the running robot").click()
+    dialog = page.get_by_role("dialog")
+    expect(dialog.get_by_role("list", name="What happens to what runs")).to_contain_text("goes on where it is")
+    dialog.get_by_role("button", name="Change it").click()
+    expect(page.get_by_text("The robot is changed.")).to_be_visible()
+    assert project.live.runs_with == project.text() != FETCH

@@ -104,20 +104,20 @@ def test_what_was_saved_is_brought_to_the_robot_that_runs_and_taken_back(
     shows(page, "places_apply")
     dialog.get_by_role("button", name="Change it").click()
     expect(page.get_by_text("The robot is changed.")).to_be_visible()
-    assert project.runs_with == project.text() != ROBOT
+    assert project.live.runs_with == project.text() != ROBOT
     page.get_by_role("button", name="Take it back").click()
     expect(page.get_by_text("The robot runs as before; the files stay as they are.")).to_be_visible()
-    assert project.runs_with == ROBOT != project.text()
+    assert project.live.runs_with == ROBOT != project.text()
 
 
 def test_why_the_robot_cannot_be_changed_now_is_told(open_page: Callable[..., Page], project: EditedProject) -> None:
-    project.why_not = "'base' moves"
+    project.live.why_not = "'base' moves"
     page = open_page(page_name="map")
     edits(page)
     drag(page, at(page, 0.0, 0.0), at(page, 0.5, 0.0))
     saves(page)
     expect(page.get_by_text("Not now: 'base' moves.")).to_be_visible()
-    project.why_not = ""
+    project.live.why_not = ""
     page.get_by_role("button", name="Change the running robot").click()  # it looks again
     expect(page.get_by_text("Not now")).to_be_hidden()
 

@@ -121,7 +121,7 @@ class Triggering:
         executive: Executive,
         kept: TriggerMemory,
     ) -> None:
-        self._triggers, self._values, self._executive = triggers, values, executive
+        self._triggers, self._executive = triggers, executive
         self._local = local_time if executive.context.clock.is_real else universal_time
         self.core = Triggers(triggers, self._local)
         self._scopes = {name: _scope(one, names, values) for name, one in triggers.items() if one.when}
@@ -143,6 +143,7 @@ class Triggering:
 
     def follow(self, names: RobotNames) -> None:
         """Let conditions see other places of the robot."""
+        self._names = names
         for name, before in self._scopes.items():
             self._scopes[name] = _scope(self._triggers[name], names, self._values)
             self._scopes[name].seen = before.seen
