@@ -24,6 +24,7 @@ import { LiveChanges } from "./live_changes";
 import { LostError, type Message } from "./rosbridge";
 import { ReadView, type Sentence } from "./read_view";
 import { Palette, StepForm, type Form, type Offered } from "./step_form";
+import { Replay, type Statuses } from "./replay";
 import { showDryRun, showTests, type DryRun, type TestReport } from "./trial";
 import type { TextEditor } from "./text_editor";
 import "./mission_editor.css";
@@ -88,6 +89,7 @@ export class MissionEditor {
   #wanted: Path | null = null; // the block to choose in the next outline
   #isChanging = false;
   #isTrying = false;
+  #replay: Replay | null = null;
   #ran: { text: string; run: DryRun } | null = null; // the last dry run, and the text that ran
   #saved = "";
   #hash = "";
@@ -113,6 +115,7 @@ export class MissionEditor {
     clearTimeout(this.#timer);
     clearTimeout(this.#formTimer);
     this.#stopLooking();
+    this.#replay?.close();
     for (const close of this.#closers) close();
     this.#keepDraft();
     this.#text?.close();
@@ -268,7 +271,7 @@ export class MissionEditor {
     if (looked.outline) {
       this.#outline.show(looked.outline, this.#wanted, this.#text!.cursor);
       this.#wanted = null;
-      this.#colour();
+      this.#replay?.colour();
       this.#fillView();
     }
     this.#text!.mark(looked.findings);
@@ -374,9 +377,12 @@ export class MissionEditor {
       if (what === "test") this.#trial.replaceChildren(showTests(await this.#askLong<TestReport>(what, { text }), text !== this.#saved));
       else {
         const run = await this.#askLong<DryRun>(what, { text });
-        this.#trial.replaceChildren(showDryRun(run));
+        this.#replay?.close();
         this.#ran = { text, run };
-        this.#colour();
+        this.#replay = new Replay(run, (statuses) => this.#colour(statuses));
+        const isWhole = run.outcome !== "" && text === this.#saved && this.#robot.config.role === "configure";
+        const keep = button("check", "Keep as a test", () => void this.#keepAsTest(keep));
+        this.#trial.replaceChildren(showDryRun(run, this.#replay.element, ...(isWhole ? [h("div", { class: "row" }, keep)] : [])));
         this.#fillView();
       }
     } catch (error) {
@@ -386,8 +392,19 @@ export class MissionEditor {
     this.#mayUndo();
   }
 
-  #colour(): void {
-    if (this.#ran?.text === this.#text!.text) this.#outline.colour(this.#ran.run.statuses);
+  async #keepAsTest(keep: HTMLButtonElement): Promise<void> {
+    keep.disabled = true;
+    try {
+      const { file } = await this.#askLong<{ file: string }>("test_new", {});
+      this.#robot.notify(`The test '${file}' expects that it ends as here, by the same steps.`);
+    } catch (error) {
+      this.#robot.notify(`Not kept: ${(error as Error).message}`);
+    }
+  }
+
+  /** Colours the outline as it was in the dry run; a text that has changed since has other blocks. */
+  #colour(statuses: Statuses): void {
+    if (this.#ran?.text === this.#text!.text) this.#outline.colour(statuses);
   }
 
   #askLong<T>(what: string, given: Message): Promise<T> {

@@ -1,7 +1,7 @@
 import { expect, it } from "vitest";
 import { ending, tested } from "./trial";
 
-const run = { outcome: "success", why: "", time: 12.345, left_out: 0, story: [], statuses: [] };
+const run = { outcome: "success", why: "", time: 12.345, left_out: 0, story: [], statuses: [], changes: [], track: [], places: [] };
 
 it("tells how a dry run ended", () => {
   expect(ending(run)).toBe("It ended in success after 12.3 s of robot time");

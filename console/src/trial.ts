@@ -11,6 +11,11 @@ export interface DryRun {
   left_out: number;
   story: { time: number; text: string; is_bad: boolean }[];
   statuses: { path: Path; status: string }[];
+  /** The statuses of blocks in the order in which they got them, with the time [s]. */
+  changes: { time: number; path: Path; status: string }[];
+  /** Where the robot was: time [s], x [m], y [m] and heading [rad] in `map`. */
+  track: number[][];
+  places: { name: string; x: number; y: number; heading: number; colour: string }[];
 }
 
 export interface TestReport {
@@ -31,7 +36,7 @@ export function tested({ tests, coverage }: TestReport): string {
   return `${passed} of ${tests.length} test${tests.length === 1 ? "" : "s"} passed; they took ${coverage.taken} of ${coverage.ways} ways.`;
 }
 
-export function showDryRun(run: DryRun): HTMLElement {
+export function showDryRun(run: DryRun, ...more: Node[]): HTMLElement {
   const isGood = run.outcome === "success";
   const lines = run.story.map(({ time, text, is_bad: isBad }) => {
     const line = h("li", {}, h("time", {}, `${time.toFixed(1)} s`), ` ${text}`);
@@ -40,7 +45,7 @@ export function showDryRun(run: DryRun): HTMLElement {
   });
   const left = run.left_out > 0 ? [h("p", { class: "label" }, `${run.left_out} lines before these are left out.`)] : [];
   const story = h("ol", { class: "lines", tabindex: "0", "aria-label": "Story of the dry run" }, ...lines);
-  return card("Dry run", isGood ? "check" : run.outcome ? "cross" : "wait", ending(run), ...left, story);
+  return card("Dry run", isGood ? "check" : run.outcome ? "cross" : "wait", ending(run), ...more, ...left, story);
 }
 
 export function showTests(report: TestReport, isUnsaved: boolean): HTMLElement {

@@ -314,11 +314,29 @@ def test_a_dry_run_tells_the_story_and_colours_the_outline(open_page: Callable[.
     expect(block(page, "go_to table")).to_contain_text("success")
     expect(block(page, "check 1 > 2")).to_contain_text("failure")
     assert page.get_by_label("Story of the dry run").get_by_role("listitem").count() > 1
+    slider, robot = page.get_by_label("Time of the dry run"), page.locator(".replay map-canvas")
+    assert float(str(robot.get_attribute("data-robot")).split()[0]) > 0.9
+    slider.focus()
+    slider.press("Home")
+    expect(block(page, "go_to table")).to_contain_text("running")
+    expect(block(page, "check 1 > 2")).not_to_contain_text("failure")
+    page.get_by_role("button", name="Play").click()
+    expect(block(page, "check 1 > 2")).to_contain_text("failure")
+    expect(page.get_by_role("button", name="Play")).to_be_visible()
     assert violations(page) == []
     if (shots := os.environ.get("SHOTS")) is not None:
         page.screenshot(path=f"{shots}/dry_run.png", full_page=True)
     page.get_by_role("button", name="Test").click()
     expect(page.get_by_text("there are no tests of 'fetch'")).to_be_visible()
+
+
+def test_a_dry_run_is_kept_as_a_test(open_page: Callable[..., Page], project: Project) -> None:
+    page = edits(open_page(page_name="mission"))
+    page.get_by_role("button", name="Dry run").click()
+    page.get_by_role("button", name="Keep as a test").click()
+    expect(page.get_by_text("The test 'missions/tests/fetch.test.yaml' expects")).to_be_visible()
+    page.get_by_role("button", name="Test", exact=True).click()
+    expect(page.get_by_text("1 of 1 test passed")).to_be_visible(timeout=20_000)
 
 
 def test_tests_run_with_the_text_that_is_not_saved(open_page: Callable[..., Page], project: Project) -> None:

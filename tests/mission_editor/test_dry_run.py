@@ -20,6 +20,43 @@ def test_a_text_runs_on_the_simulated_robot_and_tells_its_story(editor: MissionE
     assert told["statuses"] == [{"path": ["do", index], "status": "success"} for index in (0, 1)]
 
 
+def test_a_run_can_be_played_again(editor: MissionEditor) -> None:
+    told = ask(editor, "try", text=FETCH)
+    assert [(one["path"], one["status"]) for one in told["changes"]] == [
+        (["do", 0], "running"),
+        (["do", 0], "success"),
+        (["do", 1], "running"),
+        (["do", 1], "success"),
+    ]
+    times = [one["time"] for one in told["changes"]]
+    assert times == sorted(times)
+    (_, first, *_), (time, last, *_) = told["track"][0], told["track"][-1]
+    assert first < 0.1
+    assert abs(last - 1.0) < 0.1  # the table
+    assert time <= told["time"]
+    assert [place["name"] for place in told["places"]] == ["dock", "table"]
+
+
+def test_a_run_that_has_ended_becomes_a_test_which_passes(editor: MissionEditor, project: Path) -> None:
+    made = ask(editor, "test_new")
+    assert made == {"file": "missions/tests/fetch.test.yaml"}
+    text = (project / made["file"]).read_text(encoding="utf-8")
+    assert "robot: ../../robots/fetcher/robot.yaml\n" in text
+    assert text.endswith("expect:\n  outcome: success\n  steps:\n    - go_to: table\n      ended: success\n")
+    report = ask(editor, "test", text=FETCH)
+    assert [one["passed"] for one in report["tests"]] == [True]
+    assert ask(editor, "test", text=FETCH.replace("table", "dock"))["tests"][0]["passed"] is False
+    with pytest.raises(Refused, match="exists"):
+        ask(editor, "test_new")
+
+
+def test_a_run_that_goes_on_becomes_no_test(editor: MissionEditor, project: Path) -> None:
+    (project / "missions/fetch.yaml").write_text(FETCH.replace("2 s", "2 h"), encoding="utf-8")
+    with pytest.raises(Refused, match="a test needs a run that has ended"):
+        ask(editor, "test_new")
+    assert not (project / "missions/tests").exists()
+
+
 def test_a_step_that_fails_and_one_that_is_not_reached_are_told_apart(editor: MissionEditor) -> None:
     told = ask(editor, "try", text=FETCH.replace("wait: 2 s", "check: 1 > 2") + "  - wait: 1 s\n")
     assert told["outcome"] == "failure"

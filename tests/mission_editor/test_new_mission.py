@@ -19,20 +19,23 @@ __all__ = ["editor", "project"]
 
 NAMES = [one["name"] for one in templates()]
 PATROLLER = ROOT / "robots/patroller/robot.yaml"
+PI_ROBOT = ROOT / "robots/pi_robot/robot.yaml"
 
 
 @pytest.mark.parametrize("template", NAMES)
 def test_each_template_is_a_mission_without_findings(template: str) -> None:
-    robot = compile_robot(str(PATROLLER), environment=os.environ, tries_profiles=False).robot
+    is_arm = template == "pick_and_place"
+    file, profiles, name = (PI_ROBOT, ("table",), template) if is_arm else (PATROLLER, (), "patrol")
+    robot = compile_robot(str(file), environment=os.environ, profiles=profiles, tries_profiles=False).robot
     assert robot is not None
-    path = robot.manifest.missions["patrol"].path
-    text = filled(template, "patrol", robot)
-    report, _ = look_at_mission(robot, "patrol", os.environ, MappingProxyType({path: text}))
+    path = robot.manifest.missions[name].path
+    text = filled(template, name, robot)
+    report, _ = look_at_mission(robot, name, os.environ, MappingProxyType({path: text}))
     assert [str(finding) for finding in report] == []
 
 
 def test_each_template_says_what_it_does() -> None:
-    assert NAMES == ["clean_house", "deliver", "dock_when_low", "patrol"]
+    assert NAMES == ["clean_house", "deliver", "dock_when_low", "patrol", "pick_and_place"]
     assert all(one["about"].endswith(".") for one in templates())
 
 
@@ -54,6 +57,7 @@ def test_a_new_mission_gets_its_file_and_its_entry(editor: MissionEditor, projec
         ("../x", "patrol", "cannot be the name"),
         ("rounds", "../templates/patrol", "there is no template"),
         ("low", "dock_when_low", "this robot cannot do that"),
+        ("grab", "pick_and_place", "this robot has no arm that picks"),
     ],
 )
 def test_a_refused_one_leaves_nothing_behind(

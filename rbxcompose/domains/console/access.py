@@ -67,6 +67,7 @@ _SERVICES = {
     "/console/mission/save": Role.CONFIGURE,
     "/console/mission/templates": Role.VIEW,
     "/console/mission/test": Role.OPERATE,
+    "/console/mission/test_new": Role.CONFIGURE,
     "/console/mission/try": Role.OPERATE,
     "/console/robot/look": Role.VIEW,  # of changes that nobody else sees
     "/console/robot/palette": Role.VIEW,

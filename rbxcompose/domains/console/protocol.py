@@ -1456,10 +1456,11 @@ MISSION_TEXTS: Mapping[str, tuple[str, ...]] = {
     "save": ("text", "hash"),
     "templates": (),
     "test": ("text",),
+    "test_new": (),
     "try": ("text",),
 }
 """What can be asked about the text of a mission, with its arguments besides `mission`."""
-_WRITES = {"new": "makes", "save": "saves"}
+_WRITES = {"new": "makes", "save": "saves", "test_new": "makes a test of"}
 _EDITED: Mapping[str, type] = {"operation": dict, "path": list}
 """The types of those arguments that are no texts."""
 ROBOT_TEXTS: Mapping[str, Mapping[str, tuple[type, object]]] = {

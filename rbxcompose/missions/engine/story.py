@@ -29,6 +29,7 @@ class MissionStory:
     def renumber(self, nodes: Mapping[int, int]) -> None:
         """Take other numbers for leaves, since the mission has changed."""
         self._labels = {nodes[leaf]: label for leaf, label in self._labels.items() if leaf in nodes}
+        self._named = {nodes[number] for number in self._named if number in nodes}
 
     def line(self, event: events.MissionEvent) -> tuple[Level, str]:
         """Return how bad an event is, and its line, which is empty if other events say the same."""

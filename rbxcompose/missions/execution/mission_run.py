@@ -112,7 +112,7 @@ class MissionRun:
         self.end: MissionEnded | None = None
         self.began: float | None = None  # [s] of robot time
         self.patient_until: float | None = None  # [s] of the next warning while it waits for its first values
-        self.story = MissionStory(name, self._heading)
+        self.story = MissionStory(name, self.heading)
         self.by_hand = 0  # what people did to it: it cannot be reproduced without that
         self.transitions: deque[dict[str, Any]] = deque(maxlen=LAST)
         self.breakpoints = SetBreakpoints()
@@ -143,7 +143,7 @@ class MissionRun:
     def _sentences(self) -> Mapping[int, str]:
         return {number: f"{one.place} {one.sentence}" for number, one in self._drawn.items()}
 
-    def _heading(self, number: int) -> str:
+    def heading(self, number: int) -> str:
         """Return how the story names a node: as `mission show` does."""
         return heading_of(self._drawn[number], self.engine.program.nodes[number])
 

@@ -9,7 +9,7 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,39 +20,66 @@ from rbxcompose.compiler.compile import Compilation, robot_for_mission
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING
+from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 from rbxcompose.sdk.capabilities import RunsProgram
 from rbxcompose.sdk.registry import declared
 from rbxcompose.tools.mission_editor.outline import MissionOutline
+from rbxcompose.tools.mission_editor.yaml_places import Path as TextPath
 from rbxcompose.tools.mission_tests.coverage import SeenWays
 from rbxcompose.tools.mission_tests.finding_files import tests_of
 from rbxcompose.tools.mission_tests.model import RUNS, Expectations, Trial
-from rbxcompose.tools.mission_tests.runner import run_trial
+from rbxcompose.tools.mission_tests.record import TrialRecord
+from rbxcompose.tools.mission_tests.runner import RobotRun
 
 LONGEST = 600.0  # [s] of robot time
 MOST_LINES = 500  # of the story
 MOST_TESTS = 50
 TESTING = 80.0  # [s]
+SAMPLE = 0.25  # [s] of robot time between two poses
+MOST_CHANGES = 4000  # of statuses that are told
+SAMPLER = "dry run"
+TARGET_FRAME, ROBOT_FRAME = "map", "base_footprint"
 UNSAVED_TESTS = "rbxcompose.tools.mission_editor.unsaved_tests"
 
 
-class _Statuses(SeenWays):
-    """Observes how each node ended last, by its number."""
+class _Watching(SeenWays):
+    """Observes when each node begins and ends, and where the robot is."""
 
     def __init__(self) -> None:
         super().__init__()
         self.last: dict[int, int] = {}
+        self.changes: list[tuple[float, int, int]] = []  # time [s], number of a node, its status
+        self.track: list[tuple[float, float, float, float]] = []  # time [s], x [m], y [m], heading [rad] in `map`
+        self.now: Callable[[], float] = lambda: 0.0
 
     def started(self, number: int, /) -> None:
         """Handle the start of a node."""
-        self.last[number] = RUNNING
+        self._became(number, RUNNING)
 
     def ended(self, number: int, status: int, outcome: str, /) -> None:
         """Handle the end of a node; one that was halted has not ended."""
-        self.last[number] = RUNNING if status == IDLE else status
+        self._became(number, RUNNING if status == IDLE else status)
+
+    def follow(self, run: RobotRun) -> None:
+        """Note from now on where the robot is, if its frames tell."""
+        self.now, frames = (lambda: run.now), run.bench.host.frames
+
+        def look(dt: float) -> None:
+            found = frames.lookup(TARGET_FRAME, ROBOT_FRAME) if frames is not None else None
+            if found is not None:
+                pose = found.to_pose2()
+                self.track.append((run.now, pose.x, pose.y, pose.heading))
+
+        run.bench.scheduler.every(SAMPLE, SAMPLER, look)
+
+    def _became(self, number: int, status: int) -> None:
+        self.last[number] = status
+        if len(self.changes) < MOST_CHANGES:
+            self.changes.append((self.now(), number, status))
 
 
-def dry_run(made: Compilation, mission: str, path: Path, text: str) -> dict[str, Any]:
-    """Run a mission of a compiled robot, and return its `outcome`, the `story`, and the `statuses` of its blocks.
+def tried(made: Compilation, mission: str) -> tuple[TrialRecord, _Watching, Program, RobotNames]:
+    """Run a mission of a compiled robot; return what happened, with the mission and the names that it sees.
 
     Raises:
         Refused: if the robot or the mission has errors, or starts programs.
@@ -66,35 +93,60 @@ def dry_run(made: Compilation, mission: str, path: Path, text: str) -> dict[str,
     if started:
         raise Refused(f"'{started[0]}' would start a program: try it with 'rbxcompose test'")
     program, names = robot.missions[mission].program, robot.names
-    linked, seen = link(program, names.missions), _Statuses()
+    linked, seen = link(program, names.missions), _Watching()
     where = Span(program.file, 1, 1, 1, 1)
     inputs: Any = robot.missions[mission].inputs
     trial = Trial(
         "dry run", "", program.file, where, mission, program, linked, names, plan, inputs, {}, (),
         Expectations(until=LONGEST), is_complete=False,
     )  # fmt: skip
-    record = run_trial(trial, seen).record
+    run = RobotRun(trial, seen)
+    run.record.name_by(lambda number: run.executive.missions.runs[mission].heading(number))
+    seen.follow(run)
+    return run.run(), seen, linked, names
+
+
+def dry_run(made: Compilation, mission: str, path: Path, text: str) -> dict[str, Any]:
+    """Run a mission of a compiled robot, and return its `outcome`, the `story`, and the `statuses` of its blocks.
+
+    `changes` are the statuses in the order in which blocks got them, `track` is where the robot was, with the times.
+
+    Raises:
+        Refused: if the robot or the mission has errors, or starts programs.
+    """
+    record, seen, linked, names = tried(made, mission)
     outcome = "" if record.outcome == RUNS else record.outcome
     lines = record.lines[-MOST_LINES:]
+    blocks = _blocks(MissionOutline(text), shown_name(path), linked.nodes)
+    changes = [(time, blocks[number], NAMES[status]) for time, number, status in seen.changes if number in blocks]
     return {
         "outcome": outcome,
         "why": record.trouble or ("" if outcome else f"it has not ended after {LONGEST:g} s of robot time"),
         "time": record.now,
         "left_out": len(record.lines) - len(lines),
         "story": [{"time": line.time, "text": line.text, "is_bad": line.level is not Level.OK} for line in lines],
-        "statuses": _by_block(MissionOutline(text), shown_name(path), linked.nodes, seen.last),
+        "statuses": [
+            {"path": list(path), "status": NAMES[seen.last[number]]}
+            for number, path in blocks.items()
+            if number in seen.last
+        ],
+        "changes": [{"time": time, "path": list(path), "status": status} for time, path, status in changes],
+        "track": [[round(value, 3) for value in at] for at in seen.track],
+        "places": [
+            {"name": place.name, "x": place.x, "y": place.y, "heading": place.heading, "colour": place.colour}
+            for place in names.places.values()
+        ],
     }
 
 
-def _by_block(outline: MissionOutline, file: str, nodes: Any, statuses: dict[int, int]) -> list[dict[str, Any]]:
-    """Return the status of each block whose node began."""
-    told: dict[tuple[str | int, ...], str] = {}
+def _blocks(outline: MissionOutline, file: str, nodes: Sequence[MissionNode]) -> dict[int, TextPath]:
+    """Return the path of the block of each node that has one, by the node's number; the innermost node counts."""
+    found: dict[TextPath, int] = {}
     for node in nodes:
-        if node.number in statuses and node.span.file == file:
-            block = outline.written_at(node.span.line, node.span.column)
-            if block is not None:
-                told[block.path] = NAMES[statuses[node.number]]
-    return [{"path": list(path), "status": status} for path, status in told.items()]
+        block = outline.written_at(node.span.line, node.span.column) if node.span.file == file else None
+        if block is not None:
+            found[block.path] = node.number
+    return {number: path for path, number in found.items()}
 
 
 def run_tests(project: Path, mission: str, unsaved: Mapping[Path, str]) -> str:

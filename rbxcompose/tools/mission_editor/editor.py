@@ -121,6 +121,16 @@ class MissionEditor:
         with paused_collection():
             return read_aloud(self._known, request["mission"], path, request["text"])
 
+    def _test_new(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Write a test of a mission as it is on disk, from a dry run."""
+        from rbxcompose.tools.mission_editor.dry_run import tried
+        from rbxcompose.tools.mission_editor.new_test import make_test
+
+        mission = request["mission"]
+        self._path(mission)
+        record = tried(self._simulated({}), mission)[0]
+        return {"file": self._texts.shown(make_test(self._texts.project, self._file, mission, record))}
+
     def _check(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Return all that `check` finds with a text in place of a mission's file."""
         path = self._path(request["mission"])
@@ -212,6 +222,7 @@ REQUESTS: Mapping[str, Callable[[MissionEditor, Mapping[str, Any]], Any]] = Mapp
         "save": MissionEditor._save,
         "templates": MissionEditor._templates,
         "test": MissionEditor._test,
+        "test_new": MissionEditor._test_new,
         "try": MissionEditor._try,
     }
 )

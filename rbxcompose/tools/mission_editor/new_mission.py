@@ -12,12 +12,12 @@ from rbxcompose.base.requests import Refused
 from rbxcompose.commands.new_files import AnswerError, read_name, write_new
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.manifest.tree import FILE_BYTES
+from rbxcompose.manifest.tree import FILE_BYTES, MappingNode, at
 from rbxcompose.tools.mission_editor.yaml_places import placed
 from rbxcompose.tools.scaffold import MissionAnswers, with_entry
 
 TEMPLATES = Path(__file__).parent / "templates"
-_NAME, _PLACE, _MOST_PLACES = "NAME", "PLACE_", 2
+_NAME, _ARM, _PLACE, _MOST_PLACES = "NAME", "ARM", "PLACE_", 2
 
 
 def templates() -> list[dict[str, str]]:
@@ -31,10 +31,10 @@ def templates() -> list[dict[str, str]]:
 
 
 def filled(template: str, name: str, robot: Robot) -> str:
-    """Return the text of a mission: a template with a name and with places of the robot.
+    """Return the text of a mission: a template with a name, and with places and an arm of the robot.
 
     Raises:
-        Refused: if there is no such template.
+        Refused: if there is no such template, or the robot has no arm for it.
     """
     if template not in {one["name"] for one in templates()}:
         raise Refused(f"there is no template '{template[:60]}'")
@@ -43,7 +43,31 @@ def filled(template: str, name: str, robot: Robot) -> str:
     for number in range(_MOST_PLACES):
         if places:
             text = text.replace(f"{_PLACE}{number + 1}", places[number % len(places)])
+    for word, found in _of_arm(robot).items() if _ARM in text else ():
+        text = text.replace(word, found)
     return text.replace(f"name: {_NAME}", f"name: {name}")
+
+
+def _of_arm(robot: Robot) -> dict[str, str]:
+    """Return an arm that picks, with an object, and a spot and a pose of this arm.
+
+    Raises:
+        Refused: if there is none, with what is missing.
+    """
+    root = robot.manifest.root
+    arms = [arm for arm in _names(root, "arms") if f"pick_{arm}" in robot.names.skills]
+    if not arms:
+        raise Refused("this robot has no arm that picks: that is an entry of 'arms' with a 'gripper'")
+    wanted = {"OBJECT": ("scene", "objects"), "SPOT": ("arms", arms[0], "spots"), "POSE": ("arms", arms[0], "poses")}
+    found = {word: _names(root, *path) for word, path in wanted.items()}
+    if missing := next((word for word, names in found.items() if not names), None):
+        raise Refused(f"this needs an entry of '{'.'.join(wanted[missing])}' in the robot's file")
+    return {**{word: names[-1] for word, names in found.items()}, _ARM: arms[0]}
+
+
+def _names(root: MappingNode, *path: str) -> list[str]:
+    found = at(root, path)
+    return [*found.entries] if isinstance(found, MappingNode) else []
 
 
 def make_mission(

@@ -1,6 +1,6 @@
 """The record of a run: lines with their times, the steps that ran, messages, data, the end."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import field
 
 from rbxcompose.base.dataclass import dataclass
@@ -56,6 +56,10 @@ class TrialRecord:
     def __post_init__(self) -> None:
         """Begin the story."""
         self._story = MissionStory(self.mission)
+
+    def name_by(self, heading: Callable[[int], str]) -> None:
+        """Begin the story of a mission whose steps are named by their sentences."""
+        self._story = MissionStory(self.mission, heading)
 
     def note(self, text: str) -> None:
         """Add a line on an action of the test."""

@@ -1,0 +1,104 @@
+/** A dry run, shown as it went: where the robot was on the map, and which blocks ran. */
+import { h, icon } from "./dom";
+import type { Path } from "./edited";
+import { MapCanvas, type ShownPlace } from "./elements/map_canvas";
+import { formatName } from "./format";
+import type { Point, Pose } from "./map";
+import type { DryRun } from "./trial";
+import "./replay.css";
+
+export type Statuses = readonly { path: Path; status: string }[];
+
+const FRAME = 50; // [ms] between two pictures
+const LONGEST = 20; // [s] that a whole run takes to play, however long it was
+const FASTEST = 1 / 4; // [s] of a second of robot time: what is short plays four times as fast
+const TRAIL = 60; // [s] of robot time
+const EMPTY = { grids: [], areas: [], labels: [], outlines: [], paths: [], scans: [], goal: null, isOld: false };
+
+/** Returns the status that each block had last at a time [s]. */
+export function statusesAt({ changes }: DryRun, time: number): Statuses {
+  const found = new Map<string, { path: Path; status: string }>();
+  for (const change of changes) {
+    if (change.time > time) break;
+    found.set(JSON.stringify(change.path), change);
+  }
+  return [...found.values()];
+}
+
+/** Returns where the robot was at a time [s], and the way to there in the minute before; null if nobody knew. */
+export function poseAt({ track }: DryRun, time: number): { robot: Pose; trail: Point[] } | null {
+  const before = track.filter(([at]) => at! <= time && at! > time - TRAIL);
+  const last = before.at(-1) ?? track.filter(([at]) => at! <= time).at(-1);
+  if (!last) return null;
+  return { robot: { x: last[1]!, y: last[2]!, heading: last[3]! }, trail: before.map(([, x, y]) => ({ x: x!, y: y! })) };
+}
+
+export class Replay {
+  readonly element = h("section", { class: "replay", "aria-label": "The dry run as it went" });
+  readonly #run: DryRun;
+  readonly #show: (statuses: Statuses) => void;
+  readonly #map = new MapCanvas();
+  readonly #slider: HTMLInputElement;
+  readonly #time = h("output", {});
+  readonly #play = h("button", { type: "button" });
+  #timer: ReturnType<typeof setInterval> | undefined;
+
+  /** `show` gets the statuses of the blocks at the time that is shown. */
+  constructor(run: DryRun, show: (statuses: Statuses) => void) {
+    [this.#run, this.#show] = [run, show];
+    const length = { min: "0", max: String(run.time), step: "0.05", value: String(run.time) };
+    this.#slider = h("input", { type: "range", "aria-label": "Time of the dry run", ...length });
+    this.#slider.oninput = () => {
+      this.#stop();
+      this.#draw();
+    };
+    this.#play.onclick = () => (this.#timer === undefined ? this.#start() : this.#stop());
+    this.element.append(h("div", { class: "replay-bar" }, this.#play, this.#slider, this.#time));
+    if (run.track.length > 0) this.element.prepend(this.#map);
+    this.#stop();
+    this.#draw();
+  }
+
+  /** Shows the statuses once more, since what they are shown on has changed. */
+  colour(): void {
+    this.#show(statusesAt(this.#run, Number(this.#slider.value)));
+  }
+
+  close(): void {
+    clearInterval(this.#timer);
+  }
+
+  #start(): void {
+    if (Number(this.#slider.value) >= this.#run.time) this.#slider.value = "0";
+    const rate = Math.max(1 / FASTEST, this.#run.time / LONGEST); // seconds of robot time in one
+    let last = performance.now();
+    this.#timer = setInterval(() => {
+      const now = performance.now();
+      this.#slider.value = String(Math.min(this.#run.time, Number(this.#slider.value) + ((now - last) / 1000) * rate));
+      last = now;
+      this.#draw();
+      if (Number(this.#slider.value) >= this.#run.time) this.#stop();
+    }, FRAME);
+    this.#play.replaceChildren(icon("pause"), "Hold");
+  }
+
+  #stop(): void {
+    clearInterval(this.#timer);
+    this.#timer = undefined;
+    this.#play.replaceChildren(icon("play"), "Play");
+  }
+
+  #draw(): void {
+    const time = Number(this.#slider.value);
+    const words = `${time.toFixed(1)} s of ${this.#run.time.toFixed(1)} s`;
+    this.#time.textContent = words;
+    this.#slider.setAttribute("aria-valuetext", words);
+    this.#slider.style.setProperty("--share", String(time / (this.#run.time || 1)));
+    this.colour();
+    const at = poseAt(this.#run, time);
+    const places = this.#run.places.map((place) => ({ ...place, label: formatName(place.name), isDock: false }) satisfies ShownPlace);
+    this.#map.show({ ...EMPTY, robot: at?.robot ?? null, trail: at?.trail ?? [], places });
+    const { x, y } = at?.robot ?? { x: 0, y: 0 };
+    this.#map.dataset.robot = at ? `${x.toFixed(2)} ${y.toFixed(2)}` : "";
+  }
+}
