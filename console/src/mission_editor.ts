@@ -270,6 +270,8 @@ export class MissionEditor {
   #show(looked: Looked): void {
     if (looked.outline) {
       this.#outline.show(looked.outline, this.#wanted, this.#text!.cursor);
+      // What added the block may be gone from the page: whoever works by keys goes on at the block.
+      if (this.#wanted && document.activeElement === document.body) this.#outline.focus();
       this.#wanted = null;
       this.#replay?.colour();
       this.#fillView();

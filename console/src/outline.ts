@@ -101,7 +101,7 @@ export class OutlineView {
     const wanted = path ? allBlocks(outline.blocks).find((block) => isSame(block.path, path)) : undefined;
     if (wanted) this.#reach(wanted);
     this.#mark(wanted ?? this.#seenAt(cursor), wanted !== undefined);
-    if (hadFocus && this.#chosen) this.#shown.get(this.#chosen)!.item.focus();
+    if (hadFocus) this.focus();
   }
 
   /** Chooses the block at a place of the text. */
@@ -116,6 +116,11 @@ export class OutlineView {
     if (!block) return;
     this.#reach(block);
     this.#mark(block, true);
+  }
+
+  /** Takes the keyboard to the chosen block. */
+  focus(): void {
+    if (this.#chosen) this.#shown.get(this.#chosen)!.item.focus();
   }
 
   /** Colours the blocks by how each ended, until another outline is shown. */

@@ -46,7 +46,7 @@ export class Replay {
   /** `show` gets the statuses of the blocks at the time that is shown. */
   constructor(run: DryRun, show: (statuses: Statuses) => void) {
     [this.#run, this.#show] = [run, show];
-    const length = { min: "0", max: String(run.time), step: "0.05", value: String(run.time) };
+    const length = { min: "0", max: String(run.time), step: "any", value: String(run.time) };
     this.#slider = h("input", { type: "range", "aria-label": "Time of the dry run", ...length });
     this.#slider.oninput = () => {
       this.#stop();

@@ -68,3 +68,10 @@ def test_a_refused_one_leaves_nothing_behind(
     assert [path.name for path in (project / "missions").iterdir()] == ["fetch.yaml"]
     assert (project / "missions/fetch.yaml").read_text(encoding="utf-8") == FETCH
     assert (project / "robots/fetcher/robot.yaml").read_text(encoding="utf-8") == ROBOT
+
+
+def test_a_mission_that_another_process_has_made_is_known_at_once(editor: MissionEditor, project: Path) -> None:
+    other = MissionEditor(editor._compiled, project / "robots/fetcher/robot.yaml")
+    other.answer({"do": "read", "mission": "fetch"})
+    editor.answer({"do": "new", "mission": "rounds", "template": "patrol"})
+    assert other.answer({"do": "read", "mission": "rounds"})["findings"] == []

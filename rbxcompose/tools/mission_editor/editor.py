@@ -167,6 +167,8 @@ class MissionEditor:
         return self._robot
 
     def _path(self, mission: str) -> Path:
+        if mission not in self._known.manifest.missions:
+            self._compile({})  # another process may have made it
         entry = self._known.manifest.missions.get(mission)
         if entry is None:
             raise Refused(f"the robot has no mission '{mission[:60]}'")
