@@ -22,6 +22,7 @@ from rbxcompose.manifest import test_file as trials
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.files import PREFIX, PROFILE, shown_name
 from rbxcompose.manifest.files import resolve as resolve_file
+from rbxcompose.manifest.reader import Texts
 from rbxcompose.manifest.section import TEST
 from rbxcompose.manifest.test_file import SECTIONS, STEP_KEYS, TrialFile
 from rbxcompose.manifest.tree import (
@@ -496,10 +497,12 @@ class WrittenTrial:
 class TrialReader:
     """Reads the tests of one run; each robot is compiled once with each profile, and its findings are reported once.
 
-    `sources` are the texts of all files, `report` has the findings on robots.
+    `unsaved` are texts in place of files, by their real paths. `sources` are the texts of all files, `report` has the
+    findings on robots.
     """
 
     environment: Mapping[str, str]
+    unsaved: Mapping[Path, str] = field(default_factory=dict)
     sources: dict[str, str] = field(default_factory=dict)
     report: Report = field(default_factory=Report)
     _robots: dict[tuple[str, str], Compilation] = field(default_factory=dict)
@@ -531,7 +534,9 @@ class TrialReader:
     def open(self, path: Path) -> WrittenTrial:
         """Return the contents of a file for its first robot; a test without a name gets that of its file."""
         report = Report()
-        root = Documents(report, self.sources).read(path, TEST)
+        sources = Texts(self.unsaved)
+        root = Documents(report, sources).read(path, TEST)
+        self.sources.update(sources)
         name = root.get("name") if root else None
         return WrittenTrial(path, name.text if isinstance(name, ScalarNode) and name.text else path.name, root, report)
 
@@ -578,7 +583,9 @@ class TrialReader:
         key = name, chosen.text if chosen is not None else ""
         if key not in self._robots:
             profiles = [chosen.text] if chosen is not None else []
-            self._robots[key] = compile_robot(shown, profiles=profiles, environment=self.environment)
+            self._robots[key] = compile_robot(
+                shown, profiles=profiles, environment=self.environment, unsaved=self.unsaved
+            )
             self.report.extend(finding for finding in self._robots[key].report if not _is_of_profile(finding))
             self.sources.update(self._robots[key].sources)
         if (robot := self._robots[key].robot) is not None:
