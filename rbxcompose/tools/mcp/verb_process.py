@@ -1,0 +1,120 @@
+"""Verbs in processes of their own, each with a deadline: whatever happens in one, the server goes on."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import signal
+import sys
+from asyncio.subprocess import PIPE
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.requests import Refused
+
+AT_ONCE = 2  # verbs that compile
+MOST_WAITING = 16  # that wait for those
+MOST_OUTPUT = 16_000_000  # [B] that are kept of what a verb writes
+_CHUNK = 65536  # [B]
+_CRASH = "Traceback (most recent call last)"
+_TOLD = 4000  # characters of what went wrong
+ANYWHERE = Path("/")
+"""Where verbs about robots that run are at home: no file there has the name of a robot."""
+
+
+@dataclass(frozen=True, slots=True)
+class VerbOutput:
+    """What a verb wrote, and its exit code."""
+
+    code: int
+    out: str
+    err: str
+
+    def data(self, *codes: int) -> Any:
+        """Return the answer in JSON if the verb ended with one of these exit codes.
+
+        Raises:
+            Refused: with what is wrong.
+        """
+        if self.code not in codes:
+            raise Refused(self.trouble)
+        try:
+            return json.loads(self.out)
+        except ValueError as error:
+            raise Refused(self.trouble) from error
+
+    @property
+    def trouble(self) -> str:
+        """Return what is wrong, in words for people."""
+        told = self.err.strip()
+        if _CRASH in told:
+            return f"the command has failed: {told.splitlines()[-1][:_TOLD]}"
+        return told[-_TOLD:] or f"the command ended with {self.code} and gave no answer"
+
+
+class VerbProcesses:
+    """Runs verbs of the command line."""
+
+    def __init__(self, deadline: float) -> None:
+        self._deadline = deadline
+        self._turns = asyncio.Semaphore(AT_ONCE)
+        self._waiting = 0
+
+    async def compiles(self, *words: str, folder: Path, unsaved: Mapping[str, str] | None = None) -> VerbOutput:
+        """Run a verb that compiles, after those before it."""
+        if self._waiting >= MOST_WAITING:
+            raise Refused("too many calls are waiting: try again")
+        self._waiting += 1
+        try:
+            async with self._turns:
+                option = ("--unsaved", "-") if unsaved else ()
+                return await self.run(*words, *option, folder=folder, given=json.dumps(unsaved) if unsaved else "")
+        finally:
+            self._waiting -= 1
+
+    async def run(self, *words: str, folder: Path = ANYWHERE, given: str = "") -> VerbOutput:
+        """Run a verb at once, with this text as its input.
+
+        Raises:
+            Refused: if it takes too long; it has been ended then.
+        """
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-P", "-m", "rbxcompose", *words),
+            cwd=folder,
+            stdin=PIPE,
+            stdout=PIPE,
+            stderr=PIPE,
+            start_new_session=True,
+        )
+        try:
+            async with asyncio.timeout(self._deadline):
+                out, err = await _exchanged(process, given)
+                code = await process.wait()
+        except TimeoutError as error:
+            raise Refused(f"it took more than {self._deadline:g} s, and was ended") from error
+        finally:
+            if process.returncode is None:
+                with suppress(ProcessLookupError):  # it has just ended
+                    os.killpg(process.pid, signal.SIGKILL)
+        return VerbOutput(code, out, err)
+
+
+async def _exchanged(process: asyncio.subprocess.Process, given: str) -> Sequence[str]:
+    """Give a process its input, and return what it writes to both of its outputs."""
+    if process.stdin is None or process.stdout is None or process.stderr is None:
+        raise BrokenPipeError
+    with suppress(BrokenPipeError, ConnectionResetError):  # it has ended without reading
+        process.stdin.write(given.encode(errors="replace"))
+        process.stdin.close()
+    return await asyncio.gather(_text(process.stdout), _text(process.stderr))
+
+
+async def _text(stream: asyncio.StreamReader) -> str:
+    kept = bytearray()
+    while chunk := await stream.read(_CHUNK):
+        kept += chunk[: MOST_OUTPUT - len(kept)]
+    return kept.decode(errors="replace")
