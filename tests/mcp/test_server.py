@@ -190,10 +190,15 @@ def test_an_answer_is_limited_and_says_what_is_left_out(client: ToolClient, proj
     assert f"findings: {whole - shown} of {whole} items" in told["left_out"]
 
 
-def test_many_calls_at_once_are_answered_or_told_to_come_again(client: ToolClient) -> None:
-    refused = client.at_once(30, "explain", code="--")
-    assert refused == [True] * 30
-    assert not all(client.at_once(4, "plan", robot=ROBOT))
+def test_many_calls_at_once_are_all_answered(client: ToolClient) -> None:
+    assert client.at_once(30, "explain", code="--") == [True] * 30
+    assert client.at_once(3, "plan", robot=ROBOT) == [False] * 3
+
+
+def test_a_call_that_its_client_cancels_is_ended_and_logged(client: ToolClient, base: Path) -> None:
+    assert "timed out" in client.gives_up("plan", robot=ROBOT)
+    assert "process mission" in client.told("plan", robot=ROBOT)["plan"]
+    assert ("plan", "was cancelled") in [(call["tool"], call["result"]) for call in logged(base)]
 
 
 def test_a_call_is_logged_without_the_texts(client: ToolClient, project: Path, base: Path) -> None:

@@ -54,6 +54,16 @@ class ToolClient:
         calls = [self._portal.start_task_soon(partial(self._client.call_tool, tool, given)) for _ in range(number)]
         return [bool(call.result(60.0).is_error) for call in calls]
 
+    def gives_up(self, tool: str, **given: Any) -> str:
+        """Call a tool, cancel the call at once, and return what the client says of that."""
+        self.called.append(tool)
+        call = partial(self._client.call_tool, tool, given, read_timeout_seconds=0.1)
+        try:
+            self._portal.call(call)
+        except MCPError as error:
+            return error.message
+        return "it was answered in time"
+
     def resources(self) -> list[str]:
         """Return the addresses of the resources."""
         return [each.uri for each in self._portal.call(self._client.list_resources).resources]

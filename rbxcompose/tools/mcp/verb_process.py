@@ -13,6 +13,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from anyio import CancelScope
+
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import Refused
 
@@ -45,7 +47,8 @@ class VerbOutput:
         try:
             return json.loads(self.out)
         except ValueError as error:
-            raise Refused(self.trouble) from error
+            is_cut = len(self.out.encode()) >= MOST_OUTPUT
+            raise Refused("the answer is too large" if is_cut else self.trouble) from error
 
     @property
     def trouble(self) -> str:
@@ -100,6 +103,8 @@ class VerbProcesses:
             if process.returncode is None:
                 with suppress(ProcessLookupError):  # it has just ended
                     os.killpg(process.pid, signal.SIGKILL)
+                with CancelScope(shield=True):  # a call that its client cancels leaves no process, either
+                    await process.wait()
         return VerbOutput(code, out, err)
 
 
