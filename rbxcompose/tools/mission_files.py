@@ -342,7 +342,7 @@ def try_(arguments: argparse.Namespace) -> int:
             if not out.report.has_errors:
                 raise NotDoneError(REFUSED.at(None, f"'{arguments.name}' is not run: {refusal}")) from refusal
         else:
-            emit(json.dumps(tried, ensure_ascii=False) if arguments.json else _told(tried))
+            emit(json.dumps(tried, ensure_ascii=False) if arguments.json else _story(tried))
             return 0
     write_report(out.report, out.sources)
     if out.robot is not None and not out.report.has_errors:
@@ -350,7 +350,7 @@ def try_(arguments: argparse.Namespace) -> int:
     raise ReportedError
 
 
-def _told(tried: Mapping[str, Any]) -> str:
+def _story(tried: Mapping[str, Any]) -> str:
     """Return a dry run for people: a line for each event, and the end."""
     left = [f"{tried['left_out']} lines before these are left out"] if tried["left_out"] else []
     lines = [f"{line['time']:8.2f}  {line['text']}" for line in tried["story"]]

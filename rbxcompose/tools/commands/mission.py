@@ -112,7 +112,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ),
         ("show", "say or draw a mission; a running one with the states of its nodes", deferred(files, "show"), drawn),
         ("skills", "list the skills that missions may use on a robot", deferred(files, "skills"), (robot, json_)),
-        ("try", "run a mission on the simulated robot in virtual time, and tell", deferred(files, "try_"), tried),
+        (
+            "try",
+            "run a mission on the simulated robot in virtual time, and show its story",
+            deferred(files, "try_"),
+            tried,
+        ),
         ("explore", "look for dead ends by trying everything that may happen", deferred(files, "explore"), explored),
     )
     add_actions(parser, (Subcommand(name, words, do, own, words) for name, words, do, own in table), metavar="ACTION")

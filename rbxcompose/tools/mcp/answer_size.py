@@ -39,10 +39,10 @@ def _cut(value: Any, name: str, items: int, text: int, cut: list[str], depth: in
             if len(value) > items:
                 cut.append(f"{name}: {len(value) - items:,} of {len(value):,} entries")
             some = list(value.items())[:items]
-            return {key: _cut(one, f"{name}.{key}".lstrip("."), items, text, cut, depth - 1) for key, one in some}
+            return {key: _cut(entry, f"{name}.{key}".lstrip("."), items, text, cut, depth - 1) for key, entry in some}
         case list():
             if len(value) > items:
                 cut.append(f"{name}: {len(value) - items:,} of {len(value):,} items")
             some = value[:items]
-            return [_cut(one, f"{name}.{index}", items, text, cut, depth - 1) for index, one in enumerate(some)]
+            return [_cut(item, f"{name}.{index}", items, text, cut, depth - 1) for index, item in enumerate(some)]
     return value

@@ -31,7 +31,7 @@ from rbxcompose.tools.mcp.project_paths import ProjectPaths
 from rbxcompose.tools.mcp.tools import TOOLS, ToolContext, VerbTool
 from rbxcompose.tools.mcp.verb_process import VerbProcesses
 
-Context = ServerRequestContext[Any]
+CallContext = ServerRequestContext[Any]
 LANGUAGE = "rbxcompose://language"
 FINDING, MANIFEST = "rbxcompose://findings/", "rbxcompose://project/"
 _MARKDOWN, _YAML = "text/markdown", "application/yaml"
@@ -49,11 +49,11 @@ class McpSession:
         self.role, self._log = role, log
         self._paths, self._verbs = ProjectPaths(), VerbProcesses(deadline)
 
-    async def tools(self, context: Context, params: types.PaginatedRequestParams | None) -> types.ListToolsResult:
+    async def tools(self, context: CallContext, params: types.PaginatedRequestParams | None) -> types.ListToolsResult:
         """List the tools of the role."""
         return types.ListToolsResult(tools=[_declared(tool) for tool in TOOLS.values() if tool.role <= self.role])
 
-    async def call(self, context: Context, params: types.CallToolRequestParams) -> types.CallToolResult:
+    async def call(self, context: CallContext, params: types.CallToolRequestParams) -> types.CallToolResult:
         """Carry out a call; whatever is wrong with it becomes an answer that says so."""
         began, given, result = time.monotonic(), params.arguments or {}, "was cancelled"
         client = _client(context)
@@ -88,7 +88,7 @@ class McpSession:
     # Resources
 
     async def resources(
-        self, context: Context, params: types.PaginatedRequestParams | None
+        self, context: CallContext, params: types.PaginatedRequestParams | None
     ) -> types.ListResourcesResult:
         """List the language and the robots of the project."""
         robots = await asyncio.to_thread(self._paths.robots)
@@ -100,7 +100,7 @@ class McpSession:
         )
 
     async def templates(
-        self, context: Context, params: types.PaginatedRequestParams | None
+        self, context: CallContext, params: types.PaginatedRequestParams | None
     ) -> types.ListResourceTemplatesResult:
         """List the pages of findings, which are too many for a list."""
         page = types.ResourceTemplate(
@@ -108,7 +108,7 @@ class McpSession:
         )
         return types.ListResourceTemplatesResult(resource_templates=[page])
 
-    async def read(self, context: Context, params: types.ReadResourceRequestParams) -> types.ReadResourceResult:
+    async def read(self, context: CallContext, params: types.ReadResourceRequestParams) -> types.ReadResourceResult:
         """Return the text of a resource."""
         began, result = time.monotonic(), "ok"
         try:
@@ -135,7 +135,7 @@ def _page(path: Path) -> str:
     return read_regular(path, FILE_BYTES).decode("utf-8")
 
 
-def _client(context: Context) -> str:
+def _client(context: CallContext) -> str:
     """Return what logs call the client; it says itself who it is."""
     known = context.session.client_params
     return f"mcp, {plain(known.client_info.name, _CLIENT)}" if known is not None else "mcp"

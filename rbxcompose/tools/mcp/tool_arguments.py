@@ -9,8 +9,8 @@ from pydantic import Field
 from rbxcompose.base.config import Config
 
 _WORD = r"^[A-Za-z0-9_$][^\s/\\]*$"  # never an option, and never a path
-Word = Annotated[str, Field(pattern=_WORD, max_length=200)]
-WordOrNone = Annotated[str, Field(pattern=rf"^$|{_WORD}", max_length=200)]
+PlainWord = Annotated[str, Field(pattern=_WORD, max_length=200)]
+PlainWordOrNone = Annotated[str, Field(pattern=rf"^$|{_WORD}", max_length=200)]
 ProjectPath = Annotated[str, Field(min_length=1, max_length=1000)]
 
 
@@ -26,14 +26,14 @@ class CheckArguments(WithTexts):
 
     paths: Annotated[list[ProjectPath], Field(max_length=100)] = ["."]
     """Robots, missions, parts, tests or systems, or folders of them; without any, all robots of the project."""
-    profiles: Annotated[list[Word], Field(max_length=20)] = []
+    profiles: Annotated[list[PlainWord], Field(max_length=20)] = []
     """Profiles to apply."""
 
 
 class ExplainArguments(Config):
     """Arguments of `explain`."""
 
-    code: Word
+    code: PlainWord
     """Such as RBX1001."""
 
 
@@ -42,14 +42,14 @@ class RobotArguments(WithTexts):
 
     robot: Annotated[str, Field(max_length=1000)] = ""
     """The robot's file or folder, or rbx:robots/NAME of the library; without it, the only one of the project."""
-    profiles: Annotated[list[Word], Field(max_length=20)] = []
+    profiles: Annotated[list[PlainWord], Field(max_length=20)] = []
     """Profiles to apply."""
 
 
 class WhyArguments(RobotArguments):
     """Arguments of `why`."""
 
-    value: Word
+    value: PlainWord
     """The path of a value, such as battery.runtime, or of a port, such as go_to.cmd_vel."""
 
 
@@ -65,7 +65,7 @@ class TrialArguments(WithTexts):
 class DryRunArguments(WithTexts):
     """Arguments of `dry_run`."""
 
-    mission: Word
+    mission: PlainWord
     """The name that the robot gives it."""
     robot: Annotated[str, Field(max_length=1000)] = ""
     """The robot's file or folder, or rbx:robots/NAME of the library; without it, the only one of the project."""
@@ -74,14 +74,14 @@ class DryRunArguments(WithTexts):
 class UpArguments(Config):
     """Arguments of a tool about a robot that runs."""
 
-    robot: WordOrNone = ""
+    robot: PlainWordOrNone = ""
     """The name of a robot that is up; without it, the only one."""
 
 
 class StoryArguments(UpArguments):
     """Arguments of `story`."""
 
-    mission: WordOrNone = ""
+    mission: PlainWordOrNone = ""
     """Only what this one did."""
     lines: Annotated[int, Field(ge=1, le=200)] = 100
     """How many of the newest lines."""
@@ -90,16 +90,16 @@ class StoryArguments(UpArguments):
 class MissionArguments(UpArguments):
     """Arguments of a tool about a mission that runs."""
 
-    mission: WordOrNone = ""
+    mission: PlainWordOrNone = ""
     """Which one; without it, the only one that runs."""
 
 
 class RunArguments(UpArguments):
     """Arguments of `mission_run`."""
 
-    mission: Word
+    mission: PlainWord
     """Which one."""
     inputs: dict[Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*$")], str] = {}
     """Its inputs as text, such as {"rounds": "2"}."""
-    start: WordOrNone = ""
+    start: PlainWordOrNone = ""
     """Start in this state: 'outer.inner'."""

@@ -32,7 +32,7 @@ from rbxcompose.tools.mcp.tool_arguments import (
 )
 from rbxcompose.tools.mcp.verb_process import VerbProcesses
 
-Answer = dict[str, Any]
+ToolAnswer = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,16 +53,16 @@ class VerbTool:
     about: str
     arguments: type[Config]
     role: Role
-    do: Callable[[ToolContext, Any], Awaitable[Answer]]
+    do: Callable[[ToolContext, Any], Awaitable[ToolAnswer]]
 
 
-async def _check(context: ToolContext, given: CheckArguments) -> Answer:
+async def _check(context: ToolContext, given: CheckArguments) -> ToolAnswer:
     paths = await asyncio.to_thread(context.paths.checked, given.paths)
     texts = context.paths.texts(given.unsaved)
     words = ("check", "--format", "json", *_profiles(given.profiles), *paths)
     done = await context.verbs.compiles(*words, folder=context.paths.root, unsaved=texts)
     findings = done.data(0, 1)
-    count = {severity: sum(one["severity"] == severity for one in findings) for severity in Severity}
+    count = {severity: sum(finding["severity"] == severity for finding in findings) for severity in Severity}
     return {
         "is_fine": done.code == 0,
         "errors": count[Severity.ERROR],
@@ -71,19 +71,19 @@ async def _check(context: ToolContext, given: CheckArguments) -> Answer:
     }
 
 
-async def _explain(context: ToolContext, given: ExplainArguments) -> Answer:
+async def _explain(context: ToolContext, given: ExplainArguments) -> ToolAnswer:
     done = await context.verbs.compiles("explain", given.code, "--json", folder=context.paths.root)
     return dict(done.data(0))
 
 
-async def _why(context: ToolContext, given: WhyArguments) -> Answer:
+async def _why(context: ToolContext, given: WhyArguments) -> ToolAnswer:
     robot = await asyncio.to_thread(context.paths.robot, given.robot)
     texts = context.paths.texts(given.unsaved)
     words = ("why", given.value, robot, "--json", *_profiles(given.profiles))
     return dict((await context.verbs.compiles(*words, folder=context.paths.root, unsaved=texts)).data(0))
 
 
-async def _plan(context: ToolContext, given: RobotArguments) -> Answer:
+async def _plan(context: ToolContext, given: RobotArguments) -> ToolAnswer:
     robot = await asyncio.to_thread(context.paths.robot, given.robot)
     texts = context.paths.texts(given.unsaved)
     words = ("plan", robot, *_profiles(given.profiles))
@@ -93,25 +93,25 @@ async def _plan(context: ToolContext, given: RobotArguments) -> Answer:
     return {"plan": done.out.rstrip("\n")}
 
 
-async def _test(context: ToolContext, given: TrialArguments) -> Answer:
+async def _test(context: ToolContext, given: TrialArguments) -> ToolAnswer:
     paths = await asyncio.to_thread(context.paths.tests, given.paths)
     texts = context.paths.texts(given.unsaved)
     words = ("test", "--json", f"--filter={given.filter}", *paths)
     done = await context.verbs.compiles(*words, folder=context.paths.root, unsaved=texts)
-    told = done.data(0, 1)
-    for each in told["tests"]:
-        if each["passed"]:
-            del each["trace"]  # only of a failure it says something
-    passed = sum(each["passed"] for each in told["tests"])
-    return {"passed": passed, "failed": len(told["tests"]) - passed, "tests": told["tests"]}
+    tests = done.data(0, 1)["tests"]
+    for test in tests:
+        if test["passed"]:
+            del test["trace"]  # only that of a failure says something
+    passed = sum(test["passed"] for test in tests)
+    return {"passed": passed, "failed": len(tests) - passed, "tests": tests}
 
 
-async def _dry_run(context: ToolContext, given: DryRunArguments) -> Answer:
+async def _dry_run(context: ToolContext, given: DryRunArguments) -> ToolAnswer:
     robot = await asyncio.to_thread(context.paths.robot, given.robot)
     texts = context.paths.texts(given.unsaved)
     words = ("mission", "try", given.mission, robot, "--json")
-    told = (await context.verbs.compiles(*words, folder=context.paths.root, unsaved=texts)).data(0)
-    return {key: told[key] for key in ("outcome", "why", "time", "left_out", "story")}
+    tried = (await context.verbs.compiles(*words, folder=context.paths.root, unsaved=texts)).data(0)
+    return {key: tried[key] for key in ("outcome", "why", "time", "left_out", "story")}
 
 
 def _profiles(names: list[str]) -> list[str]:
@@ -121,16 +121,16 @@ def _profiles(names: list[str]) -> list[str]:
 # Robots that run
 
 
-async def _state(context: ToolContext, given: UpArguments) -> Answer:
+async def _state(context: ToolContext, given: UpArguments) -> ToolAnswer:
     robot = ("--robot", (await _found(given)).path.name, "--json")
     shown, watched = await asyncio.gather(context.verbs.run("ps", *robot), context.verbs.run("top", *robot))
     listed, seen = shown.data(0), watched.data(0)
-    more = {one["name"]: one for one in seen["components"]}
-    components = [{**more.get(one["name"], {}), **one} for one in listed["components"]]
+    more = {component["name"]: component for component in seen["components"]}
+    components = [{**more.get(component["name"], {}), **component} for component in listed["components"]]
     return {**seen, **{key: listed[key] for key in ("robot", "real", "stop")}, "components": components}
 
 
-async def _story(context: ToolContext, given: StoryArguments) -> Answer:
+async def _story(context: ToolContext, given: StoryArguments) -> ToolAnswer:
     robot = (await _found(given)).path.name
     words = ("mission", "log", *([given.mission] if given.mission else []), "--robot", robot, "--json")
     done = await context.verbs.run(*words)
@@ -148,7 +148,7 @@ async def _found(given: UpArguments) -> RobotFolder:
         raise Refused(words_of_finding(error.finding)) from error
 
 
-async def _operate(context: ToolContext, given: UpArguments, *words: str) -> Answer:
+async def _operate(context: ToolContext, given: UpArguments, *words: str) -> ToolAnswer:
     """Say in a robot's log what it is to do, and have it do so."""
     folder = await _found(given)
     try:
@@ -158,7 +158,7 @@ async def _operate(context: ToolContext, given: UpArguments, *words: str) -> Ans
     return await _done(context, folder, words)
 
 
-async def _done(context: ToolContext, folder: RobotFolder, words: Sequence[str]) -> Answer:
+async def _done(context: ToolContext, folder: RobotFolder, words: Sequence[str]) -> ToolAnswer:
     return dict((await context.verbs.run(*words, "--robot", folder.path.name, "--json")).data(0))
 
 
@@ -166,20 +166,20 @@ def _note(context: ToolContext, words: Sequence[str]) -> NoteInLog:
     return NoteInLog(f"{context.client} ({context.role.word}): asks {' '.join(words)}")
 
 
-async def _run(context: ToolContext, given: RunArguments) -> Answer:
+async def _run(context: ToolContext, given: RunArguments) -> ToolAnswer:
     sets = [f"--set={name}={text}" for name, text in given.inputs.items()]
     start = [f"--from={given.start}"] if given.start else []
     return await _operate(context, given, "mission", "run", given.mission, *sets, *start)
 
 
-def _of_mission(action: str) -> Callable[[ToolContext, MissionArguments], Awaitable[Answer]]:
-    async def do(context: ToolContext, given: MissionArguments) -> Answer:
+def _of_mission(action: str) -> Callable[[ToolContext, MissionArguments], Awaitable[ToolAnswer]]:
+    async def do(context: ToolContext, given: MissionArguments) -> ToolAnswer:
         return await _operate(context, given, "mission", action, *([given.mission] if given.mission else []))
 
     return do
 
 
-async def _stop(context: ToolContext, given: UpArguments) -> Answer:
+async def _stop(context: ToolContext, given: UpArguments) -> ToolAnswer:
     """Stop first: the note can wait, and a robot whose supervisor does not answer takes none."""
     folder, words = await _found(given), ("stop",)
     answer = await _done(context, folder, words)
@@ -188,7 +188,7 @@ async def _stop(context: ToolContext, given: UpArguments) -> Answer:
     return answer
 
 
-async def _release(context: ToolContext, given: UpArguments) -> Answer:
+async def _release(context: ToolContext, given: UpArguments) -> ToolAnswer:
     return await _operate(context, given, "release")
 
 

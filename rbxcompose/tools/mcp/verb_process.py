@@ -23,7 +23,7 @@ MOST_WAITING = 16  # that wait for those
 MOST_OUTPUT = 16_000_000  # [B] that are kept of what a verb writes
 _CHUNK = 65536  # [B]
 _CRASH = "Traceback (most recent call last)"
-_TOLD = 4000  # characters of what went wrong
+_WORDS = 4000  # characters of what went wrong
 ANYWHERE = Path("/")
 """Where verbs about robots that run are at home: no file there has the name of a robot."""
 
@@ -53,10 +53,10 @@ class VerbOutput:
     @property
     def trouble(self) -> str:
         """Return what is wrong, in words for people."""
-        told = self.err.strip()
-        if _CRASH in told:
-            return f"the command has failed: {told.splitlines()[-1][:_TOLD]}"
-        return told[-_TOLD:] or f"the command ended with {self.code} and gave no answer"
+        errors = self.err.strip()
+        if _CRASH in errors:
+            return f"the command has failed: {errors.splitlines()[-1][:_WORDS]}"
+        return errors[-_WORDS:] or f"the command ended with {self.code} and gave no answer"
 
 
 class VerbProcesses:
