@@ -9,24 +9,12 @@ import pytest
 
 from rbxcompose.base.requests import Refused
 from rbxcompose.tools.mcp import verb_process
-from rbxcompose.tools.mcp.verb_process import VerbOutput, VerbProcesses
-
-
-def test_who_comes_while_too_many_wait_is_told_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(verb_process, "MOST_WAITING", 3)
-
-    async def crowd() -> list[str]:
-        verbs = VerbProcesses(0.01)
-        calls = (verbs.compiles("explain", folder=tmp_path) for _ in range(5))
-        return [str(end) for end in await asyncio.gather(*calls, return_exceptions=True)]
-
-    late, busy = "it took more than 0.01 s, and was ended", "too many calls are waiting: try again"
-    assert asyncio.run(crowd()) == [late] * 3 + [busy] * 2
+from rbxcompose.tools.mcp.verb_process import VerbOutput, run_verb
 
 
 def test_what_is_kept_of_an_output_is_limited(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(verb_process, "MOST_OUTPUT", 100)
-    output = asyncio.run(VerbProcesses(60.0).run("help", folder=tmp_path))
+    output = asyncio.run(run_verb("help", folder=tmp_path))
     assert (output.code, len(output.out)) == (0, 100)
     with pytest.raises(Refused, match="the answer is too large"):
         output.data(0)

@@ -7,6 +7,7 @@ import json
 import time
 import traceback
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +28,9 @@ from rbxcompose.manifest.files import library_root
 from rbxcompose.manifest.tree import FILE_BYTES
 from rbxcompose.tools.mcp.answer_size import limited
 from rbxcompose.tools.mcp.audit_log import AuditLog
+from rbxcompose.tools.mcp.lanes import Lane, Lanes
 from rbxcompose.tools.mcp.project_paths import ProjectPaths
 from rbxcompose.tools.mcp.tools import TOOLS, ToolContext, VerbTool
-from rbxcompose.tools.mcp.verb_process import VerbProcesses
 
 CallContext = ServerRequestContext[Any]
 LANGUAGE = "rbxcompose://language"
@@ -47,7 +48,8 @@ class McpSession:
 
     def __init__(self, role: Role, deadline: float, log: AuditLog) -> None:
         self.role, self._log = role, log
-        self._paths, self._verbs = ProjectPaths(), VerbProcesses(deadline)
+        self._paths, self._lanes = ProjectPaths(), Lanes(deadline)
+        self._threads = ThreadPoolExecutor(Lane.COMPILE.at_once, "paths")
 
     async def tools(self, context: CallContext, params: types.PaginatedRequestParams | None) -> types.ListToolsResult:
         """List the tools of the role."""
@@ -83,7 +85,8 @@ class McpSession:
             arguments = tool.arguments.model_validate(dict(given))
         except ValidationError as error:
             raise Refused("; ".join(map(_words_of_error, error.errors(include_url=False)))) from error
-        return await tool.do(ToolContext(self._paths, self._verbs, client, self.role), arguments)
+        async with self._lanes.turn(tool.lane):
+            return await tool.do(ToolContext(self._paths, self._threads, client, self.role), arguments)
 
     # Resources
 

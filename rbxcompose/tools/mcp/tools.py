@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import suppress
-from typing import Any
+from typing import Any, TypeVar
 
 from rbxcompose.base.config import Config
 from rbxcompose.base.dataclass import dataclass
@@ -17,6 +18,7 @@ from rbxcompose.commands.lookup import answer_of, find_robot
 from rbxcompose.domains.console.access import Role
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.requests import NoteInLog
+from rbxcompose.tools.mcp.lanes import Lane
 from rbxcompose.tools.mcp.project_paths import ProjectPaths, words_of_finding
 from rbxcompose.tools.mcp.tool_arguments import (
     CheckArguments,
@@ -30,37 +32,48 @@ from rbxcompose.tools.mcp.tool_arguments import (
     UpArguments,
     WhyArguments,
 )
-from rbxcompose.tools.mcp.verb_process import VerbProcesses
+from rbxcompose.tools.mcp.verb_process import run_verb
 
 ToolAnswer = dict[str, Any]
+P = TypeVar("P")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
 class ToolContext:
-    """What tools work with: the paths of the project, the verbs, and what the robot's log calls the client."""
+    """What tools work with: the paths of the project, threads that look there, what logs call the client, its role."""
 
     paths: ProjectPaths
-    verbs: VerbProcesses
+    threads: Executor
     client: str
     role: Role
+
+    async def on_disk(self, find: Callable[[P], T], given: P) -> T:
+        """Return what is found in the project, which may be large; nothing else waits for that."""
+        return await asyncio.get_running_loop().run_in_executor(self.threads, find, given)
 
 
 @dataclass(frozen=True, slots=True)
 class VerbTool:
-    """A tool: its name, what it is for, its arguments, the least role that may use it, and what carries it out."""
+    """A tool: its name, what it is for, its arguments, and what carries it out."""
 
     name: str
     about: str
     arguments: type[Config]
-    role: Role
+    lane: Lane
     do: Callable[[ToolContext, Any], Awaitable[ToolAnswer]]
+
+    @property
+    def role(self) -> Role:
+        """Return the least role that may use it."""
+        return Role.VIEW if self.lane in (Lane.COMPILE, Lane.LOOK) else Role.OPERATE
 
 
 async def _check(context: ToolContext, given: CheckArguments) -> ToolAnswer:
-    paths = await asyncio.to_thread(context.paths.checked, given.paths)
+    paths = await context.on_disk(context.paths.checked, given.paths)
     texts = context.paths.texts(given.unsaved)
     words = ("check", "--format", "json", *_profiles(given.profiles), *paths)
-    done = await context.verbs.compiles(*words, folder=context.paths.root, unsaved=texts)
+    done = await run_verb(*words, folder=context.paths.root, unsaved=texts)
     findings = done.data(0, 1)
     count = {severity: sum(finding["severity"] == severity for finding in findings) for severity in Severity}
     return {
@@ -72,32 +85,32 @@ async def _check(context: ToolContext, given: CheckArguments) -> ToolAnswer:
 
 
 async def _explain(context: ToolContext, given: ExplainArguments) -> ToolAnswer:
-    done = await context.verbs.compiles("explain", given.code, "--json", folder=context.paths.root)
+    done = await run_verb("explain", given.code, "--json", folder=context.paths.root)
     return dict(done.data(0))
 
 
 async def _why(context: ToolContext, given: WhyArguments) -> ToolAnswer:
-    robot = await asyncio.to_thread(context.paths.robot, given.robot)
+    robot = await context.on_disk(context.paths.robot, given.robot)
     texts = context.paths.texts(given.unsaved)
     words = ("why", given.value, robot, "--json", *_profiles(given.profiles))
-    return dict((await context.verbs.compiles(*words, folder=context.paths.root, unsaved=texts)).data(0))
+    return dict((await run_verb(*words, folder=context.paths.root, unsaved=texts)).data(0))
 
 
 async def _plan(context: ToolContext, given: RobotArguments) -> ToolAnswer:
-    robot = await asyncio.to_thread(context.paths.robot, given.robot)
+    robot = await context.on_disk(context.paths.robot, given.robot)
     texts = context.paths.texts(given.unsaved)
     words = ("plan", robot, *_profiles(given.profiles))
-    done = await context.verbs.compiles(*words, folder=context.paths.root, unsaved=texts)
+    done = await run_verb(*words, folder=context.paths.root, unsaved=texts)
     if done.code:
         raise Refused(done.trouble)
     return {"plan": done.out.rstrip("\n")}
 
 
 async def _test(context: ToolContext, given: TrialArguments) -> ToolAnswer:
-    paths = await asyncio.to_thread(context.paths.tests, given.paths)
+    paths = await context.on_disk(context.paths.tests, given.paths)
     texts = context.paths.texts(given.unsaved)
     words = ("test", "--json", f"--filter={given.filter}", *paths)
-    done = await context.verbs.compiles(*words, folder=context.paths.root, unsaved=texts)
+    done = await run_verb(*words, folder=context.paths.root, unsaved=texts)
     tests = done.data(0, 1)["tests"]
     for test in tests:
         if test["passed"]:
@@ -107,10 +120,10 @@ async def _test(context: ToolContext, given: TrialArguments) -> ToolAnswer:
 
 
 async def _dry_run(context: ToolContext, given: DryRunArguments) -> ToolAnswer:
-    robot = await asyncio.to_thread(context.paths.robot, given.robot)
+    robot = await context.on_disk(context.paths.robot, given.robot)
     texts = context.paths.texts(given.unsaved)
     words = ("mission", "try", given.mission, robot, "--json")
-    tried = (await context.verbs.compiles(*words, folder=context.paths.root, unsaved=texts)).data(0)
+    tried = (await run_verb(*words, folder=context.paths.root, unsaved=texts)).data(0)
     return {key: tried[key] for key in ("outcome", "why", "time", "left_out", "story")}
 
 
@@ -123,7 +136,7 @@ def _profiles(names: list[str]) -> list[str]:
 
 async def _state(context: ToolContext, given: UpArguments) -> ToolAnswer:
     robot = ("--robot", (await _found(given)).path.name, "--json")
-    shown, watched = await asyncio.gather(context.verbs.run("ps", *robot), context.verbs.run("top", *robot))
+    shown, watched = await asyncio.gather(run_verb("ps", *robot), run_verb("top", *robot))
     listed, seen = shown.data(0), watched.data(0)
     more = {component["name"]: component for component in seen["components"]}
     components = [{**more.get(component["name"], {}), **component} for component in listed["components"]]
@@ -133,7 +146,7 @@ async def _state(context: ToolContext, given: UpArguments) -> ToolAnswer:
 async def _story(context: ToolContext, given: StoryArguments) -> ToolAnswer:
     robot = (await _found(given)).path.name
     words = ("mission", "log", *([given.mission] if given.mission else []), "--robot", robot, "--json")
-    done = await context.verbs.run(*words)
+    done = await run_verb(*words)
     if done.code:
         raise Refused(done.trouble)
     lines = done.out.splitlines()
@@ -159,7 +172,7 @@ async def _operate(context: ToolContext, given: UpArguments, *words: str) -> Too
 
 
 async def _done(context: ToolContext, folder: RobotFolder, words: Sequence[str]) -> ToolAnswer:
-    return dict((await context.verbs.run(*words, "--robot", folder.path.name, "--json")).data(0))
+    return dict((await run_verb(*words, "--robot", folder.path.name, "--json")).data(0))
 
 
 def _note(context: ToolContext, words: Sequence[str]) -> NoteInLog:
@@ -200,51 +213,51 @@ TOOLS: Mapping[str, VerbTool] = {
             "Find the mistakes of robots, missions, tests and systems of the project: each with its code, place, help "
             "and, where it is known, the fix.",
             CheckArguments,
-            Role.VIEW,
+            Lane.COMPILE,
             _check,
         ),
-        VerbTool("explain", "Explain the code of a finding, with examples.", ExplainArguments, Role.VIEW, _explain),
+        VerbTool("explain", "Explain the code of a finding, with examples.", ExplainArguments, Lane.COMPILE, _explain),
         VerbTool(
             "why",
             "Show where a value of a robot comes from: its file and line, the layers below it, what it is for.",
             WhyArguments,
-            Role.VIEW,
+            Lane.COMPILE,
             _why,
         ),
-        VerbTool("plan", "Show what would run: processes, components, their topics.", RobotArguments, Role.VIEW, _plan),
-        VerbTool("test", "Run the tests of missions in virtual time.", TrialArguments, Role.VIEW, _test),
+        VerbTool("plan", "Show what would run: processes, components, topics.", RobotArguments, Lane.COMPILE, _plan),
+        VerbTool("test", "Run the tests of missions in virtual time.", TrialArguments, Lane.COMPILE, _test),
         VerbTool(
             "dry_run",
             "Run a mission on the simulated robot in virtual time: its outcome, the time [s] and the story.",
             DryRunArguments,
-            Role.VIEW,
+            Lane.COMPILE,
             _dry_run,
         ),
         VerbTool(
             "state",
             "Show a robot that runs: components, missions, diagnostics, batteries, warnings, who has stopped it.",
             UpArguments,
-            Role.VIEW,
+            Lane.LOOK,
             _state,
         ),
-        VerbTool("story", "Show what the missions of a robot that runs did.", StoryArguments, Role.VIEW, _story),
-        VerbTool("mission_run", "Start a mission: the robot may move.", RunArguments, Role.OPERATE, _run),
-        VerbTool("mission_pause", "Hold a mission.", MissionArguments, Role.OPERATE, _of_mission("pause")),
+        VerbTool("story", "Show what the missions of a robot that runs did.", StoryArguments, Lane.LOOK, _story),
+        VerbTool("mission_run", "Start a mission: the robot may move.", RunArguments, Lane.OPERATE, _run),
+        VerbTool("mission_pause", "Hold a mission.", MissionArguments, Lane.OPERATE, _of_mission("pause")),
         VerbTool(
             "mission_resume",
             "Resume a mission where it was held: the robot may move.",
             MissionArguments,
-            Role.OPERATE,
+            Lane.OPERATE,
             _of_mission("resume"),
         ),
-        VerbTool("mission_cancel", "End a mission for good.", MissionArguments, Role.OPERATE, _of_mission("cancel")),
+        VerbTool("mission_cancel", "End a mission for good.", MissionArguments, Lane.OPERATE, _of_mission("cancel")),
         VerbTool(
             "stop",
             "Stop everything that moves immediately, until it is released. It is no emergency stop.",
             UpArguments,
-            Role.OPERATE,
+            Lane.STOP,
             _stop,
         ),
-        VerbTool("release", "Allow motion again after a stop.", UpArguments, Role.OPERATE, _release),
+        VerbTool("release", "Allow motion again after a stop.", UpArguments, Lane.OPERATE, _release),
     )
 }  # fmt: skip

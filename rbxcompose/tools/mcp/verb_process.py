@@ -1,4 +1,4 @@
-"""Verbs in processes of their own, each with a deadline: whatever happens in one, the server goes on."""
+"""Verbs in processes of their own: whatever happens in one, the server goes on."""
 
 from __future__ import annotations
 
@@ -18,8 +18,6 @@ from anyio import CancelScope
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import Refused
 
-AT_ONCE = 2  # verbs that compile
-MOST_WAITING = 16  # that wait for those
 MOST_OUTPUT = 16_000_000  # [B] that are kept of what a verb writes
 _CHUNK = 65536  # [B]
 _CRASH = "Traceback (most recent call last)"
@@ -59,53 +57,25 @@ class VerbOutput:
         return errors[-_WORDS:] or f"the command ended with {self.code} and gave no answer"
 
 
-class VerbProcesses:
-    """Runs verbs of the command line."""
-
-    def __init__(self, deadline: float) -> None:
-        self._deadline = deadline
-        self._turns = asyncio.Semaphore(AT_ONCE)
-        self._waiting = 0
-
-    async def compiles(self, *words: str, folder: Path, unsaved: Mapping[str, str] | None = None) -> VerbOutput:
-        """Run a verb that compiles, after those before it."""
-        if self._waiting >= MOST_WAITING:
-            raise Refused("too many calls are waiting: try again")
-        self._waiting += 1
-        try:
-            async with self._turns:
-                option = ("--unsaved", "-") if unsaved else ()
-                return await self.run(*words, *option, folder=folder, given=json.dumps(unsaved) if unsaved else "")
-        finally:
-            self._waiting -= 1
-
-    async def run(self, *words: str, folder: Path = ANYWHERE, given: str = "") -> VerbOutput:
-        """Run a verb at once, with this text as its input.
-
-        Raises:
-            Refused: if it takes too long; it has been ended then.
-        """
-        process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-P", "-m", "rbxcompose", *words),
-            cwd=folder,
-            stdin=PIPE,
-            stdout=PIPE,
-            stderr=PIPE,
-            start_new_session=True,
-        )
-        try:
-            async with asyncio.timeout(self._deadline):
-                out, err = await _exchanged(process, given)
-                code = await process.wait()
-        except TimeoutError as error:
-            raise Refused(f"it took more than {self._deadline:g} s, and was ended") from error
-        finally:
-            if process.returncode is None:
-                with suppress(ProcessLookupError):  # it has just ended
-                    os.killpg(process.pid, signal.SIGKILL)
-                with CancelScope(shield=True):  # a call that its client cancels leaves no process, either
-                    await process.wait()
-        return VerbOutput(code, out, err)
+async def run_verb(*words: str, folder: Path = ANYWHERE, unsaved: Mapping[str, str] | None = None) -> VerbOutput:
+    """Run a verb, which is ended if the caller is cancelled; `unsaved` are texts in place of those of files."""
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-P", "-m", "rbxcompose", *words, *(("--unsaved", "-") if unsaved else ())),
+        cwd=folder,
+        stdin=PIPE,
+        stdout=PIPE,
+        stderr=PIPE,
+        start_new_session=True,
+    )
+    try:
+        out, err = await _exchanged(process, json.dumps(unsaved) if unsaved else "")
+        return VerbOutput(await process.wait(), out, err)
+    finally:
+        if process.returncode is None:
+            with suppress(ProcessLookupError):  # it has just ended
+                os.killpg(process.pid, signal.SIGKILL)
+            with CancelScope(shield=True):
+                await process.wait()
 
 
 async def _exchanged(process: asyncio.subprocess.Process, given: str) -> Sequence[str]:
