@@ -18,6 +18,7 @@ REAL_TIME = {
     ),
     "robots and systems": (
         "tests/console/test_gateway_live",
+        "tests/mcp/test_operating",
         "tests/programs/test_up",
         "tests/ros2/test_bridge",
         "tests/runtime/test_apply_for_real",

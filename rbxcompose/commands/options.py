@@ -1,14 +1,16 @@
 """Options and arguments that verbs share; apart from what carries them out, which takes longer to import."""
 
 import argparse
+import json
 import re
-from collections.abc import Callable, Iterable
+import sys
+from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.files import open_regular
+from rbxcompose.base.files import open_regular, read_regular
 from rbxcompose.base.units import FREQUENCY, TIME, Dimension, UnitError, to_si
 
 EACH, BUS = "each host", "bus"
@@ -68,6 +70,35 @@ def run_action(arguments: argparse.Namespace, *before: object) -> int:
     """Carry out the chosen subcommand with what stands `before` its arguments; return the exit code."""
     do: Callable[..., int] = arguments.do
     return do(*before, arguments)
+
+
+def add_unsaved_option(parser: argparse.ArgumentParser) -> None:
+    """Declare `--unsaved FILE`."""
+    words = """texts in place of those of files, as JSON: {"PATH": "TEXT"}; '-' reads it from stdin"""
+    parser.add_argument("--unsaved", type=_unsaved, default={}, metavar="FILE", help=words)
+
+
+def unsaved_of(arguments: argparse.Namespace) -> Mapping[Path, str]:
+    """Return the texts that are used in place of files, by their real paths."""
+    found: Mapping[Path, str] = getattr(arguments, "unsaved", {})
+    return found
+
+
+def _unsaved(file: str) -> Mapping[Path, str]:
+    """Read texts by the paths of files that there are."""
+    from rbxcompose.manifest.tree import ALL_BYTES  # takes longer to import
+
+    try:
+        data = sys.stdin.buffer.read(ALL_BYTES + 1) if file == "-" else read_regular(Path(file), ALL_BYTES)
+        texts = json.loads(data[: ALL_BYTES + 1])
+    except (OSError, ValueError, RecursionError) as error:
+        raise argparse.ArgumentTypeError(f"'{file}' cannot be read: {error}") from error
+    if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
+        raise argparse.ArgumentTypeError(f"'{file}' has no texts by paths")
+    for path in texts:
+        if not Path(path).is_file():
+            raise argparse.ArgumentTypeError(f"'{path}' is no file: only those that exist can have another text")
+    return {Path(path).resolve(): text.removeprefix("\ufeff").replace("\r\n", "\n") for path, text in texts.items()}
 
 
 def add_system_options(parser: argparse.ArgumentParser, *, has_profile: bool = False) -> None:

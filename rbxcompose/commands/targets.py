@@ -12,7 +12,7 @@ from typing import TypedDict
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Severity, Span, kind
 from rbxcompose.commands.console import NotDoneError
-from rbxcompose.commands.options import is_system, kind_of
+from rbxcompose.commands.options import is_system, kind_of, unsaved_of
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import PREFIX, ROBOT_FILE, find, project_of, shown_name
@@ -164,6 +164,7 @@ class Layers(TypedDict):
     sets: Sequence[str]
     real: bool
     environment: Mapping[str, str]
+    unsaved: Mapping[Path, str]
 
 
 def add_layer_options(parser: argparse.ArgumentParser) -> None:
@@ -206,6 +207,7 @@ def layers_of(arguments: argparse.Namespace) -> Layers:
         "sets": arguments.sets,
         "real": arguments.real,
         "environment": os.environ,
+        "unsaved": unsaved_of(arguments),
     }
 
 

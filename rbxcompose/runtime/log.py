@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from io import BufferedReader
 from itertools import pairwise
 from pathlib import Path
+from typing import Protocol
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
@@ -57,6 +58,19 @@ class Record:
             raise ValueError(f"not a log record: {line!r}") from error
 
 
+class LogLine(Protocol):
+    """What a log file takes: a line of JSON, and its time."""
+
+    @property
+    def time(self) -> float:
+        """Return when it was [s]."""
+        ...
+
+    def to_json(self) -> str:
+        """Return it as one line, without a newline."""
+        ...
+
+
 WriteRecord = Callable[[Record], None]
 
 
@@ -79,7 +93,7 @@ class LogFile:
         """Return its descriptor, whose number stays the same."""
         return self._descriptor
 
-    def write(self, record: Record) -> None:
+    def write(self, record: LogLine) -> None:
         """Append one record."""
         if self._lost and self._append(_loss(record.time, self._lost)):
             self._lost = 0
@@ -90,7 +104,7 @@ class LogFile:
         """Close the file."""
         os.close(self._descriptor)
 
-    def _append(self, record: Record) -> bool:
+    def _append(self, record: LogLine) -> bool:
         line = record.to_json().encode(errors="backslashreplace") + b"\n"
         line = b"\n" + line if self._is_torn else line
         try:

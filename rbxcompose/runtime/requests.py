@@ -80,6 +80,14 @@ class ReleaseRobot(Command):
 
 
 @dataclass(frozen=True, slots=True)
+class NoteInLog(Command):
+    """Write into the robot's log what somebody does with it."""
+
+    about = ROBOT
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class BringDown(Command):
     """Bring the robot to rest and shut it down."""
 

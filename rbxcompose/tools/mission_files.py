@@ -16,11 +16,13 @@ from rbxcompose.base.findings import Span, kind, suggest
 from rbxcompose.base.requests import Refused
 from rbxcompose.base.units import example
 from rbxcompose.commands.console import FINDINGS, NotDoneError, ReportedError, emit, misused, table, write_report
-from rbxcompose.commands.lookup import answer_of, known_state, robots_up
+from rbxcompose.commands.lookup import REFUSED, answer_of, known_state, robots_up
+from rbxcompose.commands.options import unsaved_of
 from rbxcompose.commands.targets import put_robot_last, robot_path
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.model.skills import python_skills
+from rbxcompose.manifest.files import shown_name
 from rbxcompose.missions.engine.inputs import bind_texts
 from rbxcompose.missions.engine.log_replay import (
     OtherInterventionError,
@@ -323,6 +325,37 @@ def explore(arguments: argparse.Namespace) -> int:
     explored = explore_program(program, robot.names, inputs, ExplorationLimits(arguments.states, arguments.depth))
     emit(json.dumps(asdict(explored), indent=1) if arguments.json else text_of(explored))
     return FINDINGS if explored.found else 0
+
+
+def try_(arguments: argparse.Namespace) -> int:
+    """Run a mission on the simulated robot and the stepped clock; write its story, and what came of it."""
+    from rbxcompose.tools.mission_editor.dry_run import dry_run  # the bench takes time to import
+
+    put_robot_last(arguments, "name")
+    path = arguments.path or robot_path(None, may_run=False)
+    out = compile_robot(path, environment=os.environ, unsaved=unsaved_of(arguments), tries_profiles=False)
+    if out.robot is not None and arguments.name in out.robot.manifest.missions:
+        file = out.robot.manifest.missions[arguments.name].path
+        try:
+            tried = dry_run(out, arguments.name, file, out.sources.get(shown_name(file), ""))
+        except Refused as refusal:
+            if not out.report.has_errors:
+                raise NotDoneError(REFUSED.at(None, f"'{arguments.name}' is not run: {refusal}")) from refusal
+        else:
+            emit(json.dumps(tried, ensure_ascii=False) if arguments.json else _story(tried))
+            return 0
+    write_report(out.report, out.sources)
+    if out.robot is not None and not out.report.has_errors:
+        mission_in(out.robot, arguments.name)
+    raise ReportedError
+
+
+def _story(tried: Mapping[str, Any]) -> str:
+    """Return a dry run for people: a line for each event, and the end."""
+    left = [f"{tried['left_out']} lines before these are left out"] if tried["left_out"] else []
+    lines = [f"{line['time']:8.2f}  {line['text']}" for line in tried["story"]]
+    end = f"{tried['outcome'] or 'still running'} after {tried['time']:.2f} s"
+    return "\n".join([*left, *lines, ": ".join(filter(None, (end, tried["why"])))])
 
 
 def _inputs(robot: Robot, name: str, given: Mapping[str, str]) -> Mapping[str, Value]:

@@ -71,6 +71,7 @@ MISTAKES = {
     "mission status": "",
     "mission step": "",
     "mission triggers": "",
+    "mission try": "patrl robots/turtlebot",
     "mission watch": "",
     "mux add": "teleop",
     "mux delete": "teleop",

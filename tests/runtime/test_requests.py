@@ -23,7 +23,7 @@ from rbxcompose.runtime.channel import HostReport
 from rbxcompose.runtime.folder import RobotState, RunOptions
 from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
 from rbxcompose.runtime.processes import Process
-from rbxcompose.runtime.requests import BringDown, ReleaseRobot, RobotStatus, StopRobot
+from rbxcompose.runtime.requests import BringDown, NoteInLog, ReleaseRobot, RobotStatus, StopRobot
 from rbxcompose.runtime.supervision.changes import Fate
 from rbxcompose.runtime.supervision.conductor import Conductor
 from rbxcompose.runtime.supervision.judge import Judge
@@ -142,6 +142,14 @@ def test_release_is_refused_with_the_reason_while_a_component_needs_the_robot_to
     assert desk.ask(ReleaseRobot()) == ("the robot must stand still: 'estop' is pressed", True)
     desk.conductor.receive("mission", RobotHeld("estop", ""))
     assert desk.ask(ReleaseRobot())[1] is False
+
+
+def test_what_others_do_is_noted_on_one_line() -> None:
+    desk = Desk()
+    assert desk.ask(NoteInLog("somebody:\nasks")) == ("noted", False)
+    ((noted,),) = (desk.texts,)
+    assert noted.startswith("somebody:")
+    assert "\n" not in noted
 
 
 def test_the_status_comes_back_as_it_was() -> None:

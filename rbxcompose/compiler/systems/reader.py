@@ -5,6 +5,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from rbxcompose import __version__
@@ -35,6 +36,7 @@ from rbxcompose.compiler.systems.rules import UNKNOWN_HOST, system_findings
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.files import PREFIX, PROFILE, find, resolve, shown_name
 from rbxcompose.manifest.fill import fill, names_of
+from rbxcompose.manifest.reader import Texts
 from rbxcompose.manifest.section import SYSTEM, help_with_names
 from rbxcompose.manifest.system_file import LINKS, PROFILES, SECTIONS, SystemFile, SystemRobotModel
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, key_span, value_span
@@ -86,10 +88,18 @@ _APART = 1000  # from the port of a robot's links to that of what it shares
 
 
 def compile_system(
-    path: str, *, environment: Mapping[str, str], real: bool = False, profiles: Sequence[str] = ()
+    path: str,
+    *,
+    environment: Mapping[str, str],
+    real: bool = False,
+    profiles: Sequence[str] = (),
+    unsaved: Mapping[Path, str] = MappingProxyType({}),
 ) -> System:
-    """Compile the file of a system with these of its profiles; report all its mistakes, and those of its robots."""
-    out = System(profiles=tuple(profiles))
+    """Compile the file of a system with these of its profiles; report all its mistakes, and those of its robots.
+
+    `unsaved` are texts from an editor, by the real path of the file that each replaces.
+    """
+    out = System(profiles=tuple(profiles), sources=Texts(unsaved))
     file = find(path)
     if isinstance(file, Finding):
         out.report.add(file)
@@ -118,7 +128,7 @@ def compile_system(
             span = key_span(out.root, ("robots", max(member.entry, other.entry, key=len)))
             message = f"'{other.entry}' and '{member.entry}' both make a robot '{member.name}'"
             out.report.add(SAME_NAME.at(span, message, help="give one of them another name"))
-    compiling = _Compiling(out, environment, real)
+    compiling = _Compiling(out, environment, real, unsaved)
     compiling.outside = joined(compiling.given(one) for one in members)
     for member in members:
         if (robot := _placed_robot(member, out, compiling)) is not None:
@@ -224,6 +234,7 @@ class _Compiling:
     out: System
     environment: Mapping[str, str]
     real: bool
+    unsaved: Mapping[Path, str]
     outside: Outside = NOTHING
     done: dict[tuple[str, str | None, str], Compilation] = field(default_factory=dict)
     alone: dict[tuple[str, str | None, str], Robot | None] = field(default_factory=dict)
@@ -255,6 +266,7 @@ class _Compiling:
             sets=[f"world={world}"] if world else [],
             real=self.real,
             environment=self.environment,
+            unsaved=self.unsaved,
             outside=outside,
         )
 

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from rbxcompose.base.levels import Level
+from rbxcompose.base.printable import plain
 from rbxcompose.base.requests import Command, Refused, Request, UnreadableError, as_data, name_in, requests, to_data
 from rbxcompose.compiler.plan.dump import PlanTextError, load
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.folder import ChosenLayers, RobotState
 from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison, RevertPlan
-from rbxcompose.runtime.requests import ROBOT, BringDown, DescribeRobot, ReleaseRobot, RobotStatus, StopRobot
+from rbxcompose.runtime.requests import ROBOT, BringDown, DescribeRobot, NoteInLog, ReleaseRobot, RobotStatus, StopRobot
 from rbxcompose.runtime.supervision.changes import Changes, changes
 from rbxcompose.runtime.supervision.conductor import FINE, Conductor
 from rbxcompose.runtime.supervision.consultation import Consultations
@@ -18,7 +19,9 @@ from rbxcompose.runtime.supervision.descriptions import described
 from rbxcompose.runtime.supervision.setting_changes import SettingChanges
 from rbxcompose.sdk.registry import component_type
 
-OWN = requests(RobotStatus, DescribeRobot, StopRobot, ReleaseRobot, ComparePlan, ApplyPlan, RevertPlan, BringDown)
+OWN = requests(
+    RobotStatus, DescribeRobot, StopRobot, ReleaseRobot, NoteInLog, ComparePlan, ApplyPlan, RevertPlan, BringDown
+)
 
 
 class Supervised(Protocol):
@@ -93,6 +96,9 @@ class RequestHandler:
                 return self._stop()
             case ReleaseRobot():
                 return self._release()
+            case NoteInLog(text):
+                self._log(plain(text))
+                return "noted"
             case BringDown():
                 return self._bring_down()
         raise TypeError(f"{request} is not answered here")

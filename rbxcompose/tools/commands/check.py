@@ -9,7 +9,7 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Protocol
@@ -20,7 +20,8 @@ from rbxcompose.base.findings import Finding, Fix, Report, Sources, nearest
 from rbxcompose.base.fixes import apply, safe_fixes
 from rbxcompose.base.formats import format_names, renderer
 from rbxcompose.base.printable import plain
-from rbxcompose.commands.console import FINDINGS, emit, good, has_colour
+from rbxcompose.commands.console import FINDINGS, emit, good, has_colour, misused
+from rbxcompose.commands.options import add_unsaved_option, unsaved_of
 from rbxcompose.commands.targets import Targets, add_layer_options, compiled, projects_of, targets
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.plan.model import Plan, extent
@@ -40,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("paths", nargs="*", default=["."], metavar="PATH", help="what to check; else the robots here")
     add_layer_options(parser)
+    add_unsaved_option(parser)
     parser.add_argument("--format", choices=format_names(), default=TEXT, help="output format")
     parser.add_argument("--strict", action="store_true", help="count warnings as errors")
     parser.add_argument("--fix", action="store_true", help="fix what is certain, in the files")
@@ -66,6 +68,8 @@ class CheckedRobots:
 def run(arguments: argparse.Namespace) -> int:
     """Compile the robots, apply fixes if requested, and write the findings to stdout."""
     wanted = targets(arguments.paths)
+    if arguments.fix and arguments.unsaved:
+        return misused("check", "--fix changes files, and --unsaved is for texts that are in none: use one of them")
     if arguments.fix:
         fix(lambda: _check(wanted, arguments), emit if arguments.format == TEXT else _whisper)
     checked = _check(wanted, arguments)
@@ -83,7 +87,7 @@ def _check(wanted: Targets, arguments: argparse.Namespace) -> CheckedRobots:
         if any(file in one.sources for file in wanted.files):
             checked.add(one)
     if wanted.tests:
-        _check_tests(wanted.tests, checked)
+        _check_tests(wanted.tests, arguments, checked)
     for path in wanted.systems:
         _check_system(path, arguments, checked)
     projects = projects_of([*wanted.robots, *wanted.users, *wanted.tests, *wanted.systems])
@@ -91,10 +95,10 @@ def _check(wanted: Targets, arguments: argparse.Namespace) -> CheckedRobots:
     return checked
 
 
-def _check_tests(tests: list[str], checked: CheckedRobots) -> None:
+def _check_tests(tests: list[str], arguments: argparse.Namespace, checked: CheckedRobots) -> None:
     from rbxcompose.tools.mission_tests.reader import TrialReader  # only needed for tests
 
-    reading, found = TrialReader(os.environ), Report()
+    reading, found = TrialReader(os.environ, unsaved_of(arguments)), Report()
     for path in tests:
         trial, report = reading.read(Path(path).resolve())
         found.extend(report)
@@ -105,15 +109,18 @@ def _check_tests(tests: list[str], checked: CheckedRobots) -> None:
 
 
 def _check_system(path: str, arguments: argparse.Namespace, checked: CheckedRobots) -> None:
+    from rbxcompose.compiler.systems.model import System
     from rbxcompose.compiler.systems.reader import compile_system
     from rbxcompose.tools.inspection.plan_text import system_extent  # only needed for systems
 
-    system = compile_system(path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
+    def compiled_with(profiles: Sequence[str]) -> System:
+        return compile_system(
+            path, environment=os.environ, real=arguments.real, profiles=profiles, unsaved=unsaved_of(arguments)
+        )
+
+    system = compiled_with(arguments.profile)
     tried = [] if arguments.profile else [(name,) for name in system.known_profiles]
-    all_ = [
-        system,
-        *(compile_system(path, environment=os.environ, real=arguments.real, profiles=names) for names in tried),
-    ]
+    all_ = [system, *map(compiled_with, tried)]
     for one in all_:
         known = {(each.code, each.span, each.message) for each in checked.report}
         checked.report.extend(each for each in one.report if (each.code, each.span, each.message) not in known)

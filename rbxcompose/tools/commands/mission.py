@@ -1,4 +1,4 @@
-"""Run, hold, watch, debug, draw and explore the missions of a robot.
+"""Run, hold, watch, debug, draw, try and explore the missions of a robot.
 
 Exit codes: 0 fine, 1 refused or errors found, 2 wrong usage.
 """
@@ -12,7 +12,16 @@ from typing import TypeVar
 from rbxcompose.base.requests import Command, Query, Refused, to_data
 from rbxcompose.commands.console import NotDoneError, emit, refuse, table
 from rbxcompose.commands.lookup import REFUSED, WHICH, add_asking_options, answer_of, find_robot, pass_on
-from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, deferred, out_option, run_action
+from rbxcompose.commands.options import (
+    Declare,
+    Subcommand,
+    add_actions,
+    add_unsaved_option,
+    argument,
+    deferred,
+    out_option,
+    run_action,
+)
 from rbxcompose.missions.execution import requests
 
 GROUP = "missions"
@@ -70,6 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         argument("--format", choices=_FORMATS, default="text", help="output format"),
         out_option("write it to this file"),
     )
+    tried = (the_mission, robot, add_unsaved_option, json_)
     explored = (
         the_mission,
         robot,
@@ -102,6 +112,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ),
         ("show", "say or draw a mission; a running one with the states of its nodes", deferred(files, "show"), drawn),
         ("skills", "list the skills that missions may use on a robot", deferred(files, "skills"), (robot, json_)),
+        (
+            "try",
+            "run a mission on the simulated robot in virtual time, and show its story",
+            deferred(files, "try_"),
+            tried,
+        ),
         ("explore", "look for dead ends by trying everything that may happen", deferred(files, "explore"), explored),
     )
     add_actions(parser, (Subcommand(name, words, do, own, words) for name, words, do, own in table), metavar="ACTION")

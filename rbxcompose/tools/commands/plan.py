@@ -12,7 +12,7 @@ from pathlib import Path
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
-from rbxcompose.commands.options import is_system
+from rbxcompose.commands.options import add_unsaved_option, is_system, unsaved_of
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, layers_of, robot_path
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.plan.diff import difference
@@ -31,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_path_argument(parser)
     add_layer_options(parser)
+    add_unsaved_option(parser)
     parser.add_argument("--json", action="store_true", help="write the plan, or the difference, as JSON")
     parser.add_argument("--keys", action="store_true", help="show the keys on the wire, too")
     parser.add_argument("--diff", metavar="FILE", help="a plan that --json wrote, or a robot: what has changed since")
@@ -62,7 +63,9 @@ def _show_system(path: str, arguments: argparse.Namespace) -> int:
     if arguments.diff is not None or arguments.overlays or arguments.sets:
         sys.stderr.write("rbxcompose plan: --diff, -f and --set are for robots, not for systems\n")
         return USAGE
-    system = compile_system(path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
+    system = compile_system(
+        path, environment=os.environ, real=arguments.real, profiles=arguments.profile, unsaved=unsaved_of(arguments)
+    )
     write_report(system.report, system.sources)
     if system.report.has_errors:
         return FINDINGS

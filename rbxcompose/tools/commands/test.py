@@ -16,6 +16,7 @@ from pathlib import Path
 from rbxcompose.base.findings import Report
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, emit, has_colour, misused, write_report
+from rbxcompose.commands.options import add_unsaved_option, unsaved_of
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.missions.view.tested import keep_tested
 from rbxcompose.tools.mission_tests.coverage import Coverage
@@ -33,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "paths", nargs="*", type=Path, default=[HERE], metavar="PATH", help="tests, or folders of tests"
     )
+    add_unsaved_option(parser)
     parser.add_argument("--filter", default="", metavar="TEXT", help="only those with this text in their names")
     parser.add_argument(
         "--coverage", action="store_true", help="show what no test covered, here and on the console's page"
@@ -50,7 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
     files = tests_of(arguments.paths)
     if not files:
         return misused("test", f"no tests ('kind: Test') in {plain(', '.join(map(str, arguments.paths)))}")
-    reading, coverage, writer = TrialReader(os.environ), Coverage(), TrialWriter(has_colour(sys.stdout))
+    reading = TrialReader(os.environ, unsaved_of(arguments))
+    coverage, writer = Coverage(), TrialWriter(has_colour(sys.stdout))
     outcomes: list[FileOutcome] = []
     unreadable = Report()
     for written in (each for file in files for each in reading.every(file)):
@@ -98,7 +101,7 @@ def _finish(
 ) -> None:
     if arguments.junit:
         arguments.junit.write_text(junit(outcomes), encoding="utf-8")
-    if arguments.coverage:
+    if arguments.coverage and not unsaved_of(arguments):  # what is kept is of the files
         for robot, missions in coverage.by_robot(time.time()).items():
             with suppress(OSError):  # such as on a machine that is read only: it is shown here all the same
                 keep_tested(robot, missions)

@@ -12,6 +12,7 @@ from dataclasses import replace
 from rbxcompose.base.findings import Finding
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, emit, misused, refuse, write_report
+from rbxcompose.commands.options import add_unsaved_option
 from rbxcompose.commands.targets import add_layer_options, compiled, put_robot_last, robot_path
 from rbxcompose.manifest.files import find
 from rbxcompose.tools.inspection.why import why
@@ -27,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "robot", nargs="?", metavar="ROBOT", help="the robot's file, its folder, or rbx:robots/NAME; else the only one"
     )
     add_layer_options(parser)
+    add_unsaved_option(parser)
     parser.add_argument("--json", action="store_true", help="write the answer as JSON")
 
 

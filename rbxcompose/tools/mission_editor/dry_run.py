@@ -39,7 +39,6 @@ SAMPLE = 0.25  # [s] of robot time between two poses
 MOST_CHANGES = 4000  # of statuses that are told
 SAMPLER = "dry run"
 TARGET_FRAME, ROBOT_FRAME = "map", "base_footprint"
-UNSAVED_TESTS = "rbxcompose.tools.mission_editor.unsaved_tests"
 
 
 class _Watching(SeenWays):
@@ -162,8 +161,9 @@ def run_tests(project: Path, mission: str, unsaved: Mapping[Path, str]) -> str:
     files = [file for file in (tests_of([folder]) if folder.is_dir() else ()) if named.search(_text(file))]
     if not files:
         raise Refused(f"there are no tests of '{mission}' in 'missions/'")
-    given = {"files": [*map(str, files[:MOST_TESTS])], "unsaved": {str(path): text for path, text in unsaved.items()}}
-    command = [sys.executable, "-m", UNSAVED_TESTS]
+    given = {str(path): text for path, text in unsaved.items()}
+    verb = ["test", "--coverage", "--json", "--unsaved", "-"]
+    command = [sys.executable, "-m", "rbxcompose", *verb, *map(str, files[:MOST_TESTS])]
     try:
         done = subprocess.run(
             command, input=json.dumps(given), capture_output=True, text=True, timeout=TESTING, check=False, cwd=project

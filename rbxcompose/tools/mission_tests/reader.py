@@ -22,6 +22,7 @@ from rbxcompose.manifest import test_file as trials
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.files import PREFIX, PROFILE, shown_name
 from rbxcompose.manifest.files import resolve as resolve_file
+from rbxcompose.manifest.reader import Texts
 from rbxcompose.manifest.section import TEST
 from rbxcompose.manifest.test_file import SECTIONS, STEP_KEYS, TrialFile
 from rbxcompose.manifest.tree import (
@@ -496,13 +497,13 @@ class WrittenTrial:
 class TrialReader:
     """Reads the tests of one run; each robot is compiled once with each profile, and its findings are reported once.
 
-    `sources` are the texts of all files, `report` has the findings on robots; `unsaved` are texts that count instead of
-    those in the files of robots and missions.
+    `unsaved` are texts in place of files, by their real paths. `sources` are the texts of all files, `report` has the
+    findings on robots.
     """
 
     environment: Mapping[str, str]
-    sources: dict[str, str] = field(default_factory=dict)
     unsaved: Mapping[Path, str] = field(default_factory=dict)
+    sources: dict[str, str] = field(default_factory=dict)
     report: Report = field(default_factory=Report)
     _robots: dict[tuple[str, str], Compilation] = field(default_factory=dict)
     _kept_back: dict[Finding, str] = field(default_factory=dict)  # the finding in a test of a robot with errors
@@ -533,7 +534,9 @@ class TrialReader:
     def open(self, path: Path) -> WrittenTrial:
         """Return the contents of a file for its first robot; a test without a name gets that of its file."""
         report = Report()
-        root = Documents(report, self.sources).read(path, TEST)
+        sources = Texts(self.unsaved)
+        root = Documents(report, sources).read(path, TEST)
+        self.sources.update(sources)
         name = root.get("name") if root else None
         return WrittenTrial(path, name.text if isinstance(name, ScalarNode) and name.text else path.name, root, report)
 

@@ -1,0 +1,178 @@
+"""The server: passes calls of a client to the tools, over stdin and stdout, and writes each into the log."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+import traceback
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from mcp import types
+from mcp.server.context import ServerRequestContext
+from mcp.server.lowlevel.server import Server
+from mcp.server.stdio import stdio_server
+from mcp.shared.exceptions import MCPError
+from pydantic import ValidationError
+
+import rbxcompose
+from rbxcompose.base.files import read_regular
+from rbxcompose.base.findings import suggest
+from rbxcompose.base.printable import plain
+from rbxcompose.base.requests import Refused
+from rbxcompose.domains.console.access import Role
+from rbxcompose.manifest.files import library_root
+from rbxcompose.manifest.tree import FILE_BYTES
+from rbxcompose.tools.mcp.answer_size import limited
+from rbxcompose.tools.mcp.audit_log import AuditLog
+from rbxcompose.tools.mcp.lanes import Lane, Lanes
+from rbxcompose.tools.mcp.project_paths import ProjectPaths
+from rbxcompose.tools.mcp.tools import TOOLS, ToolContext, VerbTool
+
+CallContext = ServerRequestContext[Any]
+LANGUAGE = "rbxcompose://language"
+FINDING, MANIFEST = "rbxcompose://findings/", "rbxcompose://project/"
+_MARKDOWN, _YAML = "text/markdown", "application/yaml"
+_CLIENT = 60  # characters of its name
+_ABOUT = (
+    "Robots and missions of the project in the folder where this server was started. Nothing here writes a file: give "
+    "changed texts as 'unsaved' to try them."
+)
+
+
+class McpSession:
+    """One client's session: which tools its role has, and what it called."""
+
+    def __init__(self, role: Role, deadline: float, log: AuditLog) -> None:
+        self.role, self._log = role, log
+        self._paths, self._lanes = ProjectPaths(), Lanes(deadline)
+        self._threads = ThreadPoolExecutor(Lane.COMPILE.at_once, "paths")
+
+    async def tools(self, context: CallContext, params: types.PaginatedRequestParams | None) -> types.ListToolsResult:
+        """List the tools of the role."""
+        return types.ListToolsResult(tools=[_declared(tool) for tool in TOOLS.values() if tool.role <= self.role])
+
+    async def call(self, context: CallContext, params: types.CallToolRequestParams) -> types.CallToolResult:
+        """Carry out a call; whatever is wrong with it becomes an answer that says so."""
+        began, given, result = time.monotonic(), params.arguments or {}, "was cancelled"
+        client = _client(context)
+        try:
+            data = limited(await self._answer(params.name, given, client))
+            result = "ok"
+            return _result(data)
+        except Refused as refusal:
+            result = f"refused: {refusal}"
+            return _result(limited({"error": str(refusal)}), is_error=True)
+        except Exception as error:  # a mistake of ours ends this call only
+            traceback.print_exc()
+            result = f"failed: {type(error).__name__}"
+            return _result({"error": f"the call has failed: {type(error).__name__}"}, is_error=True)
+        finally:
+            self._log.write(client, params.name, given, result, time.monotonic() - began)
+
+    async def _answer(self, name: str, given: Mapping[str, Any], client: str) -> dict[str, Any]:
+        tool = TOOLS.get(name)
+        if tool is None:
+            known = [tool.name for tool in TOOLS.values() if tool.role <= self.role]
+            raise Refused(f"there is no tool '{plain(name)}'; {suggest(name, known, 'tools')}")
+        if tool.role > self.role:
+            needs = f"'{name}' needs the role '{tool.role.word}', and this server gives '{self.role.word}'"
+            raise Refused(f"{needs}: start it with '--{tool.role.word}'")
+        try:
+            arguments = tool.arguments.model_validate(dict(given))
+        except ValidationError as error:
+            raise Refused("; ".join(map(_words_of_error, error.errors(include_url=False)))) from error
+        async with self._lanes.turn(tool.lane):
+            return await tool.do(ToolContext(self._paths, self._threads, client, self.role), arguments)
+
+    # Resources
+
+    async def resources(
+        self, context: CallContext, params: types.PaginatedRequestParams | None
+    ) -> types.ListResourcesResult:
+        """List the language and the robots of the project."""
+        robots = await asyncio.to_thread(self._paths.robots)
+        return types.ListResourcesResult(
+            resources=[
+                types.Resource(name="language", uri=LANGUAGE, mime_type=_MARKDOWN, description="What a user writes."),
+                *(types.Resource(name=robot, uri=f"{MANIFEST}{robot}", mime_type=_YAML) for robot in robots),
+            ]
+        )
+
+    async def templates(
+        self, context: CallContext, params: types.PaginatedRequestParams | None
+    ) -> types.ListResourceTemplatesResult:
+        """List the pages of findings, which are too many for a list."""
+        page = types.ResourceTemplate(
+            name="finding", uri_template=f"{FINDING}{{code}}", mime_type=_MARKDOWN, description="The page of a code."
+        )
+        return types.ListResourceTemplatesResult(resource_templates=[page])
+
+    async def read(self, context: CallContext, params: types.ReadResourceRequestParams) -> types.ReadResourceResult:
+        """Return the text of a resource."""
+        began, result = time.monotonic(), "ok"
+        try:
+            text, kind = await asyncio.to_thread(self._text, params.uri)
+        except (Refused, OSError, UnicodeDecodeError) as error:
+            result = f"refused: {error}"
+            raise MCPError(types.INVALID_PARAMS, str(error)) from error
+        finally:
+            self._log.write(_client(context), "resources/read", {"uri": params.uri}, result, time.monotonic() - began)
+        contents = types.TextResourceContents(uri=params.uri, mime_type=kind, text=text)
+        return types.ReadResourceResult(contents=[contents])
+
+    def _text(self, uri: str) -> tuple[str, str]:
+        if uri == LANGUAGE:
+            return _page(library_root() / "docs" / "language.md"), _MARKDOWN
+        if uri.startswith(FINDING) and (code := uri.removeprefix(FINDING)).isalnum():
+            return _page(library_root() / "docs" / "findings" / f"{code.upper()}.md"), _MARKDOWN
+        if uri.startswith(MANIFEST) and (robot := uri.removeprefix(MANIFEST)) in self._paths.robots():
+            return _page(Path(robot)), _YAML
+        raise Refused(f"there is no resource '{plain(uri)}'")
+
+
+def _page(path: Path) -> str:
+    return read_regular(path, FILE_BYTES).decode("utf-8")
+
+
+def _client(context: CallContext) -> str:
+    """Return what logs call the client; it says itself who it is."""
+    known = context.session.client_params
+    return f"mcp, {plain(known.client_info.name, _CLIENT)}" if known is not None else "mcp"
+
+
+def _words_of_error(error: Any) -> str:
+    place = ".".join(map(str, error["loc"]))
+    return f"{place}: {error['msg']}" if place else str(error["msg"])
+
+
+def _declared(tool: VerbTool) -> types.Tool:
+    is_safe = tool.role <= Role.VIEW
+    hints = types.ToolAnnotations(read_only_hint=is_safe, destructive_hint=not is_safe, open_world_hint=not is_safe)
+    schema = tool.arguments.model_json_schema()
+    return types.Tool(name=tool.name, description=tool.about, input_schema=schema, annotations=hints)
+
+
+def _result(data: dict[str, Any], *, is_error: bool = False) -> types.CallToolResult:
+    text = types.TextContent(type="text", text=json.dumps(data, ensure_ascii=False))
+    return types.CallToolResult(content=[text], structured_content=data, is_error=is_error)
+
+
+async def serve(role: Role, deadline: float, log: AuditLog) -> None:
+    """Serve one client until it closes the connection."""
+    session = McpSession(role, deadline, log)
+    server: Server[Any] = Server(
+        "rbxcompose",
+        version=rbxcompose.__version__,
+        instructions=_ABOUT,
+        on_list_tools=session.tools,
+        on_call_tool=session.call,
+        on_list_resources=session.resources,
+        on_list_resource_templates=session.templates,
+        on_read_resource=session.read,
+    )
+    async with stdio_server() as (there, back):
+        await server.run(there, back, server.create_initialization_options())
