@@ -24,8 +24,8 @@ import { LiveChanges } from "./live_changes";
 import { LostError, type Message } from "./rosbridge";
 import { ReadView, type Sentence } from "./read_view";
 import { Palette, StepForm, type Form, type Offered } from "./step_form";
-import { Replay, type Statuses } from "./replay";
-import { showDryRun, showTests, type DryRun, type TestReport } from "./trial";
+import { Replay } from "./replay";
+import { showDryRun, showTests, type DryRun, type Statuses, type TestReport } from "./trial";
 import type { TextEditor } from "./text_editor";
 import "./mission_editor.css";
 

@@ -1,37 +1,14 @@
 /** A dry run, shown as it went: where the robot was on the map, and which blocks ran. */
 import { h, icon } from "./dom";
-import type { Path } from "./edited";
 import { MapCanvas, type ShownPlace } from "./elements/map_canvas";
 import { formatName } from "./format";
-import type { Point, Pose } from "./map";
-import type { DryRun } from "./trial";
+import { poseAt, statusesAt, type DryRun, type Statuses } from "./trial";
 import "./replay.css";
-
-export type Statuses = readonly { path: Path; status: string }[];
 
 const FRAME = 50; // [ms] between two pictures
 const LONGEST = 20; // [s] that a whole run takes to play, however long it was
 const FASTEST = 1 / 4; // [s] of a second of robot time: what is short plays four times as fast
-const TRAIL = 60; // [s] of robot time
 const EMPTY = { grids: [], areas: [], labels: [], outlines: [], paths: [], scans: [], goal: null, isOld: false };
-
-/** Returns the status that each block had last at a time [s]. */
-export function statusesAt({ changes }: DryRun, time: number): Statuses {
-  const found = new Map<string, { path: Path; status: string }>();
-  for (const change of changes) {
-    if (change.time > time) break;
-    found.set(JSON.stringify(change.path), change);
-  }
-  return [...found.values()];
-}
-
-/** Returns where the robot was at a time [s], and the way to there in the minute before; null if nobody knew. */
-export function poseAt({ track }: DryRun, time: number): { robot: Pose; trail: Point[] } | null {
-  const before = track.filter(([at]) => at! <= time && at! > time - TRAIL);
-  const last = before.at(-1) ?? track.filter(([at]) => at! <= time).at(-1);
-  if (!last) return null;
-  return { robot: { x: last[1]!, y: last[2]!, heading: last[3]! }, trail: before.map(([, x, y]) => ({ x: x!, y: y! })) };
-}
 
 export class Replay {
   readonly element = h("section", { class: "replay", "aria-label": "The dry run as it went" });

@@ -1,6 +1,9 @@
 /** What came of a dry run of a mission, or of its tests, below its text. */
 import { h, icon, type Icon } from "./dom";
 import type { Path } from "./edited";
+import type { Point, Pose } from "./map";
+
+export type Statuses = readonly { path: Path; status: string }[];
 
 export interface DryRun {
   /** Empty if the mission has not ended; `why` tells more. */
@@ -21,6 +24,26 @@ export interface DryRun {
 export interface TestReport {
   tests: { name: string; passed: boolean; outcome: string; problems: { message: string; place: string }[] }[];
   coverage: { ways: number; taken: number; missing: { mission: string; line: number; way: string }[] };
+}
+
+const TRAIL = 60; // [s] of robot time
+
+/** Returns the status that each block had last at a time [s]. */
+export function statusesAt({ changes }: DryRun, time: number): Statuses {
+  const found = new Map<string, { path: Path; status: string }>();
+  for (const change of changes) {
+    if (change.time > time) break;
+    found.set(JSON.stringify(change.path), change);
+  }
+  return [...found.values()];
+}
+
+/** Returns where the robot was at a time [s], and the way to there in the minute before; null if nobody knew. */
+export function poseAt({ track }: DryRun, time: number): { robot: Pose; trail: Point[] } | null {
+  const before = track.filter(([at]) => at! <= time && at! > time - TRAIL);
+  const last = before.at(-1) ?? track.filter(([at]) => at! <= time).at(-1);
+  if (!last) return null;
+  return { robot: { x: last[1]!, y: last[2]!, heading: last[3]! }, trail: before.map(([, x, y]) => ({ x: x!, y: y! })) };
 }
 
 /** Returns how a dry run ended, in a sentence. */

@@ -45,7 +45,7 @@ def test_a_loop_over_the_nearest_place_waits_for_the_pose() -> None:
     assert robot.lines == ["0 mission test waits for pose"]
     robot.look.pose = Pose2(0.9, 0.0, 0.0)
     robot.advance(0.1)
-    assert robot.lines[1:] == ["0.1 go_to corner"]
+    assert robot.lines[1:] == ["0.1 1.1 Go to the place: go_to corner"]
 
 
 def test_a_pose_that_no_mission_reads_has_not_arrived() -> None:
@@ -64,7 +64,7 @@ def test_a_mission_that_waits_for_a_value_says_so_again_each_minute() -> None:
     assert robot.events == [MissionWaits("test", text)] * 2
     robot.level(100.0)
     robot.advance(0.0)
-    assert robot.lines[-1] == "130 go_to corner"
+    assert robot.lines[-1] == "130 1.1 Go to corner"
 
 
 def test_it_waits_for_every_value_that_is_read_then_tells_its_story() -> None:
@@ -87,9 +87,9 @@ def test_it_waits_for_every_value_that_is_read_then_tells_its_story() -> None:
     robot.advance(0.0)
     assert robot.lines == [
         "0 mission test waits for battery",
-        "1 go_to corner",
+        "1 1.1 Go to corner",
         "6.2 go_to corner: success (5.2 s)",
-        "6.2 go_to dock",
+        "6.2 1.2 Go to dock",
         "7.5 interrupt low: $battery < 50 % (battery 49 %)",
         "7.5 go_to dock: halted (1.3 s)",
         "7.5 recharge",

@@ -29,7 +29,8 @@ if "--undo" in words:
 fate = "restarted" if changes == "yes" else "kept"
 part = {"name": "base", "type": "t", "process": "p", "fate": fate, "reasons": []}
 why = "it moves" if refuses == "yes" else ""
-print(json.dumps({"robot": "r", "components": [part], "generation": 3, "why_not": why, "shares_change": False}))
+found = {"robot": "r", "components": [part], "generation": 3, "why_not": why, "shares_change": False, "said": []}
+print(json.dumps(found))
 if fails == "yes" and "--yes" in words:
     print("error[RBX9004]: 'r' refuses: only in part")
     print("1 error")

@@ -106,11 +106,8 @@ class SnapshotStore:
         return (self._folder or Path()) / f"{mission}{aside}.json"
 
     def _write(self, path: Path, content: Mapping[str, Any]) -> None:
-        temporary = path.with_suffix(TEMPORARY)
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            temporary.write_text(json.dumps(content), encoding="utf-8")
-            os.replace(temporary, path)
+            replace_unflushed(path, json.dumps(content))
             self.trouble = ""
         except OSError as error:
             self.trouble = f"snapshots cannot be written: {error.strerror}"
@@ -126,6 +123,18 @@ def described(
     leaves = dict.fromkeys(named(node) for node, status in running if status == RUNNING and not node.children)
     inputs = {name: text for name, text in texts.items() if text is not None}
     return ListedSnapshot(mission, at, " and ".join(leaves), inputs, changed, waits)
+
+
+def replace_unflushed(path: Path, text: str) -> None:
+    """Replace a file as a whole, without waiting for the disk: it is for a process that fails.
+
+    Raises:
+        OSError: if it cannot be written.
+    """
+    temporary = path.with_suffix(TEMPORARY)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary.write_text(text, encoding="utf-8")
+    os.replace(temporary, path)
 
 
 def identity_of(program: Program, robot: RobotNames) -> dict[str, str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
@@ -15,13 +14,14 @@ from rbxcompose.base.expressions.evaluate import holds
 from rbxcompose.base.expressions.tree import new_names
 from rbxcompose.base.expressions.types import FLAG
 from rbxcompose.base.expressions.values import NOT_ARRIVED, EvaluationError, NotArrived, Value
-from rbxcompose.base.files import TEMPORARY
+from rbxcompose.base.files import read_regular
 from rbxcompose.base.requests import Refused, from_data, to_data
 from rbxcompose.missions.engine.events import MissionEnded
 from rbxcompose.missions.engine.scopes import RobotValues, RunScope, SinceScope
 from rbxcompose.missions.execution.mission_run import MissionRun
 from rbxcompose.missions.execution.missions import RunningMissions
 from rbxcompose.missions.execution.requests import ListedTrigger, RunMission
+from rbxcompose.missions.execution.snapshots import replace_unflushed
 from rbxcompose.missions.program.program import RobotNames
 from rbxcompose.missions.triggers.core import Triggers
 from rbxcompose.missions.triggers.trigger import Trigger
@@ -29,6 +29,7 @@ from rbxcompose.sdk.component import Context
 
 POLL = 0.1  # [s] between two evaluations of a condition that may change without a message
 _SHOWN = "%a %Y-%m-%d %H:%M"
+_MOST = 1_000_000  # [B] of a file
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +52,7 @@ class TriggerMemory:
     def read(self) -> TriggerNotes:
         """Return what is kept; nothing if that cannot be read."""
         try:
-            content = self._file.read_bytes() if self._file else b"{}"
+            content = read_regular(self._file, _MOST) if self._file else b"{}"
             notes: TriggerNotes = from_data(TriggerNotes, json.loads(content))
         except (OSError, ValueError):
             notes = TriggerNotes()
@@ -63,11 +64,7 @@ class TriggerMemory:
             return
         self._written = notes
         try:
-            temporary = self._file.with_suffix(TEMPORARY)
-            self._file.parent.mkdir(parents=True, exist_ok=True)
-            temporary.write_text(json.dumps(to_data(notes)), encoding="utf-8")
-            # Not flushed to disk: it is for a process that fails. After a loss of power, the robot starts anew.
-            os.replace(temporary, self._file)
+            replace_unflushed(self._file, json.dumps(to_data(notes)))  # after a loss of power, the robot starts anew
             self.trouble = ""
         except OSError as error:
             self.trouble = f"what triggers did cannot be kept: {error.strerror}"
