@@ -32,6 +32,11 @@ class PluggedDevice:
             os.close(self._near)
             self.is_plugged = False
 
+    @property
+    def far(self) -> int:
+        """Return the descriptor of the far end, for a process that has it instead of this one."""
+        return self._far
+
     def write(self, data: bytes) -> None:
         """Write bytes; the terminal has room for some thousand."""
         assert os.write(self._far, data) == len(data)
