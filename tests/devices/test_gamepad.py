@@ -159,6 +159,29 @@ def test_after_a_stop_of_the_robot_the_button_must_be_released(plug: Plug) -> No
     assert set(robot.during(0.3)) == {(0.5, 0.0)}
 
 
+def test_after_a_stop_a_button_that_was_not_held_drives_at_its_first_press(plug: Plug) -> None:
+    pad = plug()
+    robot = Driven()
+    component = robot.bench.component("gamepad")
+    component.stop()
+    robot.during(0.5)
+    component.release()
+    pad.press(LB)
+    pad.move(ABS_Y, -32768)
+    assert set(robot.during(0.3)) == {(0.5, 0.0)}
+
+
+def test_a_button_that_is_pressed_during_a_stop_must_be_released(plug: Plug) -> None:
+    pad = plug()
+    robot = Driven()
+    component = robot.bench.component("gamepad")
+    component.stop()
+    pad.press(LB)
+    robot.during(0.5)
+    component.release()
+    assert robot.during(0.5) == []
+
+
 def test_events_that_the_kernel_dropped_are_made_up_for_by_its_state(plug: Plug) -> None:
     pad = plug()
     robot = Driven()

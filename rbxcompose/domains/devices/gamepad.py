@@ -166,8 +166,8 @@ class HeldDrive:
         return self._is_down and not self._is_armed
 
     def disarm(self) -> None:
-        """Let the button count only after it is released: the robot was stopped, or the pad has gone."""
-        self._is_armed = False
+        """Let the button, if it is held, count only after it was released: the robot was stopped."""
+        self._is_armed = not self._is_down
 
     def hear(self, now: float, *, is_down: bool) -> None:
         """Take where the button is, as the pad has just said."""
@@ -176,9 +176,8 @@ class HeldDrive:
         self.is_silent = self.is_silent and is_down
 
     def forget(self) -> None:
-        """Take the pad for gone."""
-        self._is_down = False
-        self.disarm()
+        """Take the pad for gone: until it is heard again, nobody knows where its button is."""
+        self._is_down = self._is_armed = False
 
     def command(self, now: float, forwards: float, turn: float) -> Velocity2 | None:
         """Return the velocity to send now, None for silence; `forwards` and `turn` are the axes, from -1 to 1."""
