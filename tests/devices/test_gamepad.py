@@ -114,16 +114,26 @@ def test_a_device_that_is_no_gamepad_is_refused_with_what_it_lacks(plug: Plug, t
     assert robot.during(1.0) == []
 
 
+@pytest.mark.parametrize(
+    ("device", "level", "words"),
+    [
+        ("event4", 2, "{device} may not be read by this user"),
+        ("", 1, "no gamepad is connected, or this user may not read it: 1 input device may not be read"),
+    ],
+    ids=["by its path", "any"],
+)
 def test_a_device_that_may_not_be_read_is_reported_with_what_helps(
-    plug: Plug, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    device: str, level: int, words: str, plug: Plug, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(path: str, **_: object) -> None:
         raise PermissionError(13, "Permission denied", path)
 
     plug(4)
     monkeypatch.setattr("evdev.InputDevice", refuse)
-    robot = Driven()
-    assert robot.status == f"{tmp_path}/event4 may not be read by this user; it waits for a gamepad"
+    path = str(tmp_path / device) if device else ""
+    robot = Driven(device=path)
+    assert robot.status == f"{words.format(device=path)}; it waits for a gamepad"
+    assert robot.statuses[-1].level == level
     assert [value.value for value in robot.statuses[-1].values if value.key == "help"] == [
         'sudo usermod -aG input $USER, then log in again; or a udev rule with TAG+="uaccess"'
     ]

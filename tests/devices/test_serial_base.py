@@ -35,8 +35,10 @@ from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.sensor_msgs import BatteryState
 from rbxcompose.testing import Bench, instance
 from tests.devices.plugged import PluggedDevice, plugged_in
+from tests.project.package import PACKAGE
 
 SOURCE = Path(__file__).with_name("board") / "board.cpp"
+SKETCH = PACKAGE / "domains/bases/sketch/wheel_board/wheel_board.ino"
 COMPILER = shutil.which("g++") or shutil.which("c++")
 STEP = 0.02  # [s]
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no compiler of C++ is here: install g++")
@@ -131,6 +133,13 @@ def wired(folder: Path, program: Path, **config: object) -> Iterator[Wired]:
             yield found
         finally:
             found.board.close()
+
+
+@needs_compiler
+def test_the_sketch_is_right_cpp() -> None:
+    words = [str(COMPILER), "-std=c++11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-x", "c++"]
+    words += ["-include", str(SOURCE.with_name("Arduino.h")), str(SKETCH)]
+    assert subprocess.run(words, capture_output=True, text=True, timeout=60, check=False).stderr == ""
 
 
 @needs_compiler

@@ -121,11 +121,14 @@ def open_gamepad(wanted: str, hold: ButtonName, axes: tuple[AxisName, ...]) -> E
         device.close()
     if others:
         raise NoGamepadError(others[0], is_wrong=True)
-    if forbidden:
-        count = f"{len(forbidden)} input devices" if len(forbidden) > 1 else forbidden[0]
-        raise NoGamepadError(f"{count} may not be read by this user", JOIN_GROUP, is_wrong=True)
+    if is_path and forbidden:
+        raise NoGamepadError(f"{wanted} may not be read by this user", JOIN_GROUP, is_wrong=True)
     named = f" with '{wanted}' in its name" if wanted and not is_path else ""
-    raise NoGamepadError(f"{wanted} is not connected" if is_path else f"no gamepad{named} is connected")
+    problem = f"{wanted} is not connected" if is_path else f"no gamepad{named} is connected"
+    if not forbidden:
+        raise NoGamepadError(problem)
+    hidden = f"{len(forbidden)} input device{'s' if len(forbidden) > 1 else ''}"
+    raise NoGamepadError(f"{problem}, or this user may not read it: {hidden} may not be read", JOIN_GROUP)
 
 
 def _opened(path: str) -> InputDevice[str]:

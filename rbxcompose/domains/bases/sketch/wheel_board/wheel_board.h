@@ -135,11 +135,15 @@ class Board {
       is_greeted_ = payload[0] == VERSION;
       is_driven_ = false;
     } else if (reader_.type() == DRIVE && reader_.size() == 4 && is_greeted_) {
-      speeds_.left = static_cast<int16_t>(payload[0] | payload[1] << 8);
-      speeds_.right = static_cast<int16_t>(payload[2] | payload[3] << 8);
+      speeds_.left = number(payload);
+      speeds_.right = number(payload + 2);
       heard_ = now;
       is_driven_ = true;
     }
+  }
+
+  static int16_t number(const uint8_t* bytes) {
+    return static_cast<int16_t>(static_cast<uint16_t>(bytes[0]) | static_cast<uint16_t>(bytes[1]) << 8);
   }
 
   size_t frame(uint8_t* out, uint8_t type, const uint8_t* payload, uint8_t size) {
