@@ -10,7 +10,7 @@ from typing import Literal
 
 from rbxcompose.base.printable import plain
 
-Engine = Literal["auto", "espeak-ng", "piper", "log"]
+SpeechProgram = Literal["auto", "espeak-ng", "piper", "log"]
 PER_WORD = 0.4  # [s] per word of unhurried speech
 LONGEST = 2000  # characters of what is said at once
 _RATE = "22050"  # [Hz] of the samples that piper writes with most of its voices
@@ -26,7 +26,9 @@ def duration_of(words: str) -> float:
     return PER_WORD * len(words.split())
 
 
-def pipeline_of(engine: Engine, voice: str, find: Callable[[str], str | None] = shutil.which) -> tuple[Pipeline, str]:
+def pipeline_of(
+    engine: SpeechProgram, voice: str, find: Callable[[str], str | None] = shutil.which
+) -> tuple[Pipeline, str]:
     """Return the commands that speak with a voice, and why there are none."""
     has_model = voice.endswith(_MODEL)
     if engine == "log":

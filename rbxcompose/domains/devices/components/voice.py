@@ -7,7 +7,7 @@ import math
 from rbxcompose import sdk
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import plain
-from rbxcompose.domains.devices.speech import LONGEST, Engine, Utterance, duration_of, pipeline_of
+from rbxcompose.domains.devices.speech import LONGEST, SpeechProgram, Utterance, duration_of, pipeline_of
 from rbxcompose.msgs.rbxcompose_msgs import Say
 
 _SLOWEST = 3.0  # times the usual duration, and as many seconds, after which a program is taken for stuck
@@ -17,7 +17,7 @@ SaidGoal = sdk.ServedGoal[Say.Goal, Say.Result, Say.Feedback]
 class VoiceConfig(sdk.Config):
     """What speaks, and how."""
 
-    engine: Engine = "auto"
+    engine: SpeechProgram = "auto"
     """The program that speaks: `auto` is piper if `voice` is a file, else espeak-ng. With `log` nobody hears it."""
     voice: str = "en"
     """A voice of espeak-ng, such as `en` or `de+f3`, or the file of one of piper, which ends in `.onnx`."""
