@@ -170,6 +170,7 @@ def test_an_unplugged_receiver_is_reported_and_read_again_when_it_is_back(device
     robot.hears(GGA)
     assert robot.status()[0] == 0
     assert len(robot.found["fix"]) == 2
+    assert any("the receiver is back" in text for text in robot.bench.texts())
 
 
 def test_a_silent_receiver_is_an_error(device: PluggedDevice) -> None:

@@ -80,7 +80,7 @@ class SerialSensor(sdk.Component[C]):
             return False
         self.tried_at = self.now
         self.line.open()
-        self.since, self.bytes_since, self.trouble = self.now, 0, ""
+        self.since, self.bytes_since = self.now, 0
         self.begin()
         return True
 
@@ -112,6 +112,9 @@ class SerialSensor(sdk.Component[C]):
             if self.bytes_since:
                 words = f"nothing that {self.what} sends can be read: does it really send at {self.line.baud} bit/s?"
             self.complain(words, **values)
+            return
+        if self.trouble and self.read_at < self.since:
+            self.status(Level.WARN, "its port is open again, and nothing came yet")
             return
         if self.trouble:
             self.trouble = ""

@@ -130,6 +130,7 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
     def begin(self) -> None:
         """Greet the board: it was plugged in, or the port was opened."""
         self.link.forget()
+        self.trouble = ""
 
     def take(self, data: bytes) -> None:
         """Publish what the board says."""
