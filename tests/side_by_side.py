@@ -10,6 +10,7 @@ REAL_TIME = {
         "tests/cli/test_servo",
         "tests/controllers/test_diff_drive_bytes",
         "tests/console/test_page",
+        "tests/devices/test_gamepad_for_real",
         "tests/exposure/",
         "tests/faults/",
         "tests/net/",

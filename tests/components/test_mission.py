@@ -92,10 +92,10 @@ def test_it_waits_for_every_value_that_is_read_then_tells_its_story() -> None:
         "6.2 1.2 Go to dock",
         "7.5 interrupt low: $battery < 50 % (battery 49 %)",
         "7.5 go_to dock: halted (1.3 s)",
-        "7.5 recharge",
+        "7.5 2.1 Recharge",
         "9.5 recharge: success (2 s)",
         "9.5 interrupt low done, back to go_to dock",
-        "9.5 go_to dock",
+        "9.5 1.2 Go to dock",
         "10.5 go_to dock: failure (1 s): stuck",
         "10.5 mission test: failure: mission.yaml:8: stuck",
     ]

@@ -29,7 +29,7 @@ ROOMS = (
 """Each imports only from itself and from those before it; what stands behind it, it loads by name."""
 DOMAINS = {
     "arms": "body servos worlds",
-    "bases": "body servos worlds",
+    "bases": "body devices servos worlds",
     "console": "body",
     "navigation": "bases body vision worlds",
     "programs": "body",

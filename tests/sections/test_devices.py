@@ -130,3 +130,22 @@ def test_a_part_may_bring_its_device_or_use_one_of_the_robot(port: str, given: s
     checked = check_text(f"{robot}{{part: part.yaml{given}}}\n", tmp_path, others=others, real=True)
     assert checked.text == ""
     assert port_of(checked) == found
+
+
+RECEIVER = "rbx: 1\nkind: Robot\nname: cart\n{devices}components:\n  gps: {{type: gps, port: {port}}}\n"
+
+
+def test_a_component_is_given_the_device_that_its_port_names(tmp_path: Path) -> None:
+    checked = check_text(RECEIVER.format(devices=DEVICES, port="dev:usb2dynamixel"), tmp_path)
+    [found] = [instance.config for instance in checked.plan.instances if instance.type == "gps"]
+    assert getattr(found, "port", None) == "dev:usb2dynamixel=usb:0403:6001:A700eUxA"
+
+
+@pytest.mark.parametrize(
+    ("port", "words"),
+    [("dev:gps", "there is no device 'dev:gps'"), ("ttyUSB0", "must be a path: write '/dev/ttyUSB0'")],
+)
+def test_a_component_with_a_port_that_is_none_is_told_where(port: str, words: str, tmp_path: Path) -> None:
+    checked = check_text(RECEIVER.format(devices=DEVICES, port=port), tmp_path)
+    assert words in checked.text
+    assert "robot.yaml:7:26" in checked.text

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import select
 import termios
@@ -11,10 +10,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import Enum
 from typing import NamedTuple
 
-import serial
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PortHandler, Protocol1PacketHandler, Protocol2PacketHandler
 
-from rbxcompose.domains.devices import serial_ports
+from rbxcompose.domains.devices import serial_line, serial_ports
 from rbxcompose.domains.servos.bus import REPLY, ROOM
 from rbxcompose.domains.servos.transfers import Stretch
 
@@ -22,15 +20,6 @@ BITS = 10  # of a byte on the wire: start bit, eight of data, stop bit
 _CHUNK = 4096  # [B] of one read
 _EARLY = 0.0005  # [s] before the last byte of long replies at which it is worth looking
 _STUCK = 0.5  # [s] after which a port that takes no bytes has failed to send
-_ERRORS: dict[int | None, tuple[type[serial_ports.PortError], str]] = {
-    errno.ENOENT: (serial_ports.NoPortError, "does not exist"),
-    errno.ENXIO: (serial_ports.NoPortError, "has no device"),
-    errno.ENODEV: (serial_ports.NoPortError, "has no device"),
-    errno.EACCES: (serial_ports.ForbiddenPortError, "may not be opened by this user"),
-    errno.EPERM: (serial_ports.ForbiddenPortError, "may not be opened by this user"),
-    errno.EBUSY: (serial_ports.BusyPortError, "is used by another program"),
-    errno.EAGAIN: (serial_ports.BusyPortError, "is used by another program"),
-}
 
 
 class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
@@ -69,15 +58,8 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     def _open(self) -> None:
         if self.is_open:
             self.closePort()
-        try:
-            self.ser = serial.Serial(self.port_name, self.baudrate, timeout=0, exclusive=True)
-            self._descriptor = self.ser.fileno()
-        except (OSError, termios.error, ValueError, OverflowError) as error:
-            number = getattr(error, "errno", None)
-            cause, words = _ERRORS.get(
-                number, (serial_ports.UnfitPortError, f"cannot be a serial port at {self.baudrate} bit/s")
-            )
-            raise cause(str(self.port_name), words) from error
+        self.ser = serial_line.opened(str(self.port_name), self.baudrate)
+        self._descriptor = self.ser.fileno()
         self.is_open, self.is_using = True, False
         self.tx_time_per_byte = 1000.0 * BITS / self.baudrate
         try:

@@ -7,7 +7,7 @@ PER_WORD = 0.4  # [s] per word of unhurried speech
 
 @skill("say", claims="voice", pausable=True)
 class Say(Activity):
-    """Say words. A robot without a voice only logs them, and takes the time that speaking would take.
+    """Say words. Without a component `voice` they are only logged, and take the time that speaking would take.
 
     Example:
         say: the kitchen is clean

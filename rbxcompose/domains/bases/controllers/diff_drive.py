@@ -6,13 +6,12 @@ import math
 from types import MappingProxyType
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from rbxcompose import sdk
 from rbxcompose.base.config import AngularJerk, Config, Jerk, JointName, LinkName
-from rbxcompose.base.geometry import Transform3, Velocity2
+from rbxcompose.base.geometry import Velocity2
+from rbxcompose.domains.bases.odometry_messages import odometry_message, odometry_transform
 from rbxcompose.domains.bases.wheels import ABSURD, BaseLimits, OdometryPolicy, WheelDrive, WheelGeometry, WheelOdometry
 from rbxcompose.domains.servos.controller import ControlledJoint, Controller, ControllerConfig, controller
 from rbxcompose.manifest.fields import TopicName
@@ -25,8 +24,6 @@ from rbxcompose.msgs.tf2_msgs import TFMessage
 AVERAGED = 0.1  # [s], over which velocities are averaged
 JUMP = 2.0  # times the largest speed of a wheel: a servo that has started again counts from elsewhere
 STALE = 3.0  # cycles after which nobody knows where a wheel is
-UNKNOWN = 1e6  # variance of what wheels cannot measure: height, roll, pitch
-PLANAR = (0, 1, 5)  # x, y, and the turn about z, of the six that a covariance has
 
 
 class OdometryConfig(Config):
@@ -242,31 +239,6 @@ class DiffDriveController(Controller[DiffDriveConfig]):
         """Publish where the base is, and how it moves."""
         odometry, known = self.config.odometry, self.odometry
         header = Header(stamp=to_time(self.site.stamp), frame_id=odometry.frame)
-        at = Transform3.from_pose2(known.pose)
-        x, y, z = at.translation
-        turn = geometry.Quaternion(*at.rotation)
-        pose = geometry.Pose(position=geometry.Point(x, y, z), orientation=turn)
-        velocity = known.velocity
-        twist = geometry.Twist(linear=geometry.Vector3(x=velocity.linear), angular=geometry.Vector3(z=velocity.angular))
-        spread = np.zeros((3, 3))
-        spread[np.ix_((0, 2), (0, 2))] = known.velocity_covariance  # a wheel does not slip sideways
-        self.site.send(
-            "odometry",
-            Odometry(
-                header=header,
-                child_frame_id=odometry.child,
-                pose=geometry.PoseWithCovariance(pose=pose, covariance=planar(known.covariance)),
-                twist=geometry.TwistWithCovariance(twist=twist, covariance=planar(spread)),
-            ),
-        )
+        self.site.send("odometry", odometry_message(known, header, odometry.child))
         if odometry.tf:
-            placed = geometry.Transform(translation=geometry.Vector3(x, y, z), rotation=turn)
-            link = geometry.TransformStamped(header=header, child_frame_id=odometry.child, transform=placed)
-            self.site.send("tf", TFMessage(transforms=(link,)))
-
-
-def planar(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the 36 numbers of a covariance of x, y and the turn about z; the others are unknown."""
-    whole = np.diag([UNKNOWN] * 6)
-    whole[np.ix_(PLANAR, PLANAR)] = covariance
-    return whole.ravel()
+            self.site.send("tf", odometry_transform(known, header, odometry.child))

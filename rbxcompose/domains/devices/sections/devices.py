@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Annotated
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, ValidationInfo
 
-from rbxcompose.base.config import DEVICE, DEVICE_PORT, PREFIXED, Config
+from rbxcompose.base.config import DEVICE, DEVICE_PORT, PREFIXED, Config, Refers
 from rbxcompose.base.findings import Finding, Related, Severity, Span, kind
 from rbxcompose.domains.devices.usb import USB_PORT, UsbDevice
 from rbxcompose.manifest.registry import section
@@ -138,3 +138,22 @@ def port_name(contents: Contents, port: str) -> str:
     name = port.removeprefix(prefix)
     one = contents.of(devices).get(name) if port.startswith(prefix) else None
     return one.wanted(name).port if one else port
+
+
+def with_folder(text: str) -> str:
+    """Refuse a name of Linux without its folder."""
+    if text.startswith("tty") and text.isalnum():
+        raise ValueError(f"must be a path: write '/dev/{text}', or 'dev:NAME' for one of 'devices'")
+    return text
+
+
+def _device(text: str, info: ValidationInfo) -> str:
+    """Return the name by which a port is opened, as `port_name` does."""
+    prefix, kind = PREFIXED[DEVICE_PORT]
+    known = {} if info.context is None else info.context.get(kind, {})
+    device = known.get(name := text.removeprefix(prefix)) if text.startswith(prefix) else None
+    return device.wanted(name).port if isinstance(device, DeviceModel) else text
+
+
+SerialPortName = Annotated[str, Refers(DEVICE_PORT), AfterValidator(with_folder), AfterValidator(_device)]
+"""The serial port of a component: a path, or `dev:NAME`, which becomes what is known of the device."""

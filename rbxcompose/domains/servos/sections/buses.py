@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, WithJsonSchema
 from rbxcompose.base.config import DEVICE_PORT, SERVO_BUS, Angle, BitRate, Config, Frequency, Refers, Time
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.sections.body import body
-from rbxcompose.domains.devices.sections.devices import port_name
+from rbxcompose.domains.devices.sections.devices import port_name, with_folder
 from rbxcompose.domains.servos.bus import bus_type_names
 from rbxcompose.domains.servos.controller import ControllerConfig, controller_type
 from rbxcompose.domains.servos.models import share_of
@@ -39,19 +39,12 @@ class TwinModel(Config):
     """Another seed gives other noise, the same one gives the same."""
 
 
-def _port(text: str) -> str:
-    """Refuse a name of Linux without its folder."""
-    if text.startswith("tty") and text.isalnum():
-        raise ValueError(f"must be a path: write '/dev/{text}', or 'dev:NAME' for one of 'devices'")
-    return text
-
-
 class BusOfServosModel(Config):
     """A line of servos, driven by a process of its own."""
 
     type: BusTypeName
     """What speaks on it."""
-    port: Annotated[str, Refers(DEVICE_PORT), AfterValidator(_port)] = ""
+    port: Annotated[str, Refers(DEVICE_PORT), AfterValidator(with_folder)] = ""
     """The serial port, such as `/dev/ttyUSB0`, or `dev:NAME` of a device; simulated servos need none."""
     baud: BitRate = Field(1_000_000, gt=0)
     """Bits per second."""

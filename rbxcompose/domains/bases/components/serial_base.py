@@ -1,0 +1,256 @@
+"""A base whose motors are driven by a board at a serial port."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import Field
+
+from rbxcompose import sdk
+from rbxcompose.base.config import BitRate
+from rbxcompose.base.geometry import Pose2, Velocity2
+from rbxcompose.base.levels import Level
+from rbxcompose.domains.bases import wheel_board
+from rbxcompose.domains.bases.odometry_messages import odometry_message, odometry_transform
+from rbxcompose.domains.bases.wheels import (
+    ABSURD,
+    BaseLimits,
+    OdometryPolicy,
+    WheelDrive,
+    WheelGeometry,
+    WheelOdometry,
+    WheelSpeeds,
+)
+from rbxcompose.domains.devices.serial_ports import PortError
+from rbxcompose.domains.devices.serial_sensor import SILENT, SerialConfig, SerialSensor
+from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.sensor_msgs import BatteryState
+from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.msgs.tf2_msgs import TFMessage
+
+ODOM, BASE = "odom", "base_footprint"
+AVERAGED = 0.1  # [s], over which velocities are averaged
+JUMP = 2.0  # times the largest speed of a wheel
+
+
+class SerialBaseConfig(SerialConfig):
+    """Which board, and what it moves."""
+
+    baud: Annotated[BitRate, Field(gt=0)] = 115200
+    """Bits per second."""
+    ticks_per_metre: float = Field(gt=0)
+    """Ticks of an encoder for each metre of way of its wheel."""
+    wheel_distance: sdk.Length = Field(gt=0)
+    """Between the points where the wheels touch the ground."""
+    max_speed: sdk.Speed = Field(0.5, gt=0)
+    """Largest speed, forwards and backwards."""
+    max_turn_rate: sdk.AngularSpeed = Field(math.pi / 2, gt=0)
+    """Largest turn rate."""
+    acceleration: sdk.Acceleration = Field(1.0, gt=0)
+    """Acceleration when speeding up and braking."""
+    turn_acceleration: sdk.AngularAcceleration = Field(3.0, gt=0)
+    """Acceleration when starting and stopping to turn."""
+    command_timeout: sdk.Time = Field(0.5, gt=0)
+    """The base brakes when no command arrives for this long."""
+    rate: sdk.Frequency = Field(50.0, ge=10, le=100)
+    """How often it tells the board how fast to drive."""
+
+
+@sdk.component("serial_base")
+class SerialBase(SerialSensor[SerialBaseConfig]):
+    """Drives a base on two wheels by a board at a serial port, such as an Arduino, and publishes its odometry.
+
+    The board has the sketch `wheel_board`, or another one of its protocol. It stops its motors by itself when nothing
+    comes from here for 0.2 s. While nothing comes from it for as long, the base rests, and begins again from rest.
+
+    Example:
+        base: {type: serial_base, port: /dev/ttyACM0, ticks_per_metre: 4200, wheel_distance: 24 cm}
+    """
+
+    what = "the board"
+    cmd_vel = sdk.In(Twist, "cmd_vel", qos="command")
+    odom = sdk.Out(Odometry, "odom")
+    tf = sdk.Out(TFMessage, "/tf")
+    battery = sdk.Out(BatteryState, "battery")
+
+    @classmethod
+    def rate_of(cls, config: SerialBaseConfig) -> float:
+        """Return how often it commands the board [Hz]."""
+        return config.rate
+
+    @classmethod
+    def capabilities(cls, config: SerialBaseConfig) -> tuple[sdk.Capability, ...]:
+        """Declare its limits, the frame that it moves, and its port."""
+        base = sdk.Drives(
+            "cmd_vel",
+            "odom",
+            max_speed=sdk.Setting(config.max_speed, "max_speed"),
+            max_turn_rate=sdk.Setting(config.max_turn_rate, "max_turn_rate"),
+            drops_above=sdk.Setting(ABSURD),
+            stops_after=sdk.Setting(config.command_timeout, "command_timeout"),
+            acceleration=sdk.Setting(config.acceleration, "acceleration"),
+            turn_acceleration=sdk.Setting(config.turn_acceleration, "turn_acceleration"),
+            wheel_distance=sdk.Setting(config.wheel_distance, "wheel_distance"),
+        )
+        return *super().capabilities(config), base, sdk.WritesFrame("tf", sdk.Setting(ODOM), sdk.Setting(BASE))
+
+    def configure(self) -> None:
+        """Begin at the origin of `odom`, without a board."""
+        super().configure()
+        self.patience = 0.0  # commands wait for nothing
+        config = self.config
+        self.geometry = WheelGeometry.of_ticks(config.ticks_per_metre, config.wheel_distance, wheel_board.COUNTS)
+        limits = BaseLimits(config.max_speed, config.max_turn_rate, config.acceleration, config.turn_acceleration)
+        self.drive = WheelDrive(self.geometry, limits, config.command_timeout, wheel_board.MOST_TICKS)
+        self.link = wheel_board.BoardLink(self.faults)
+        self.odometry = self.new_odometry(Pose2())
+        self.last: wheel_board.BoardState | None = None
+        self.was_alive = False
+        self.refused = ""
+
+    def new_odometry(self, pose: Pose2) -> WheelOdometry:
+        """Return an odometry that begins at a pose, wherever the encoders are."""
+        config, tick = self.config, 1.0 / self.config.ticks_per_metre
+        fastest = self.geometry.fastest(Velocity2(config.max_speed, config.max_turn_rate)) * tick
+        policy = OdometryPolicy(greatest_speed=JUMP * fastest, resolution=tick, window=AVERAGED)
+        return WheelOdometry(self.geometry, policy, pose)
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Return whether the wheels are to stand still."""
+        return self.drive.at_rest
+
+    def on_cmd_vel(self, message: Twist) -> None:
+        """Take a command."""
+        self.refused = self.drive.command(Velocity2(message.linear.x, message.angular.z), self.now) or ""
+
+    def begin(self) -> None:
+        """Greet the board: it was plugged in, or the port was opened."""
+        self.link.forget()
+        self.trouble = ""
+
+    def take(self, data: bytes) -> None:
+        """Publish what the board says."""
+        for state in self.link.feed(data, self.now):
+            self.understood()
+            if self.last is None:
+                self.odometry = self.new_odometry(self.odometry.pose)  # its encoders may have begun again
+            self.last = state
+            if reason := self.odometry.update(state.left, state.right, self.now):
+                self.faults["jumps of wheels"] += "jumped" in reason
+            self.publish(state)
+
+    def publish(self, state: wheel_board.BoardState) -> None:
+        """Publish the odometry and the battery."""
+        header = Header(stamp=to_time(self.stamp), frame_id=ODOM)
+        if self.odom.is_wanted:
+            self.odom(odometry_message(self.odometry, header, BASE))
+        self.tf(odometry_transform(self.odometry, header, BASE))
+        if self.battery.is_wanted:
+            unknown = math.nan
+            self.battery(
+                BatteryState(
+                    Header(header.stamp),
+                    voltage=state.voltage,
+                    temperature=unknown,
+                    current=unknown,
+                    charge=unknown,
+                    capacity=unknown,
+                    design_capacity=unknown,
+                    percentage=unknown,
+                    present=True,
+                )
+            )
+
+    def step(self, dt: float) -> None:
+        """Take what the board says, and say how fast its wheels should turn."""
+        super().step(dt)
+        is_alive = self.line.is_open and self.link.is_alive(self.now)
+        if is_alive != self.was_alive:
+            self.was_alive = is_alive
+            self.changed(is_alive=is_alive)
+        if not is_alive or (self.last is not None and self.last.has_failed):
+            self.drive.rest()
+        speeds = self.drive.step(self.now, dt)
+        if self.line.is_open:
+            self.say(speeds)
+
+    def changed(self, *, is_alive: bool) -> None:
+        """Rest when the board is not heard any more, and tell when it is again."""
+        if is_alive:
+            self.trouble = ""
+            self.info("the board answers")
+            return
+        self.last = None
+        self.link.is_greeted = False
+        if self.line.is_open:
+            self.complain("the board is not heard: the base rests")
+
+    def say(self, speeds: WheelSpeeds) -> None:
+        """Send the speeds of the wheels; a port that takes nothing is opened again."""
+        try:
+            if not self.line.write(self.link.speak(self.now, speeds)):
+                self.line.close()
+                self.complain(f"{self.config.port} takes no bytes: the base rests")
+        except PortError as error:
+            self.lose(error)
+
+    def report(self) -> None:
+        """Report how the board is; one that never answered has its own words."""
+        if self.link.is_of_another_version:
+            speaks = f"version {self.link.version} of the protocol, not {wheel_board.VERSION}"
+            self.complain(f"the board speaks {speaks}: load the sketch again")
+        elif self.was_alive or self.now - max(self.since, self.read_at) > SILENT:
+            super().report()
+        elif self.trouble:
+            self.complain(self.trouble)
+        else:
+            self.status(Level.WARN, "the board has not answered yet")
+
+    def state(self) -> tuple[Level, str]:
+        """Return how the board is."""
+        if self.last is not None and self.last.has_failed:
+            return Level.ERROR, "a motor has failed: the base rests"
+        if self.refused:
+            return Level.WARN, f"a command was refused: {self.refused}"
+        return Level.OK, "drives" if not self.drive.at_rest else "rests"
+
+    def values(self) -> dict[str, str]:
+        """Return the battery."""
+        return {"battery": f"{self.last.voltage:.2f} V"} if self.last is not None else {}
+
+    def stop(self) -> None:
+        """Brake and ignore commands until `release`."""
+        self.drive.brake()
+
+    def release(self) -> None:
+        """Accept commands again."""
+        self.drive.release()
+
+    def hold(self) -> None:
+        """Rest: robot time stands still."""
+        self.drive.rest()
+        if self.line.is_open:
+            self.say(WheelSpeeds())
+
+    def go_on(self) -> None:
+        """Brake until the next command: robot time stood still, or has jumped."""
+        self.drive.forget()
+
+    def brake(self) -> None:
+        """Come to rest for good."""
+        self.drive.brake()
+
+    def cleanup(self) -> None:
+        """Let the board stand, and close the port."""
+        if self.line.is_open:
+            self.say(WheelSpeeds())
+        super().cleanup()
+
+    def summary(self) -> dict[str, str]:
+        """Report where it went."""
+        pose = self.odometry.pose
+        return {"place in odom": f"{pose.x:.2f} m, {pose.y:.2f} m, {math.degrees(pose.heading):.0f} deg"}

@@ -1,0 +1,1 @@
+"""Components that read devices at USB and serial ports."""

@@ -1,0 +1,116 @@
+"""A voice that people hear."""
+
+from __future__ import annotations
+
+import math
+
+from rbxcompose import sdk
+from rbxcompose.base.levels import Level
+from rbxcompose.base.printable import plain
+from rbxcompose.domains.devices.speech import LONGEST, SpeechProgram, Utterance, duration_of, pipeline_of
+from rbxcompose.msgs.rbxcompose_msgs import Say
+
+_SLOWEST = 3.0  # times the usual duration, and as many seconds, after which a program is taken for stuck
+SaidGoal = sdk.ServedGoal[Say.Goal, Say.Result, Say.Feedback]
+
+
+class VoiceConfig(sdk.Config):
+    """What speaks, and how."""
+
+    engine: SpeechProgram = "auto"
+    """The program that speaks: `auto` is piper if `voice` is a file, else espeak-ng. With `log` nobody hears it."""
+    voice: str = "en"
+    """A voice of espeak-ng, such as `en` or `de+f3`, or the file of one of piper, which ends in `.onnx`."""
+
+
+@sdk.component("voice")
+class Voice(sdk.Component[VoiceConfig]):
+    """Says what missions `say`, so that people hear it: by espeak-ng or piper, if they are installed.
+
+    Without them, without a loudspeaker, and where time is not real, words are logged and take the time of speaking.
+
+    Example:
+        voice: {type: voice, voice: en}
+    """
+
+    rate = 20.0
+    steps_for_goals = True
+    say = sdk.ServesAction(Say, "say", claims="voice", pausable=True)
+
+    def configure(self) -> None:
+        """Look which program is here."""
+        self.pipeline, self.trouble = pipeline_of(self.config.engine, self.config.voice)
+        self.goal: object = None  # what is being said
+        self.utterance: Utterance | None = None
+        self.until = -math.inf  # [s] of robot time, until which words take time, or a program may speak
+
+    def activate(self) -> None:
+        """Tell whether anybody will hear it."""
+        self.report()
+
+    def accept_say(self, goal: Say.Goal) -> str:
+        """Refuse what nobody would listen to."""
+        return "" if len(goal.words) <= LONGEST else f"that is longer than {LONGEST} characters"
+
+    def step(self, dt: float) -> None:
+        """Speak on."""
+        goal = self.say.current
+        if goal is None or goal.cancel_requested or goal.is_paused:
+            self.be_silent()
+            if goal is not None and goal.cancel_requested:
+                goal.canceled()
+            return
+        if goal is not self.goal:
+            self.begin(goal)
+        if self.utterance is None:
+            if self.now >= self.until - 1e-6:
+                self.end(goal)
+            return
+        reason = self.utterance.end()
+        if reason is None and self.now > self.until:
+            reason = "the program that speaks is stuck"
+        if reason is not None:
+            self.trouble = reason
+            self.report()
+            self.end(goal)
+
+    def begin(self, goal: SaidGoal) -> None:
+        """Begin to say the words of a goal, from the first one."""
+        self.be_silent()
+        self.goal = goal
+        words = plain(goal.request.words, LONGEST)
+        usual = duration_of(words)
+        self.until = self.now + usual
+        if not self.pipeline or not self.context.clock.is_real or not words.strip():
+            self.info(f"says: {words}")
+            return
+        try:
+            self.utterance = Utterance(self.pipeline, words)
+            self.until = self.now + _SLOWEST * usual + _SLOWEST
+        except OSError as error:
+            self.trouble = str(error)
+            self.report()
+
+    def end(self, goal: SaidGoal) -> None:
+        """End a goal: whoever could not hear it can read it in the log."""
+        if self.trouble and self.utterance is not None:
+            self.info(f"says: {plain(goal.request.words, LONGEST)}")
+        self.be_silent()
+        goal.succeeded(Say.Result(message=self.trouble))
+
+    def be_silent(self) -> None:
+        """Say nothing any more."""
+        if self.utterance is not None:
+            self.utterance.stop()
+        self.utterance = self.goal = None
+
+    def report(self) -> None:
+        """Report whether it is heard."""
+        if self.trouble:
+            self.status(Level.WARN, f"nobody hears it: {self.trouble}")
+        else:
+            self.status(Level.OK, f"speaks by {self.pipeline[0][0]}" if self.pipeline else "words are logged")
+
+    def cleanup(self) -> None:
+        """Be silent."""
+        self.be_silent()
