@@ -129,3 +129,8 @@ def test_what_there_is_to_choose_is_offered_places_joints_poses_topics_values_an
     assert offered(4)["set_parameter.component"]["choices"]
     assert "poses_and_gripper" in offered(5)["use"]["choices"]
     assert "$leading" in offered(6)["check"]["choices"]
+
+
+def test_a_skill_is_told_by_the_component_of_this_robot(editor: MissionEditor) -> None:
+    offered = {one["word"]: one["about"] for one in editor.answer({"do": "palette", "mission": "fetch"})}
+    assert offered["go_to"].startswith("Skill of 'go_to': ")  # a navigator of another robot offers one, too

@@ -8,6 +8,7 @@ from pathlib import Path as FilePath
 from textwrap import dedent
 
 from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.compiler.schema.mission import skills_of
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions.language.fields import first_line
 from rbxcompose.missions.program.registry import kinds
@@ -23,6 +24,9 @@ def palette(robot: Robot, file: FilePath) -> list[dict[str, str]]:
     """Return what a step can be: first this robot's skills, then the kinds, each with a line of help and its YAML."""
     guide, known = guide_of(robot, file, MappingNode({"do": _entry("do", MappingNode({}))}))
     about = {name: str(schema.get("description", "")) for name, schema in guide.keys(("do",)).items()}
+    # The guide knows all types that offer a skill; here it is one of those that this robot has.
+    own = skills_of({component.type_name for component in robot.components.values()})
+    about |= {name: text.replace("`", "'") for name, (_, text) in own.items()}
     skills = [
         {"word": name, "sort": "skill", "about": about.get(name, ""), "yaml": _skill(robot, file, name)}
         for name in sorted(known.of(SKILL))
