@@ -76,10 +76,10 @@ def session(package: Path, project: Path) -> Session:
     if node is None:
         pytest.skip("there is no node here")
 
-    def play(scenario: str, *programs: Path) -> Any:
+    def play(scenario: str, *programs: Path | str) -> Any:
         words = [node, str(HERE / "vscode_session.cjs"), scenario, str(package / "extension/dist/extension.js")]
         done = subprocess.run(
-            [*words, str(project), *map(str, programs)], text=True, capture_output=True, timeout=60, check=False
+            [*words, str(project), *programs], text=True, capture_output=True, timeout=60, check=False
         )
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)
@@ -188,3 +188,28 @@ def test_yaml_of_others_starts_nothing(session: Session, tmp_path: Path) -> None
     noisy = written(tmp_path / "noisy", f"touch {started}")
     assert session("foreign", noisy) == {"messages": [], "output": []}
     assert not started.exists()
+
+
+@pytest.mark.parametrize(
+    ("path", "text"),
+    [
+        ("robots/new.yaml", ""),
+        ("elsewhere.yaml", "# yaml-language-server: $schema=../schemas/mission.schema.json\n"),
+        ("elsewhere.yaml", "# A robot.\nrbx: 1\n"),
+    ],
+    ids=["folder", "schema", "header"],
+)
+def test_the_server_is_started_by(path: str, text: str, session: Session, tmp_path: Path) -> None:
+    said = session("begins", tmp_path / "none", json.dumps([path, text]))
+    assert said.startswith(f"'{tmp_path / 'none'}' cannot be started.")
+
+
+def test_the_program_of_the_workspace_comes_first(session: Session, program: Path, project: Path) -> None:
+    own = project / ".venv/bin/rbxcompose"
+    own.parent.mkdir(parents=True)
+    program.rename(own)
+    assert session("found", "")[0]["message"] == WRONG
+
+
+def test_a_mission_of_no_robot_has_a_page_that_says_so(session: Session, program: Path) -> None:
+    assert "error[RBX9040]" in session("no_robot", program)

@@ -76,9 +76,27 @@ const scenarios = {
     await deactivate(); // nothing more is said
     return { messages: editor.seen.messages, output: editor.seen.output.rbxcompose };
   },
+  async begins() {
+    activate(context);
+    await editor.open(...JSON.parse(process.argv[6]));
+    return (await said())[0].text;
+  },
+  async found() {
+    await editor.open(ROBOT, wrong());
+    activate(context);
+    return await found(ROBOT);
+  },
+  async no_robot() {
+    activate(context);
+    writeFileSync(join(folder, "unused.yaml"), "rbx: 1\nkind: Mission\nname: unused\ndo: [{wait: 1 s}]\n");
+    await editor.open("unused.yaml");
+    await run("showMission");
+    return editor.seen.panels[0].webview.html;
+  },
   async foreign() {
     activate(context);
     await editor.open("compose.yaml", "services:\n  web: {}\n");
+    await editor.open("config/other.yaml", "# yaml-language-server: $schema=other.schema.json\nkind: Robot\n");
     return { messages: editor.seen.messages, output: editor.seen.output.rbxcompose };
   },
 };
