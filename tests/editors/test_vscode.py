@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+import rbxcompose
 from tests.conftest import ROOT
 
 pytestmark = pytest.mark.timeout(150)
@@ -118,6 +119,8 @@ def test_manifest_and_lock_file_agree_with_the_project() -> None:
     declared = {entry["command"] for entry in manifest["contributes"]["commands"]}
     registered = re.findall(r'registerCommand\("([\w.]+)"', (FOLDER / "src/extension.ts").read_text("utf-8"))
     assert declared == set(registered)
+    assert manifest["version"] == rbxcompose.__version__
+    assert manifest["engines"]["vscode"] == f"^{manifest['devDependencies']['@types/vscode']}"
     assert manifest["capabilities"]["untrustedWorkspaces"]["supported"] is False
     assert not any("resolved" in package for package in lock["packages"].values())
     assert all(re.fullmatch(r"[\d.]+", version) for version in manifest["devDependencies"].values())
