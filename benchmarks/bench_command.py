@@ -2,15 +2,39 @@
 
 from __future__ import annotations
 
+import shutil
 import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from benchmarks.measuring import BARE, COMMAND, Row, in_turns, program
+from benchmarks.measuring import BARE, COMMAND, Row, Samples, in_turns, program
+from tests.conftest import ROOT
+from tests.lsp.client import Client
 
 MEASURES = ("rbxcompose/commands", "rbxcompose/compiler", "rbxcompose/tools")
+EDITORS = 10  # that start the language server, one after the other
+
+
+def served() -> tuple[Samples, Samples]:
+    """Return the times until the language server answers `initialize`, and until it has looked at a robot [s]."""
+    ready, looked = [], []
+    with TemporaryDirectory() as folder:
+        path = Path(folder).resolve() / "robots/turtlebot/robot.yaml"
+        shutil.copytree(ROOT / "robots/turtlebot", path.parent)
+        shutil.copytree(ROOT / "missions", Path(folder, "missions"))
+        document = {"uri": path.as_uri(), "languageId": "yaml", "version": 1, "text": path.read_text("utf-8")}
+        for _ in range(EDITORS):
+            start = time.perf_counter()
+            with Client(Path(folder)) as client:
+                ready.append(time.perf_counter() - start)
+                client.tell("textDocument/didOpen", textDocument=document)
+                client.diagnostics(path.as_uri())
+                looked.append(time.perf_counter() - start)
+    return Samples(tuple(ready)), Samples(tuple(looked))
 
 
 def rows() -> list[Row]:
-    """Return the time until help is there, and until the smallest robot is checked."""
+    """Return the time until help is there, until the smallest robot is checked, and until an editor is answered."""
     shown, checked, bare = in_turns(
         program([*COMMAND, "--help"]),
         program([*COMMAND, "check", "robots/turtlebot"]),
@@ -18,6 +42,7 @@ def rows() -> list[Row]:
         rounds=15,
         clock=time.perf_counter,
     )
+    ready, looked = served()
     return [
         Row(
             name="`--help`",
@@ -38,5 +63,20 @@ def rows() -> list[Row]:
             peer=bare.median * 1e3,
             against="python -c pass",
             most_ratio=20,
+        ),
+        Row(
+            name="`lsp`: start",
+            unit="ms",
+            how="until `initialize` is answered",
+            ours=ready.median * 1e3,
+            p99=ready.p99 * 1e3,
+            most=1000,
+        ),
+        Row(
+            name="`lsp`: first findings",
+            unit="ms",
+            how="from its start, of `robots/turtlebot`",
+            ours=looked.median * 1e3,
+            p99=looked.p99 * 1e3,
         ),
     ]

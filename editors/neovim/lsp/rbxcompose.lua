@@ -1,0 +1,5 @@
+return {
+  cmd = { "rbxcompose", "lsp" },
+  filetypes = { "yaml" },
+  root_markers = { "robots", "missions", ".git" },
+}
