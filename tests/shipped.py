@@ -27,7 +27,9 @@ def compiled(
     **others: Any,
 ) -> Compilation:
     """Compile a robot as `compile_robot` does, if it ships only once; any other one may have changed since."""
-    if overlays or not Path(path).resolve().is_relative_to(ROOT / "robots"):
+    if not others.get("unsaved"):
+        others.pop("unsaved", None)
+    if overlays or "unsaved" in others or not Path(path).resolve().is_relative_to(ROOT / "robots"):
         return compile_robot(path, environment=environment, profiles=profiles, overlays=overlays, sets=sets, **others)
     variables = tuple(sorted((name, value) for name, value in environment.items() if name not in OF_THE_TEST))
     made = _compiled(os.getcwd(), path, variables, tuple(profiles), tuple(sets), tuple(sorted(others.items())))

@@ -88,6 +88,7 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
         "action/BackUp.action",
         "action/Recharge.action",
         "action/RunMission.action",
+        "action/Say.action",
         "srv/AttachObject.srv",
         "srv/DetachObject.srv",
         "srv/LocateArm.srv",

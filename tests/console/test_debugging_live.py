@@ -15,6 +15,7 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from tests.cli.live_robot import PATIENCE, Robot
 from tests.console.test_gateway_live import free_port
+from tests.runtime.real_robot import eventually
 
 pytestmark = pytest.mark.timeout(60)
 PORT = free_port()
@@ -134,4 +135,4 @@ def test_a_mission_is_debugged_through_the_gateway(robot: Robot) -> None:
     asyncio.run(visit())
     log = robot.do("logs", "mission").stdout
     assert "by hand: round = 7; the run cannot be reproduced without this" in log
-    assert "asks mission.ForceNode" in robot.do("logs", "gateway").stdout
+    eventually(lambda: "asks mission.ForceNode" in robot.do("logs", "gateway").stdout)  # it logs once a second
