@@ -333,6 +333,54 @@ def test_it_moves_joints_and_an_empty_trajectory_brings_them_to_rest(tmp_path: P
     assert not sent[-1].points
 
 
+HEAD = """
+rbx: 1
+kind: Robot
+name: head
+buses:
+  servos: {type: dynamixel, port: /dev/ttyUSB0, baud: 1000000}
+include:
+  head: {part: "rbx:parts/pan_tilt.yaml", with: {bus: servos, pan_id: 1, tilt_id: 2}}
+components:
+  turn:
+    type: policy
+    model: turn.onnx
+    starts: true
+    observes:
+      - {topic: joint_states, joints: [head_pan_joint, head_tilt_joint], fields: [position]}
+      - {topic: wish, message: std_msgs/Float32, fields: [data]}
+    commands:
+      topic: head_controller/joint_trajectory
+      outputs:
+        head_pan_joint: {least: -1, most: 1, jump: 0.2}
+        head_tilt_joint: {least: -0.5, most: 0.5, jump: 0.2}
+"""
+
+
+def test_it_turns_simulated_servos_by_their_controller_which_rest_when_it_is_silent(tmp_path: Path) -> None:
+    network(tmp_path / "turn.onnx", [[1, 0], [0, 1], [1, 0]], [0, 0])  # where it is, and by the wish farther
+    plan, findings = compiled(tmp_path, HEAD)
+    assert [finding for finding in findings if finding.severity == "error"] == []
+    bench = Bench(plan=plan)
+    states = bench.collect("/joint_states", JointState)
+
+    def pan() -> float:
+        return float(states[-1].position[states[-1].name.index("head_pan_joint")])
+
+    bench.advance(1.0)
+    start = pan()
+    for _ in range(20):
+        bench.publish("/wish", Float32(data=0.05))
+        bench.advance(0.1)
+    assert pan() > start + 0.1
+    for _ in range(10):
+        bench.publish("/wish", Float32(data=NAN))
+        bench.advance(0.1)
+    rested = pan()
+    bench.advance(2.0)
+    assert pan() == pytest.approx(rested, abs=0.005)
+
+
 def test_check_compares_the_sizes_of_the_network_with_what_is_written(tmp_path: Path) -> None:
     network(tmp_path / "steer.onnx", [[1, 0, 0], [0, 1, 0]], [0, 0, 0])
     _, findings = compiled(tmp_path, BASE)
