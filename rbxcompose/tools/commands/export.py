@@ -1,4 +1,4 @@
-"""Write a system for what keeps it alive, a robot for ROS 2, MoveIt or a viewer, or a mission as a tree.
+"""Write a system for what keeps it alive, a robot for ROS 2, MoveIt or viewers, a mission as a tree.
 
 `systemd`, `compose` and `k8s` write units, a Compose file and manifests of Kubernetes; `srdf` is for MoveIt.
 `ros2` writes packages for a workspace: messages, and for each robot a launch file for RViz or Foxglove.
