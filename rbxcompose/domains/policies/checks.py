@@ -10,7 +10,6 @@ from typing import Any
 from rbxcompose.base.findings import Finding
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
-from rbxcompose.domains.policies.network import PolicyNetwork, PolicyNetworkError, read_network
 from rbxcompose.manifest.tree import ScalarNode, at
 
 
@@ -23,6 +22,12 @@ def unusable_policy(robot: Robot) -> Iterator[Finding]:
 
 
 def _examined(robot: Robot, made: RobotComponent) -> Iterator[Finding]:
+    from rbxcompose.domains.policies.network import (
+        PolicyNetwork,
+        PolicyNetworkError,
+        read_network,
+    )  # few robots have one
+
     config: Any = made.config
     path = Path(config.model)
     try:
@@ -37,7 +42,7 @@ def _examined(robot: Robot, made: RobotComponent) -> Iterator[Finding]:
         return
     if network is None:
         return
-    takes, gives = sum(one.length for one in config.observes), len(config.commands.outputs)
+    takes, gives = sum(seen.length for seen in config.observes), len(config.commands.outputs)
     if network.takes not in (None, takes):
         where = robot.value(*made.place("observes"))
         yield unusable_policy.at(where, f"these are {takes} numbers, and '{path.name}' takes {network.takes}")

@@ -57,7 +57,7 @@ class PolicyCore:
             self.counts.refused += 1
             return problem
         pairs = zip(self.limits.values(), answer, strict=True)
-        self.last, self.sent_at = tuple(min(max(value, one.least), one.most) for one, value in pairs), ended
+        self.last, self.sent_at = tuple(min(max(value, limits.least), limits.most) for limits, value in pairs), ended
         self.counts.sent += 1
         return ""
 
@@ -74,7 +74,7 @@ class PolicyCore:
         return ""
 
     def must_rest(self, now: float) -> bool:
-        """Return whether what is commanded must rest now: its last command was good too long ago; told once."""
+        """Return whether what is commanded must rest now: its last command was good too long ago; once."""
         if self.last is None or now - self.sent_at <= self.deadline:
             return False
         self.last = None

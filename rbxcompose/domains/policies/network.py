@@ -80,8 +80,10 @@ def _length(end: Any, what: str) -> int | None:
     shape = end.shape
     is_vector = len(shape) == 1 or (len(shape) == 2 and (shape[0] == 1 or not isinstance(shape[0], int)))
     if end.type != "tensor(float)" or not is_vector:
-        told = "x".join(map(str, shape)) or "nothing"
-        raise PolicyNetworkError(f"its {what} '{end.name}' is {end.type} of the shape {told}, and not floats N or 1xN")
+        written = "x".join(map(str, shape)) or "nothing"
+        raise PolicyNetworkError(
+            f"its {what} '{end.name}' is {end.type} of the shape {written}, and not floats N or 1xN"
+        )
     return shape[-1] if isinstance(shape[-1], int) else None
 
 

@@ -119,10 +119,10 @@ class PolicyConfig(sdk.Config):
 def positions_in(observes: list[ObservationConfig]) -> dict[str, tuple[int, int]]:
     """Return in which observation, and where in it, the position of each joint is."""
     found: dict[str, tuple[int, int]] = {}
-    for number, one in enumerate(observes):
-        if one.message == JOINT_STATE and "position" in one.fields:
-            first = one.fields.index("position") * len(one.joints)
-            found |= {joint: (number, first + place) for place, joint in enumerate(one.joints)}
+    for number, seen in enumerate(observes):
+        if seen.message == JOINT_STATE and "position" in seen.fields:
+            first = seen.fields.index("position") * len(seen.joints)
+            found |= {joint: (number, first + place) for place, joint in enumerate(seen.joints)}
     return found
 
 
@@ -151,14 +151,14 @@ class Policy(sdk.Component[PolicyConfig]):
     @classmethod
     def ports(cls, config: PolicyConfig) -> dict[str, sdk.Port[Any]]:
         """Return what it observes and commands, and its switch."""
-        seen: dict[str, sdk.Port[Any]] = {
-            name: sdk.In(registry.message(one.message), one.topic, is_open=True, limits=BULK).named(name)
-            for name, one in _observed(config).items()
+        inputs: dict[str, sdk.Port[Any]] = {
+            name: sdk.In(registry.message(seen.message), seen.topic, is_open=True, limits=BULK).named(name)
+            for name, seen in _observed(config).items()
         }
         kind = MESSAGES[config.commands.message]
         commands: sdk.Port[Any] = sdk.Out(kind, config.commands.topic, qos=_quality(config))
         return {
-            **seen,
+            **inputs,
             "commands": commands.named("commands"),
             "switch": sdk.Serves(SetBool, config.switch).named("switch"),
         }
@@ -175,7 +175,10 @@ class Policy(sdk.Component[PolicyConfig]):
     def configure(self) -> None:
         """Load the network; if it is none, that is reported."""
         config = self.config
-        limits = {name: AnswerLimits(one.least, one.most, one.jump) for name, one in config.commands.outputs.items()}
+        limits = {
+            name: AnswerLimits(output.least, output.most, output.jump)
+            for name, output in config.commands.outputs.items()
+        }
         self.core = PolicyCore(limits, config.deadline)
         self.observations = _observed(config)
         self.newest: dict[str, tuple[float, Any]] = {}
@@ -247,11 +250,11 @@ class Policy(sdk.Component[PolicyConfig]):
             NothingObservedError: if one is missing or old.
         """
         parts = []
-        for port, one in self.observations.items():
+        for port, seen in self.observations.items():
             came, message = self.newest.get(port, (None, None))
-            if came is None or now - came > one.timeout:
-                raise NothingObservedError(f"nothing comes on '{one.topic}'")
-            parts.append(observed(one, message))
+            if came is None or now - came > seen.timeout:
+                raise NothingObservedError(f"nothing comes on '{seen.topic}'")
+            parts.append(observed(seen, message))
         return parts
 
     def beginning(self, parts: list[list[float]]) -> list[float]:
@@ -303,7 +306,7 @@ class Policy(sdk.Component[PolicyConfig]):
 
 def _observed(config: PolicyConfig) -> dict[str, ObservationConfig]:
     """Return the observations by the names of their ports."""
-    return {f"observed_{number}": one for number, one in enumerate(config.observes, 1)}
+    return {f"observed_{number}": seen for number, seen in enumerate(config.observes, 1)}
 
 
 def _quality(config: PolicyConfig) -> str:
