@@ -24,6 +24,7 @@ FAMILIES = {
     "35": "rates and units",
     "36": "worlds and navigation",
     "37": "seeing",
+    "38": "policies",
     "41": "missions",
     "42": "tests of missions",
     "50": "diagnostics",

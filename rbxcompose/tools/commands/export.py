@@ -1,7 +1,8 @@
-"""Write a system for what keeps it alive, a robot for ROS 2 or MoveIt, or a mission as a tree.
+"""Write a system for what keeps it alive, a robot for ROS 2, MoveIt or viewers, a mission as a tree.
 
 `systemd`, `compose` and `k8s` write units, a Compose file and manifests of Kubernetes; `srdf` is for MoveIt.
 `ros2` writes packages for a workspace: messages, and for each robot a launch file for RViz or Foxglove.
+`rviz` and `foxglove` write what shows a robot there: a configuration of RViz 2, a layout of Foxglove.
 `bt` writes a mission, with those that it uses, as trees of BehaviorTree.CPP 4.
 
 The files go to a new or empty folder; `srdf` writes a URDF and an SRDF.
@@ -12,7 +13,7 @@ import argparse
 import getpass
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from rbxcompose import __version__
@@ -20,22 +21,32 @@ from rbxcompose.base.findings import Finding, Report, kind
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.options import is_system, out_option
 from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.bundle import files_of
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.tools.exporting import compose, kubernetes, ros2, systemd
 from rbxcompose.tools.exporting.exported_share import shares
+from rbxcompose.tools.exporting.foxglove import foxglove_layout
+from rbxcompose.tools.exporting.rviz import rviz_config
 
 GROUP = "system"
 NOT_EXPORTED = kind("RBX6115")
-SRDF, ROS2, BT = "srdf", "ros2", "bt"
-PROGRAMS = ("systemd", "compose", "k8s", ROS2, SRDF, BT)
+SRDF, ROS2, RVIZ, FOXGLOVE, BT = "srdf", "ros2", "rviz", "foxglove", "bt"
+PROGRAMS = ("systemd", "compose", "k8s", ROS2, SRDF, RVIZ, FOXGLOVE, BT)
+_OF_ROBOTS: Mapping[str, Callable[[Sequence[Plan]], dict[str, str]]] = {
+    ROS2: lambda plans: ros2.packages(plans, __version__),
+    RVIZ: lambda plans: {f"{plan.robot}.rviz": rviz_config(plan) for plan in plans},
+    FOXGLOVE: lambda plans: {f"{plan.robot}.foxglove.json": foxglove_layout(plan) for plan in plans},
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("program", choices=PROGRAMS, help="for which program")
-    parser.add_argument("path", metavar="SYSTEM", help="the file: a system; srdf: a robot; ros2: either; bt: a mission")
+    parser.add_argument(
+        "path", metavar="SYSTEM", help="the file: a system; srdf: a robot; ros2, rviz, foxglove: either; bt: a mission"
+    )
     out_option("a new or empty folder", metavar="FOLDER", required=True)(parser)
     parser.add_argument("--host", metavar="NAME", help="only what this host runs")
     parser.add_argument("--profile", action="append", default=[], metavar="P", help="apply this profile of the system")
@@ -50,8 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Compile the system and write the files."""
     if arguments.program == SRDF:
         return _export_robot(arguments)
-    if arguments.program == ROS2:
-        return _ros2(arguments)
+    if arguments.program in _OF_ROBOTS:
+        return _export_robots(arguments, _OF_ROBOTS[arguments.program])
     if arguments.program == BT:
         return _export_mission(arguments)
     if not is_system(arguments.path):
@@ -70,8 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
     return _finish(arguments, made)
 
 
-def _ros2(arguments: argparse.Namespace) -> int:
-    """Write packages for the robots of a system, or for a single robot."""
+def _export_robots(arguments: argparse.Namespace, made: Callable[[Sequence[Plan]], dict[str, str]]) -> int:
+    """Write what is made of the robots of a system, or of a single robot."""
     compiled: System | Compilation
     if is_system(arguments.path):
         compiled = compile_system(arguments.path, environment=os.environ, real=arguments.real)
@@ -82,7 +93,7 @@ def _ros2(arguments: argparse.Namespace) -> int:
     write_report(compiled.report, compiled.sources)
     if compiled.report.has_errors:
         return FINDINGS
-    return _finish(arguments, _encoded(ros2.packages(plans, __version__)))
+    return _finish(arguments, _encoded(made(plans)))
 
 
 def _finish(arguments: argparse.Namespace, made: Mapping[str, bytes]) -> int:

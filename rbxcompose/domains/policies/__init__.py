@@ -1,0 +1,1 @@
+"""Policies: networks of the user that command joints or the base."""

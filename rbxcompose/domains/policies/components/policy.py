@@ -1,0 +1,318 @@
+"""A network of the user that commands joints or the base."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field, ValidationInfo, field_validator
+
+from rbxcompose import sdk
+from rbxcompose.base.config import LocalPath
+from rbxcompose.base.levels import Level
+from rbxcompose.domains.policies.core import AnswerLimits, PolicyCore
+from rbxcompose.domains.policies.network import PolicyNetwork, PolicyNetworkError
+from rbxcompose.domains.policies.observation import JOINT_STATE, NothingObservedError, ObservationConfig, observed
+from rbxcompose.manifest.fields import TopicName
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.arrays import filled
+from rbxcompose.msgs.geometry_msgs import Twist, Vector3
+from rbxcompose.msgs.stamps import to_duration
+from rbxcompose.msgs.std_msgs import Float64MultiArray
+from rbxcompose.msgs.std_srvs import SetBool
+from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
+from rbxcompose.msgs.types import Message
+from rbxcompose.sdk.ports import BULK
+
+JOINTS, NUMBERS, VELOCITY = JointTrajectory.TYPE, Float64MultiArray.TYPE, Twist.TYPE
+MESSAGES: Mapping[str, type[Message]] = {JOINTS: JointTrajectory, NUMBERS: Float64MultiArray, VELOCITY: Twist}
+AXES = tuple(f"{kind}.{axis}" for kind in ("linear", "angular") for axis in "xyz")
+PERIODS = 2.0  # of the rate, in which joints arrive if nothing else is said
+
+
+class PolicyOutputConfig(sdk.Config):
+    """What a number of an answer may be, in SI; an answer with any other is refused."""
+
+    least: float
+    """The least value."""
+    most: float
+    """The greatest value."""
+    jump: float = Field(gt=0)
+    """How far it may be from the value before; the first one from where the joint is, or from 0."""
+
+    @field_validator("most")
+    @classmethod
+    def _is_more(cls, most: float, info: ValidationInfo) -> float:
+        if "least" in info.data and most < info.data["least"]:
+            raise ValueError(f"it is below 'least', {info.data['least']:g}")
+        return most
+
+
+class PolicyCommandsConfig(sdk.Config):
+    """Where answers go, and what they mean."""
+
+    topic: TopicName
+    """The topic of a controller (`arm/joint_trajectory`), or an input of a mux (`cmd_vel/policy`)."""
+    message: sdk.MessageName = JOINTS
+    """Its type: `trajectory_msgs/JointTrajectory`, `geometry_msgs/Twist` or `std_msgs/Float64MultiArray`."""
+    within: sdk.Time | None = Field(None, gt=0)
+    """In which time joints arrive at a position, and then rest; by default in two periods of the rate."""
+    outputs: dict[str, PolicyOutputConfig] = Field(min_length=1)
+    """The numbers of an answer in their order: joints, `linear.x` to `angular.z` of a velocity, or any words."""
+
+    @field_validator("message")
+    @classmethod
+    def _is_understood(cls, message: str) -> str:
+        if message not in MESSAGES:
+            raise ValueError(f"answers are sent as {', '.join(MESSAGES)}")
+        return message
+
+    @field_validator("outputs")
+    @classmethod
+    def _are_axes(cls, outputs: dict[str, PolicyOutputConfig], info: ValidationInfo) -> dict[str, PolicyOutputConfig]:
+        unknown = [name for name in outputs if name not in AXES]
+        if info.data.get("message") == VELOCITY and unknown:
+            raise ValueError(f"a velocity has no '{unknown[0]}', but {', '.join(AXES)}")
+        return outputs
+
+
+class PolicyConfig(sdk.Config):
+    """The network, what it is given, and what its answers command."""
+
+    model: LocalPath = Field(min_length=1)
+    """The network, a file in ONNX: relative to the robot's file, or a whole path on the robot's computer."""
+    rate: sdk.Frequency = Field(10.0, gt=0, le=200)
+    """How often it is asked."""
+    deadline: sdk.Time = Field(0.2, gt=0, validate_default=True)
+    """An answer that took longer is not sent; so long after the last one that was, what it commands comes to rest."""
+    observes: list[ObservationConfig] = Field(min_length=1)
+    """What it is given, in this order."""
+    commands: PolicyCommandsConfig
+    """What its answers command."""
+    switch: TopicName = "policy/enable"
+    """The service that switches it on and off."""
+    starts: bool = False
+    """Whether it is on as soon as the robot is up; after a stop it is off in any case."""
+
+    @field_validator("deadline")
+    @classmethod
+    def _is_longer_than_a_period(cls, deadline: float, info: ValidationInfo) -> float:
+        if (rate := info.data.get("rate")) is not None and deadline <= 1.0 / rate:
+            raise ValueError(
+                f"at {rate:g} Hz there is an answer every {1e3 / rate:.0f} ms: it must be longer than that"
+            )
+        return deadline
+
+    @field_validator("commands")
+    @classmethod
+    def _sees_what_it_moves(cls, commands: PolicyCommandsConfig, info: ValidationInfo) -> PolicyCommandsConfig:
+        if commands.message == JOINTS and "observes" in info.data:
+            blind = [joint for joint in commands.outputs if joint not in positions_in(info.data["observes"])]
+            if blind:
+                raise ValueError(
+                    f"it must observe the position of '{blind[0]}' to command it: its first step is from there"
+                )
+        return commands
+
+
+def positions_in(observes: list[ObservationConfig]) -> dict[str, tuple[int, int]]:
+    """Return in which observation, and where in it, the position of each joint is."""
+    found: dict[str, tuple[int, int]] = {}
+    for number, seen in enumerate(observes):
+        if seen.message == JOINT_STATE and "position" in seen.fields:
+            first = seen.fields.index("position") * len(seen.joints)
+            found |= {joint: (number, first + place) for place, joint in enumerate(seen.joints)}
+    return found
+
+
+@sdk.component("policy")
+class Policy(sdk.Component[PolicyConfig]):
+    """Runs a network in ONNX that observes joints or other numbers, and commands a controller or an input of a mux.
+
+    Nothing is sent that is late, not finite, or beyond the limits of `outputs`. It is off until its service, such as
+    the skill `enable`, switches it on.
+
+    Example:
+        reach: {type: policy, model: /opt/models/reach.onnx,
+          observes: [{topic: odom, message: nav_msgs/Odometry, fields: [twist.twist.linear.x]}],
+          commands: {topic: cmd_vel/policy, message: geometry_msgs/Twist,
+            outputs: {linear.x: {least: -0.1, most: 0.3, jump: 0.05}}}}
+    """
+
+    process = "policy"
+    blocking = True
+
+    @classmethod
+    def rate_of(cls, config: PolicyConfig) -> float:
+        """Return how often it is asked [Hz]."""
+        return config.rate
+
+    @classmethod
+    def ports(cls, config: PolicyConfig) -> dict[str, sdk.Port[Any]]:
+        """Return what it observes and commands, and its switch."""
+        inputs: dict[str, sdk.Port[Any]] = {
+            name: sdk.In(registry.message(seen.message), seen.topic, is_open=True, limits=BULK).named(name)
+            for name, seen in _observed(config).items()
+        }
+        kind = MESSAGES[config.commands.message]
+        commands: sdk.Port[Any] = sdk.Out(kind, config.commands.topic, qos=_quality(config))
+        return {
+            **inputs,
+            "commands": commands.named("commands"),
+            "switch": sdk.Serves(SetBool, config.switch).named("switch"),
+        }
+
+    @classmethod
+    def capabilities(cls, config: PolicyConfig) -> tuple[sdk.Capability, ...]:
+        """Declare what it needs, and how fast it drives."""
+        needed = sdk.NeedsExtra(sdk.Setting("onnxruntime"), sdk.Setting("policy"))
+        if config.commands.message != VELOCITY:
+            return (needed,)
+        speed, turn_rate = (_greatest(config, name) for name in ("linear.x", "angular.z"))
+        return needed, sdk.CommandsMotion("commands", sdk.Setting(speed), sdk.Setting(turn_rate))
+
+    def configure(self) -> None:
+        """Load the network; if it is none, that is reported."""
+        config = self.config
+        limits = {
+            name: AnswerLimits(output.least, output.most, output.jump)
+            for name, output in config.commands.outputs.items()
+        }
+        self.core = PolicyCore(limits, config.deadline)
+        self.observations = _observed(config)
+        self.newest: dict[str, tuple[float, Any]] = {}
+        self.is_on, self.problem = False, ""
+        self.network: PolicyNetwork | None = None
+        try:
+            self.network = PolicyNetwork(Path(config.model))
+        except PolicyNetworkError as error:
+            self.problem = str(error)
+            self.warn(self.problem)
+
+    def start(self) -> None:
+        """Begin if it is to begin by itself."""
+        self.is_on = self.config.starts and not self.context.is_stopped
+
+    def received(self, port: str, message: Any) -> None:
+        """Keep the newest message of each topic."""
+        self.newest[port] = self.now, message
+
+    def on_switch(self, request: SetBool.Request) -> SetBool.Response:
+        """Switch it on or off."""
+        if request.data and self.network is None:
+            return SetBool.Response(success=False, message=self.problem)
+        if request.data and self.context.is_stopped:
+            return SetBool.Response(success=False, message="the robot is stopped")
+        if not request.data:
+            self.rest()
+        self.is_on = request.data
+        return SetBool.Response(success=True)
+
+    def step(self, dt: float) -> None:
+        """Ask the network, and send its answer if that may be."""
+        if self.network is None:
+            self.status(Level.ERROR, self.problem)
+            return
+        problem = self.ask(self.network) if self.is_on else ""
+        if self.core.must_rest(self.now):
+            self.send_rest()
+        words = problem or ("sends" if self.is_on else "is off")
+        is_silent = bool(problem) and self.core.last is None
+        level = Level.ERROR if is_silent else Level.WARN if problem else Level.OK
+        counts = self.core.counts
+        self.status(level, words, sent=counts.sent, late=counts.late, refused=counts.refused, unseen=counts.unseen)
+
+    def ask(self, network: PolicyNetwork) -> str:
+        """Send the answer to what is observed now; return why not, or nothing."""
+        began = self.now
+        try:
+            parts = self.observe(began)
+        except NothingObservedError as error:
+            self.core.counts.unseen += 1
+            return str(error)
+        try:
+            answer = network.answer([number for part in parts for number in part])
+        except PolicyNetworkError as error:
+            self.core.counts.refused += 1
+            return str(error)
+        if self.context.is_stopped:
+            return "the robot is stopped"
+        problem = self.core.judge(answer, self.beginning(parts), began, self.now)
+        if not problem and self.core.last is not None:
+            self.bound["commands"](self.command(self.core.last))
+        return problem
+
+    def observe(self, now: float) -> list[list[float]]:
+        """Return the numbers of each observation.
+
+        Raises:
+            NothingObservedError: if one is missing or old.
+        """
+        parts = []
+        for port, seen in self.observations.items():
+            came, message = self.newest.get(port, (None, None))
+            if came is None or now - came > seen.timeout:
+                raise NothingObservedError(f"nothing comes on '{seen.topic}'")
+            parts.append(observed(seen, message))
+        return parts
+
+    def beginning(self, parts: list[list[float]]) -> list[float]:
+        """Return what the first answer must be near to: where joints are, else 0."""
+        known = positions_in(self.config.observes) if self.config.commands.message == JOINTS else {}
+        places = [known.get(name) for name in self.core.limits]
+        return [parts[place[0]][place[1]] if place else 0.0 for place in places]
+
+    def command(self, answer: tuple[float, ...]) -> Message:
+        """Return an answer as a message."""
+        commands = self.config.commands
+        if commands.message == JOINTS:
+            within = commands.within or PERIODS / self.config.rate
+            point = JointTrajectoryPoint(positions=filled("float64", answer), time_from_start=to_duration(within))
+            return JointTrajectory(joint_names=tuple(commands.outputs), points=(point,))
+        if commands.message == NUMBERS:
+            return Float64MultiArray(data=filled("float64", answer))
+        axes = dict(zip(commands.outputs, answer, strict=True))
+        linear, angular = (
+            Vector3(*(axes.get(f"{kind}.{axis}", 0.0) for axis in "xyz")) for kind in ("linear", "angular")
+        )
+        return Twist(linear=linear, angular=angular)
+
+    def rest(self) -> None:
+        """Bring what it commands to rest, if it commands anything."""
+        if self.core.forget():
+            self.send_rest()
+
+    def send_rest(self) -> None:
+        """Command rest once: no velocity, or a trajectory without points; numbers have no meaning that we know."""
+        if self.config.commands.message == VELOCITY:
+            self.bound["commands"](Twist())
+        elif self.config.commands.message == JOINTS:
+            self.bound["commands"](JointTrajectory(joint_names=tuple(self.config.commands.outputs)))
+
+    def stop(self) -> None:
+        """Be off, until somebody switches it on again."""
+        self.is_on = False
+        self.rest()
+
+    def hold(self) -> None:
+        """Command rest: no step follows while robot time stands still."""
+        self.rest()
+
+    def brake(self) -> None:
+        """Be off for good."""
+        self.stop()
+
+
+def _observed(config: PolicyConfig) -> dict[str, ObservationConfig]:
+    """Return the observations by the names of their ports."""
+    return {f"observed_{number}": seen for number, seen in enumerate(config.observes, 1)}
+
+
+def _quality(config: PolicyConfig) -> str:
+    return "state" if config.commands.message == JOINTS else "command"
+
+
+def _greatest(config: PolicyConfig, name: str) -> float:
+    output = config.commands.outputs.get(name)
+    return max(abs(output.least), abs(output.most)) if output else 0.0

@@ -1,0 +1,398 @@
+"""A policy commands by a network that the tests make; whatever is wrong with its answers, what it commands rests."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from rbxcompose.base.findings import Finding
+from rbxcompose.base.levels import Level
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.domains.policies.components.policy import PolicyConfig
+from rbxcompose.domains.policies.core import AnswerLimits, PolicyCore
+from rbxcompose.domains.policies.network import PolicyNetwork, PolicyNetworkError
+from rbxcompose.domains.policies.observation import NothingObservedError, ObservationConfig, observed
+from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.sensor_msgs import JointState
+from rbxcompose.msgs.std_msgs import Float32, Float64MultiArray
+from rbxcompose.msgs.std_srvs import SetBool
+from rbxcompose.msgs.trajectory_msgs import JointTrajectory
+from rbxcompose.testing import Bench, instance
+from tests.policies.networks import network
+
+LIMITS = {"a": AnswerLimits(-1.0, 1.0, 0.2), "b": AnswerLimits(-1.0, 1.0, 0.2)}
+NAN, INF = math.nan, math.inf
+
+
+def judged(core: PolicyCore, answer: Sequence[float], began: float = 0.0, took: float = 0.01) -> str:
+    return core.judge(answer, [0.0, 0.0], began, began + took)
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        ((NAN, 0.0), "'a' is not finite"),
+        ((0.0, -INF), "'b' is not finite"),
+        ((0.0, 1.5), "'b' is 1.5, beyond -1 to 1"),
+        ((0.3, 0.0), "'a' jumps from 0 to 0.3, by more than 0.2"),
+        ((0.0,), "an answer has 1 numbers, and not 2"),
+    ],
+)
+def test_what_is_wrong_is_refused_and_counted(answer: tuple[float, ...], said: str) -> None:
+    core = PolicyCore(LIMITS, 0.1)
+    assert judged(core, answer) == said
+    assert (core.counts.refused, core.counts.sent, core.last) == (1, 0, None)
+
+
+def test_what_is_late_is_not_sent() -> None:
+    core = PolicyCore(LIMITS, 0.1)
+    assert judged(core, (0.0, 0.0), took=0.15) == "an answer took 150 ms, and is late after 100 ms"
+    assert (core.counts.late, core.counts.sent) == (1, 0)
+
+
+def test_rest_is_told_once_when_the_last_good_answer_is_old_and_the_next_one_begins_anew() -> None:
+    core = PolicyCore(LIMITS, 0.1)
+    assert judged(core, (0.2, 0.0)) == judged(core, (0.4, 0.0), began=0.05) == ""
+    assert judged(core, (NAN, 0.0), began=0.1)
+    assert [core.must_rest(time) for time in (0.1, 0.15, 0.2, 0.3)] == [False, False, True, False]
+    assert judged(core, (0.4, 0.0), began=0.4).startswith("'a' jumps from 0 to 0.4")
+
+
+@given(st.lists(st.tuples(*[st.floats() for _ in LIMITS]), max_size=20))
+def test_nothing_that_is_sent_is_beyond_limits_or_far_from_what_was_sent(answers: list[tuple[float, float]]) -> None:
+    core, before = PolicyCore(LIMITS, 0.1), (0.0, 0.0)
+    for answer in answers:
+        if not judged(core, answer):
+            assert core.last is not None
+            assert all(-1 <= value <= 1 for value in core.last)
+            assert all(abs(value - old) <= 0.2 + 2e-6 for value, old in zip(core.last, before, strict=True))
+            before = (core.last[0], core.last[1])
+    assert core.counts.sent + core.counts.refused == len(answers)
+
+
+def test_numbers_are_observed_in_the_order_in_which_they_are_written() -> None:
+    states = JointState(name=("a", "b", "c"), position=np.array([1.0, 2.0, 3.0]), velocity=np.array([4.0, 5.0, 6.0]))
+    config = ObservationConfig(topic="joint_states", joints=["c", "a"], fields=["velocity", "position"])
+    assert (observed(config, states), config.length) == ([6.0, 4.0, 3.0, 1.0], 4)
+    numbers = ObservationConfig(topic="goal", message="std_msgs/Float64MultiArray", fields=["data"], size=2)
+    assert observed(numbers, Float64MultiArray(data=np.array([7.0, 8.0]))) == [7.0, 8.0]
+    with pytest.raises(NothingObservedError, match="'data' of 'goal' has 1 numbers, and not 2"):
+        observed(numbers, Float64MultiArray(data=np.array([7.0])))
+    with pytest.raises(NothingObservedError, match="'joint_states' has no velocity of 'c'"):
+        observed(config, JointState(name=("c",), position=np.array([1.0])))
+
+
+@pytest.mark.parametrize(
+    ("config", "said"),
+    [
+        ({"message": "nav_msgs/Odometry", "fields": ["twist.twist.linear.w"]}, "has no field 'w'"),
+        ({"message": "nav_msgs/Odometry", "fields": ["pose.pose"]}, "not numbers"),
+        ({"message": "nav_msgs/Odometry", "joints": ["a"], "fields": ["pose.pose.position.x"]}, "has joints"),
+        ({"joints": ["a"], "fields": ["name"]}, "a joint has no field 'name'"),
+        ({"joints": ["a", "a"]}, "a joint is there twice"),
+    ],
+)
+def test_what_cannot_be_observed_is_found_in_the_manifest(config: Mapping[str, Any], said: str) -> None:
+    with pytest.raises(ValidationError, match=said):
+        ObservationConfig.model_validate({"topic": "states", **config})
+
+
+def test_a_joint_that_is_commanded_is_observed_and_the_deadline_is_longer_than_a_period() -> None:
+    limits = {"least": -1, "most": 1, "jump": 0.1}
+    config: dict[str, Any] = {
+        "model": "reach.onnx",
+        "observes": [{"topic": "joint_states", "joints": ["a"], "fields": ["position"]}],
+        "commands": {"topic": "arm/joint_trajectory", "outputs": {"b": limits}},
+    }
+    with pytest.raises(ValidationError, match="it must observe the position of 'b'"):
+        PolicyConfig.model_validate(config)
+    with pytest.raises(ValidationError, match="at 5 Hz there is an answer every 200 ms"):
+        PolicyConfig.model_validate({**config, "rate": "5 Hz"})
+
+
+def test_a_network_takes_and_gives_vectors(tmp_path: Path) -> None:
+    for is_batch in (True, False):
+        made = PolicyNetwork(network(tmp_path / "sum.onnx", [[1, 0], [1, 1], [0, 1]], [0, 10], is_batch=is_batch))
+        assert (made.takes, made.gives) == (3, 2)
+        assert made.answer([1.0, 2.0, 3.0]) == [3.0, 15.0]
+        with pytest.raises(PolicyNetworkError, match="the network fails"):
+            made.answer([1.0])
+    (tmp_path / "text.onnx").write_text("no network")
+    for path, said in [
+        (tmp_path / "nowhere.onnx", "there is no file"),
+        (tmp_path / "text.onnx", "'text.onnx' is no network in ONNX"),
+        (tmp_path, "cannot be used"),
+        (network(tmp_path / "two.onnx", [[1]], [0], inputs=2), "it has 2 inputs"),
+    ]:
+        with pytest.raises(PolicyNetworkError, match=said):
+            PolicyNetwork(path)
+
+
+class Driving:
+    """A policy that drives as fast as a topic says, observed ten times per second."""
+
+    def __init__(self, folder: Path, **config: Any) -> None:
+        path = network(folder / "steer.onnx", [[1, 0]], [0, 0.1])
+        limits = {"least": -0.5, "most": 0.5, "jump": 0.2}
+        made = {
+            "model": str(path),
+            "observes": [{"topic": "wish", "message": "std_msgs/Float32", "fields": ["data"]}],
+            "commands": {
+                "topic": "cmd_vel/policy",
+                "message": "geometry_msgs/Twist",
+                "outputs": {"linear.x": limits, "angular.z": limits},
+            },
+            "starts": True,
+            **config,
+        }
+        self.bench = Bench(instance("steer", "policy", made))
+        self.sent = self.bench.collect("/cmd_vel/policy", Twist)
+        self.statuses = self.bench.statuses("steer")
+
+    def wish(self, value: float, seconds: float = 0.1) -> list[tuple[float, float]]:
+        """What is sent in a time in which a wish comes ten times per second."""
+        self.sent.clear()
+        for _ in range(round(seconds * 10)):
+            self.bench.publish("/wish", Float32(data=value))
+            self.bench.advance(0.1)
+        return [(round(twist.linear.x, 3), round(twist.angular.z, 3)) for twist in self.sent]
+
+    def switch(self, *, on: bool) -> SetBool.Response:
+        answer: SetBool.Response = self.bench.component("steer").on_switch(SetBool.Request(data=on))  # type: ignore[attr-defined]
+        return answer
+
+    def counts(self) -> dict[str, str]:
+        self.bench.advance(1.1)
+        return {value.key: value.value for value in self.statuses[-1].values}
+
+
+def test_it_sends_what_its_network_answers(tmp_path: Path) -> None:
+    driving = Driving(tmp_path)
+    assert set(driving.wish(0.2, 0.5)) == {(0.2, 0.1)}
+    driving.bench.advance(0.6)
+    assert driving.statuses[-1].level in (Level.OK, Level.ERROR)
+
+
+def test_without_an_observation_it_rests_once_and_is_silent(tmp_path: Path) -> None:
+    driving = Driving(tmp_path)
+    driving.wish(0.2, 0.5)
+    driving.bench.advance(0.5)  # the last observation still counts
+    driving.sent.clear()
+    driving.bench.advance(3.0)
+    assert [(twist.linear.x, twist.angular.z) for twist in driving.sent][-1:] == [(0.0, 0.0)]
+    assert len([twist for twist in driving.sent if twist.linear.x == 0]) == 1
+    assert driving.statuses[-1].level == Level.ERROR
+    assert driving.statuses[-1].message == "nothing comes on 'wish'"
+    assert int(driving.counts()["unseen"]) > 20
+
+
+@pytest.mark.parametrize("wrong", [NAN, INF, 0.8])
+def test_what_is_wrong_is_not_sent_but_a_rest_and_it_is_reported(tmp_path: Path, wrong: float) -> None:
+    driving = Driving(tmp_path)
+    driving.wish(0.2, 0.5)
+    assert driving.wish(wrong, 2.0) == [(0.0, 0.0)]
+    assert driving.statuses[-1].level == Level.ERROR
+    assert int(driving.counts()["refused"]) >= 20
+    assert (0.2, 0.1) in driving.wish(0.2, 0.5), "it goes on once answers are right again"
+
+
+def test_a_jump_is_refused_while_it_drives(tmp_path: Path) -> None:
+    driving = Driving(tmp_path)
+    assert (0.2, 0.1) in driving.wish(0.2, 0.3)
+    assert driving.wish(-0.2, 0.1) == []
+    assert (0.3, 0.1) in driving.wish(0.3, 0.2)
+
+
+def test_an_answer_that_takes_too_long_is_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    driving = Driving(tmp_path)
+    driving.wish(0.2, 0.5)
+    policy: Any = driving.bench.component("steer")
+    answer, clock = policy.network.answer, driving.bench.clock
+
+    def slow(vector: Sequence[float]) -> list[float]:
+        monkeypatch.setattr(clock, "now", lambda: now() + 0.3)
+        found: list[float] = answer(vector)
+        return found
+
+    now = clock.now
+    monkeypatch.setattr(policy.network, "answer", slow)
+    policy.on_switch(SetBool.Request(data=True))
+    before = policy.core.counts.sent
+    policy.step(0.1)
+    monkeypatch.undo()
+    assert (policy.core.counts.late, policy.core.counts.sent) == (1, before)
+
+
+def test_it_is_off_until_it_is_switched_on_and_after_a_stop(tmp_path: Path) -> None:
+    driving = Driving(tmp_path, starts=False)
+    assert driving.wish(0.2, 0.5) == []
+    assert driving.switch(on=True).success
+    assert (0.2, 0.1) in driving.wish(0.2, 0.5)
+    driving.bench.host.stop()
+    assert not driving.switch(on=True).success
+    assert driving.wish(0.2, 0.5)[1:] == []
+    driving.bench.host.release()
+    assert driving.wish(0.2, 0.5) == [], "a release does not start motion"
+    assert driving.switch(on=True).success
+    assert (0.2, 0.1) in driving.wish(0.2, 0.5)
+    assert driving.switch(on=False).success
+    assert driving.wish(0.2, 0.5) == [(0.0, 0.0)], "it rests once"
+
+
+def test_without_a_network_it_says_so_and_cannot_be_switched_on(tmp_path: Path) -> None:
+    driving = Driving(tmp_path, model=str(tmp_path / "nowhere.onnx"))
+    assert driving.wish(0.2, 0.5) == []
+    answer = driving.switch(on=True)
+    assert (answer.success, answer.message) == (False, f"there is no file '{tmp_path / 'nowhere.onnx'}'")
+    driving.bench.advance(1.1)
+    assert driving.statuses[-1].level == Level.ERROR
+
+
+BASE = """
+rbx: 1
+kind: Robot
+name: learner
+components:
+  base: {type: diff_drive_sim, command_timeout: 0.5 s}
+  steer:
+    type: policy
+    model: steer.onnx
+    starts: true
+    observes: [{topic: wish, message: std_msgs/Float32, fields: [data]}]
+    commands:
+      topic: cmd_vel/policy
+      message: geometry_msgs/Twist
+      outputs: {linear.x: {least: -0.2, most: 0.3, jump: 0.3}}
+muxes:
+  cmd_vel:
+    inputs:
+      teleop: {priority: 100, timeout: 0.5 s}
+      policy: {from: steer, priority: 10, timeout: 0.5 s}
+"""
+
+
+def compiled(folder: Path, text: str) -> tuple[Any, list[Finding]]:
+    (folder / "robot.yaml").write_text(text)
+    made = compile_robot(str(folder / "robot.yaml"), environment={})
+    return made.plan, list(made.report)
+
+
+def test_it_drives_through_the_mux_which_a_person_takes_over_and_silence_stops_the_base(tmp_path: Path) -> None:
+    network(tmp_path / "steer.onnx", [[1]], [0])
+    plan, findings = compiled(tmp_path, BASE)
+    assert [finding.code for finding in findings if finding.severity == "error"] == []
+    bench = Bench(plan=plan)
+    odometry = bench.collect("/odom", Odometry)
+
+    def speed(wish: float, seconds: float, teleop: float | None = None) -> float:
+        for _ in range(round(seconds * 10)):
+            bench.publish("/wish", Float32(data=wish))
+            if teleop is not None:
+                command = Twist()
+                bench.publish("/cmd_vel/teleop", command)
+            bench.advance(0.1)
+        return round(odometry[-1].twist.twist.linear.x, 2)
+
+    assert speed(0.2, 2.0) == 0.2
+    assert speed(0.2, 2.0, teleop=0.0) == 0.0
+    assert speed(0.2, 2.0) == 0.2
+    assert speed(NAN, 2.0) == 0.0
+    assert speed(0.2, 2.0) == 0.2
+    bench.advance(3.0)
+    assert round(odometry[-1].twist.twist.linear.x, 2) == 0.0
+
+
+def test_it_moves_joints_and_an_empty_trajectory_brings_them_to_rest(tmp_path: Path) -> None:
+    path = network(tmp_path / "track.onnx", [[1, 0], [0, 1]], [0.05, -0.05])
+    limits = {"least": -1, "most": 1, "jump": 0.1}
+    config = {
+        "model": str(path),
+        "starts": True,
+        "observes": [{"topic": "joint_states", "joints": ["pan", "tilt"], "fields": ["position"]}],
+        "commands": {"topic": "head/joint_trajectory", "outputs": {"pan": limits, "tilt": limits}},
+    }
+    bench = Bench(instance("track", "policy", config))
+    sent = bench.collect("/head/joint_trajectory", JointTrajectory)
+    for _ in range(3):
+        bench.publish("/joint_states", JointState(name=("tilt", "pan"), position=np.array([0.5, -0.25])))
+        bench.advance(0.1)
+    assert sent[0].joint_names == ("pan", "tilt")
+    assert [round(value, 3) for value in sent[0].points[0].positions] == [-0.2, 0.45]
+    assert sent[0].points[0].time_from_start.nanosec == 200_000_000
+    bench.advance(3.0)
+    assert [len(one.points) for one in sent].count(0) == 1
+    assert not sent[-1].points
+
+
+HEAD = """
+rbx: 1
+kind: Robot
+name: head
+buses:
+  servos: {type: dynamixel, port: /dev/ttyUSB0, baud: 1000000}
+include:
+  head: {part: "rbx:parts/pan_tilt.yaml", with: {bus: servos, pan_id: 1, tilt_id: 2}}
+components:
+  turn:
+    type: policy
+    model: turn.onnx
+    starts: true
+    observes:
+      - {topic: joint_states, joints: [head_pan_joint, head_tilt_joint], fields: [position]}
+      - {topic: wish, message: std_msgs/Float32, fields: [data]}
+    commands:
+      topic: head_controller/joint_trajectory
+      outputs:
+        head_pan_joint: {least: -1, most: 1, jump: 0.2}
+        head_tilt_joint: {least: -0.5, most: 0.5, jump: 0.2}
+"""
+
+
+def test_it_turns_simulated_servos_by_their_controller_which_rest_when_it_is_silent(tmp_path: Path) -> None:
+    network(tmp_path / "turn.onnx", [[1, 0], [0, 1], [1, 0]], [0, 0])  # where it is, and by the wish farther
+    plan, findings = compiled(tmp_path, HEAD)
+    assert [finding for finding in findings if finding.severity == "error"] == []
+    bench = Bench(plan=plan)
+    states = bench.collect("/joint_states", JointState)
+
+    def pan() -> float:
+        return float(states[-1].position[states[-1].name.index("head_pan_joint")])
+
+    bench.advance(1.0)
+    start = pan()
+    for _ in range(20):
+        bench.publish("/wish", Float32(data=0.05))
+        bench.advance(0.1)
+    assert pan() > start + 0.1
+    for _ in range(10):
+        bench.publish("/wish", Float32(data=NAN))
+        bench.advance(0.1)
+    rested = pan()
+    bench.advance(2.0)
+    assert pan() == pytest.approx(rested, abs=0.005)
+
+
+def test_check_compares_the_sizes_of_the_network_with_what_is_written(tmp_path: Path) -> None:
+    network(tmp_path / "steer.onnx", [[1, 0, 0], [0, 1, 0]], [0, 0, 0])
+    _, findings = compiled(tmp_path, BASE)
+    found = {(one.message, one.span.line, one.span.column) for one in findings if one.code == "RBX3801" and one.span}
+    assert found == {
+        ("these are 1 numbers, and 'steer.onnx' takes 2", 11, 15),
+        ("these are 1 numbers, and 'steer.onnx' gives 3", 15, 16),
+    }
+
+
+def test_check_tells_which_file_is_missing(tmp_path: Path) -> None:
+    _, findings = compiled(tmp_path, BASE)
+    [found] = [one for one in findings if one.code == "RBX3801"]
+    assert found.span is not None
+    assert (found.message, found.span.line, found.span.column) == ("there is no file 'steer.onnx'", 9, 12)
