@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from docs.generating.extras import extras
 from docs.generating.families import families
 from docs.generating.markdown import about, code, lowered, table
 from docs.generating.missions import takes
@@ -18,7 +19,7 @@ from rbxcompose.missions.program.registry import StepType, kinds
 from rbxcompose.sdk.registry import PLUGINS, component_type
 from rbxcompose.tools.behaviour_trees.nodes import table as behaviour_trees
 
-PAGES = ("architecture.md", "how_to.md", "language.md", "missions.md")
+PAGES = ("architecture.md", "dependencies.md", "how_to.md", "language.md", "missions.md")
 BLOCK = re.compile(r"(<!-- made by `make docs`: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 """Words between such comments are written by a program."""
 
@@ -89,6 +90,7 @@ def few_words(kind: StepType) -> str:
 TABLES: Mapping[str, Callable[[], str]] = {
     "behaviour_trees": behaviour_trees,
     "components": components,
+    "extras": extras,
     "families": families,
     "nodes": nodes,
     "sections": sections,
