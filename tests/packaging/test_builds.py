@@ -48,6 +48,7 @@ def test_the_wheel_has_the_package_the_library_and_the_pages_and_no_tests(wheel:
         names = archive.namelist()
     for wanted in ("py.typed", "library/robots/turtlebot/robot.yaml", "library/docs/language.md", "msgs/std_msgs.pyi"):
         assert f"rbxcompose/{wanted}" in names
+    assert any(name.endswith(".data/data/share/man/man1/rbxcompose.1") for name in names)
     tops = {name.partition("/")[0] for name in names}
     assert {top for top in tops if not top.startswith("rbxcompose-")} == {"rbxcompose"}
     assert not any(name.endswith((".pyc", ".lock")) for name in names)
