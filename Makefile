@@ -9,7 +9,7 @@ PYTEST ?= -n auto
 # Each command that a test starts would compile the package again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: up console vscode npm ros2 test lint types unit soak bench docs site messages lock clean
+.PHONY: up console vscode npm ros2 test lint types unit soak bench docs site dist release-check messages lock clean
 
 # The robot with its page, and what it needs beside rbxcompose, such as libraries for arms, in the versions of the lock file.
 up: $(VENV)/.up
@@ -69,6 +69,12 @@ docs: $(VENV)/.test  ## Write the generated pages, tables and schemas, and the p
 site: $(VENV)/.site  ## Build the searchable site of the documentation, build/site/html; a dead link is an error
 	$(BIN)/python -m docs.site
 	$(BIN)/zensical build --strict --config-file build/site/zensical.toml
+
+dist: $(VENV)/.test  ## Build the wheel and the source distribution, the same bytes each time
+	$(BIN)/python -m release.build
+
+release-check: $(VENV)/.test  ## Tell what keeps this tree from being released
+	$(BIN)/python -m release.check
 
 messages: $(VENV)/.test  ## Write the stubs of message classes, for mypy and editors, from the interface texts
 	$(BIN)/python -m rbxcompose.msgs.generate

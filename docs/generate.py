@@ -1,14 +1,14 @@
 """Writes what is generated in the documentation, from models, registries and docstrings.
 
-Whole pages: reference. In pages that people write: tables between two comments, and the line of facts below the title
-of a finding. Run it with `make docs`; a test fails when a page is out of date.
+Whole pages: reference, and the manual page. In pages that people write: tables between two comments, and the line of
+facts below the title of a finding. Run it with `make docs`; a test fails when a page is out of date.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from docs.generating import commands, components, controllers, expressions, findings, missions, robot, sdk, tables
+from docs.generating import commands, components, controllers, expressions, findings, man, missions, robot, sdk, tables
 
 DOCS = Path(__file__).parent
 REFERENCE = "reference"
@@ -29,6 +29,7 @@ def pages() -> dict[str, str]:
     return {
         **{f"findings/{name}": text for name, text in findings.pages().items()},
         **{f"reference/{name}.md": text for name, text in reference.items()},
+        man.PAGE: man.whole_page(),
         **{name: tables.filled((DOCS / name).read_text(encoding="utf-8")) for name in tables.PAGES},
     }
 
@@ -36,7 +37,7 @@ def pages() -> dict[str, str]:
 def written() -> dict[str, str]:
     """Return the path below `docs/` -> text of the pages that are there."""
     whole = (page for folder in FOLDERS for page in (DOCS / folder).glob("*.md"))
-    there = [*whole, *(DOCS / name for name in tables.PAGES)]
+    there = [*whole, *(DOCS / name for name in tables.PAGES), *DOCS.glob(man.PAGE)]
     return {page.relative_to(DOCS).as_posix(): page.read_text(encoding="utf-8") for page in there}
 
 

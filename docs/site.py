@@ -39,6 +39,7 @@ MENU: Mapping[str, str | Mapping[str, str]] = {
         "Several hosts": "systems.md",
         "ROS 2": "interop.md",
         "Programs of others": "programs.md",
+        "Small machines": "small_machines.md",
     },
     "Tools": {
         "Seeing a robot": "inspection.md",

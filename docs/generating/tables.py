@@ -7,18 +7,20 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from docs.generating.extras import extras
 from docs.generating.families import families
 from docs.generating.markdown import about, code, lowered, table
 from docs.generating.missions import takes
 from docs.generating.robot import models_below
 from docs.generating.shapes import with_default
+from docs.generating.small_machines import small_machines
 from rbxcompose.manifest.registry import sections as registered
 from rbxcompose.manifest.section import Section
 from rbxcompose.missions.program.registry import StepType, kinds
 from rbxcompose.sdk.registry import PLUGINS, component_type
 from rbxcompose.tools.behaviour_trees.nodes import table as behaviour_trees
 
-PAGES = ("architecture.md", "how_to.md", "language.md", "missions.md")
+PAGES = ("architecture.md", "dependencies.md", "how_to.md", "language.md", "missions.md", "small_machines.md")
 BLOCK = re.compile(r"(<!-- made by `make docs`: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 """Words between such comments are written by a program."""
 
@@ -89,8 +91,10 @@ def few_words(kind: StepType) -> str:
 TABLES: Mapping[str, Callable[[], str]] = {
     "behaviour_trees": behaviour_trees,
     "components": components,
+    "extras": extras,
     "families": families,
     "nodes": nodes,
     "sections": sections,
+    "small_machines": small_machines,
     "steps": steps,
 }

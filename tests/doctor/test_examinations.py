@@ -353,3 +353,17 @@ def test_the_machine_tells_who_listens_what_it_may_and_what_is_installed() -> No
     clocks = machine.ClockWatch().clocks()
     assert abs(clocks.step) < 0.05
     assert clocks.oldest < clocks.wall
+
+
+def test_an_extra_that_a_component_needs_and_that_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = robot_of(tmp_path, "components: {usage: {type: cpu_monitor}}\n")
+    assert told("extras", replace(FINE, file=robot)) == [("ok", "cart: monitors installed")]
+    monkeypatch.setattr("rbxcompose.commands.targets.find_spec", lambda name: None)
+    assert told("extras", replace(FINE, file=robot)) == [
+        ("RBX2253", "'usage' needs the package 'psutil', which is not installed")
+    ]
+    [found] = [one for one in EXAMINATIONS["extras"](replace(FINE, file=robot)) if isinstance(one, Finding)]
+    assert found.help == "pip install 'rbxcompose[monitors]'"
+    plain = robot_of(tmp_path, "components: {battery: {type: battery_sim}}\n")
+    assert told("extras", replace(FINE, file=plain)) == [("ok", "cart needs none")]
+    assert told("extras", FINE) == [("ok", "no robot was examined that may need one")]

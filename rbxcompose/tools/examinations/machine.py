@@ -8,8 +8,10 @@ from pathlib import Path
 
 from rbxcompose.base.findings import Finding, Severity, kind
 from rbxcompose.base.printable import plain
+from rbxcompose.commands.targets import missing_extras
 from rbxcompose.manifest.files import project_of, shown_name
 from rbxcompose.manifest.secrets import FOLDER
+from rbxcompose.sdk.capabilities import NeedsExtra
 from rbxcompose.tools.doctor import HostFacts, RunningRobot, examination
 
 LEFT = kind("RBX9409", Severity.WARNING)
@@ -123,3 +125,20 @@ def versions(facts: HostFacts) -> Iterator[str | Finding]:
         yield OTHER_VERSION.at(None, there + locked, help=todo)
     fine = ", ".join(f"{one.name} {one.installed}" for one in facts.versions if one not in wrong)
     yield f"Python {facts.python}, {fine}" if fine else f"Python {facts.python}"
+
+
+@examination
+def extras(facts: HostFacts) -> Iterator[str | Finding]:
+    """Look for the packages that components need beside those of rbxcompose itself."""
+    for robot in facts.robots:
+        missing = list(missing_extras(robot))
+        yield from missing
+        needed = sorted({needed.extra.value for _, needed in robot.declared(NeedsExtra)})
+        if not missing:
+            yield (
+                f"{robot.manifest.name}: {', '.join(needed)} installed"
+                if needed
+                else f"{robot.manifest.name} needs none"
+            )
+    if not facts.robots:
+        yield "no robot was examined that may need one"

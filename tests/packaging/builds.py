@@ -1,0 +1,54 @@
+"""The wheel that these tests install, built once, and the Pythons of this machine."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+VERSIONS = ("3.11", "3.12", "3.13", "3.14")
+LONG = 500.0  # [s]
+
+
+@cache
+def python_of(version: str) -> str:
+    """Return the program of a version of Python, or skip the test with the reason."""
+    installed = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"), "versions")
+    candidates = [
+        shutil.which(f"python{version}"),
+        *map(str, sorted(installed.glob(f"{version}.*/bin/python"), reverse=True)),
+    ]
+    for program in filter(None, candidates):
+        script = "import sys; print(sys.version.split()[0], sys.prefix == sys.base_prefix)"
+        said = subprocess.run([program, "-c", script], capture_output=True, text=True, check=False).stdout
+        if said.startswith(f"{version}."):
+            return program
+    pytest.skip(f"there is no Python {version} here")
+
+
+def without_ours(folder: Path) -> dict[str, str]:
+    """Return an environment in which nothing of this checkout is found, and whose state is in a folder."""
+    (run := folder / "run").mkdir(mode=0o700, exist_ok=True)
+    there = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    return {**there, "XDG_RUNTIME_DIR": str(run), "XDG_CACHE_HOME": str(folder / "cache")}
+
+
+def pip(program: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """Run pip of an environment."""
+    command = [str(program), "-m", "pip", "-q", "--disable-pip-version-check", *words]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def environment_of(python: str, folder: Path) -> Path:
+    """Return the program of a new environment with the locked packages, or skip the test with the reason."""
+    subprocess.run([python, "-m", "venv", str(folder)], check=True)
+    program = folder / "bin" / "python"
+    done = pip(program, "install", "--require-hashes", "-r", str(ROOT / "requirements.lock"))
+    if done.returncode != 0:
+        pytest.skip(f"the packages cannot be had here: {done.stderr.strip().splitlines()[-1]}")
+    return program

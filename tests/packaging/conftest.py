@@ -1,0 +1,24 @@
+"""What is built once for these tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from release.build import build
+
+
+@pytest.fixture(scope="package")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder with the wheel and the source distribution."""
+    folder = tmp_path_factory.mktemp("built")
+    build(folder)
+    return folder
+
+
+@pytest.fixture(scope="package")
+def wheel(built: Path) -> Path:
+    """The wheel."""
+    [wheel] = built.glob("*.whl")
+    return wheel
