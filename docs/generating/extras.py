@@ -40,6 +40,7 @@ PURPOSES: Mapping[str, str] = {
     "navigation": "maps, localisation, ways around obstacles, people",
     "physics": "`simulator: physics`",
     "picture": "`body picture` and `body simplify`",
+    "policy": "policies: networks that command joints or the base",
     "serial": "sensors and bases at serial ports",
     "servos": "real Dynamixel servos",
     "vision": "cameras, tags, things on tables",

@@ -39,7 +39,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "__main__": Cost(code=4, files=1, small=1, imports=2),
     "base": Cost(code=3735, files=33, small=4, imports=232),
     "bus": Cost(code=2385, files=20, small=0, imports=168),
-    "commands": Cost(code=2494, files=25, small=1, imports=291),
+    "commands": Cost(code=2495, files=25, small=1, imports=291),
     "compiler": Cost(code=7720, files=76, small=9, imports=933),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
     "domains/arms": Cost(code=13025, files=77, small=2, imports=1195),
@@ -50,6 +50,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/diagnostics": Cost(code=2349, files=24, small=4, imports=214),
     "domains/muxes": Cost(code=2023, files=15, small=1, imports=122),
     "domains/navigation": Cost(code=3952, files=30, small=2, imports=384),
+    "domains/policies": Cost(code=437, files=7, small=0, imports=57),
     "domains/power": Cost(code=461, files=6, small=0, imports=37),
     "domains/programs": Cost(code=3781, files=30, small=1, imports=374),
     "domains/servos": Cost(code=7885, files=52, small=1, imports=581),
@@ -61,21 +62,21 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "runtime": Cost(code=7574, files=46, small=1, imports=707),
     "sdk": Cost(code=1467, files=12, small=2, imports=156),
     "testing": Cost(code=629, files=7, small=2, imports=78),
-    "tools": Cost(code=17839, files=138, small=10, imports=1920),
+    "tools": Cost(code=18037, files=141, small=10, imports=1942),
 }
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 112905,
-    "files": 936,
+    "lines of code": 113541,
+    "files": 946,
     "files of 1 to 30 lines of code": 74,
-    "lines of imports": 11054,
+    "lines of imports": 11133,
     "packages at the top": 12,
     "modules at the top": 0,
-    "kB of schemas": 381,
+    "kB of schemas": 388,
     "tell, tells, told": 230,
     "names that are 'one'": 1667,
-    "modules that 'check robots/turtlebot' imports": 337,
+    "modules that 'check robots/turtlebot' imports": 339,
     "pages of findings in code": 0,
 }
 

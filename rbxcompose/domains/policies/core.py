@@ -81,7 +81,7 @@ class PolicyCore:
         return True
 
     def forget(self) -> bool:
-        """Begin anew with the next answer; return whether something is commanded that must rest."""
+        """Start again with the next answer; return whether something is commanded that must rest."""
         is_moving, self.last = self.last is not None, None
         return is_moving
 
