@@ -133,8 +133,11 @@ def memory_of(pid: int) -> int:
 def tree(pid: int) -> list[int]:
     """Return a process, those that it has started, and theirs."""
     children: list[int] = []
-    for task in Path(f"/proc/{pid}/task").iterdir():
-        with contextlib.suppress(FileNotFoundError):  # a thread that has ended meanwhile
+    tasks: list[Path] = []
+    with contextlib.suppress(FileNotFoundError):  # it has ended meanwhile
+        tasks += Path(f"/proc/{pid}/task").iterdir()
+    for task in tasks:
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # a thread that has ended meanwhile
             children += map(int, (task / "children").read_text(encoding="ascii").split())
     return [pid, *(found for child in children for found in tree(child))]
 

@@ -11,6 +11,7 @@ import platform
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -62,14 +63,24 @@ def measured() -> dict[str, dict[str, Cost]]:
 
 
 def costs(pid: int, watched: float = _WATCHED) -> dict[str, Cost]:
-    """Return the cost of a process and of those below it, by their names, after watching them for a time [s]."""
+    """Return the cost of a process and of those below it, by their names, after watching them for a time [s].
+
+    One that ends meanwhile is left out.
+    """
     from benchmarks.measuring import memory_of, processor_time, tree
 
-    pids = tree(pid)
-    before, began = {one: processor_time(one) for one in pids}, time.monotonic()
+    before: dict[int, float] = {}
+    began = time.monotonic()
+    for one in tree(pid):
+        with suppress(FileNotFoundError, ProcessLookupError):
+            before[one] = processor_time(one)
     time.sleep(watched)
     lasted = time.monotonic() - began
-    return {name_of(one): Cost(memory_of(one), (processor_time(one) - before[one]) / lasted) for one in pids}
+    found: dict[str, Cost] = {}
+    for one, had in before.items():
+        with suppress(FileNotFoundError, ProcessLookupError):
+            found[name_of(one)] = Cost(memory_of(one), (processor_time(one) - had) / lasted)
+    return found
 
 
 def name_of(pid: int) -> str:

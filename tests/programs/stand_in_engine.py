@@ -76,16 +76,16 @@ class Daemon:
 
 
 def ask(files: list[int], **content: Any) -> int:
-    """AskEngine the daemon; return the exit code that it answers."""
+    """Ask the daemon; return the exit code that it answers."""
     with socket.socket(socket.AF_UNIX) as daemon:
         daemon.connect(str(FOLDER / "socket"))
-        socket.send_fds(daemon, [json.dumps(content).encode()], files)
 
         def pass_on(number: int, frame: FrameType | None) -> None:
             daemon.sendall(bytes([number]))
 
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, pass_on)
+        socket.send_fds(daemon, [json.dumps(content).encode()], files)  # what it runs may be asked to end at once
         return int(daemon.makefile().readline())
 
 
