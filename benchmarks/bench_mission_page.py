@@ -15,6 +15,7 @@ from benchmarks.peers import free_port
 MEASURES = ("rbxcompose/tools/mission_editor", "console/src")
 
 NODES = 300
+LONGEST = 1_000  # nodes of the mission in which a mistake is made
 EDITS = 12
 SCROLL = 2.0  # [s]
 SETTLED = 2_500  # [ms] after an edit, in which it is looked at and checked
@@ -31,10 +32,10 @@ missions:
 """
 
 
-def mission() -> str:
+def mission(nodes: int) -> str:
     """Return a mission of about so many nodes: steps, loops and choices, nested in one another."""
     lines = ["rbx: 1", "kind: Mission", "name: long", "do:"]
-    for number in range(NODES // 6):
+    for number in range(nodes // 6):
         lines += [
             f"  - log: group {number}",
             "  - repeat: 2",
@@ -47,12 +48,12 @@ def mission() -> str:
 
 
 @contextmanager
-def _console() -> Iterator[str]:
-    """Yield the address of a console whose robot has the mission."""
+def _console(nodes: int) -> Iterator[str]:
+    """Yield the address of a console whose robot has a mission of so many nodes."""
     with TemporaryDirectory() as folder:
         port, base = free_port(), Path(folder)
         (base / "robot.yaml").write_text(MANIFEST.format(port=port, bus=free_port()), encoding="utf-8")
-        (base / "long.yaml").write_text(mission(), encoding="utf-8")
+        (base / "long.yaml").write_text(mission(nodes), encoding="utf-8")
         environment = {"XDG_RUNTIME_DIR": folder}
         program([*COMMAND, "up", "-d", folder], environment)()
         try:
@@ -81,6 +82,19 @@ _FRAMES = """async (seconds) => {
 }"""
 
 
+_FINDINGS = """() => {
+  const clean = () => document.body.innerText.includes("No mistakes");
+  let [pressed, was] = [0, clean()];
+  window.delays = [];
+  document.addEventListener("keydown", () => { pressed = performance.now(); }, true);
+  new MutationObserver(() => {
+    if (clean() === was) return;
+    was = !was;
+    window.delays.push(performance.now() - pressed);
+  }).observe(document.body, { subtree: true, childList: true, characterData: true });
+}"""
+
+
 class _Measured:
     """A page, and what Chromium's own counters say of it."""
 
@@ -105,11 +119,12 @@ class _Measured:
         return Samples(tuple(times))
 
 
-def measured() -> tuple[float, float, Samples]:
-    """Return the scripting of an edit in the text and in the outline [s], and the frames of scrolling [ms]."""
+@contextmanager
+def _editor(nodes: int) -> Iterator[Any]:
+    """Yield a page that has a mission of so many nodes open in the editor."""
     from playwright.sync_api import sync_playwright
 
-    with _console() as address, sync_playwright() as playwright:
+    with _console(nodes) as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1280, "height": 800})
         page.goto(address)
@@ -118,6 +133,25 @@ def measured() -> tuple[float, float, Samples]:
         if page.locator("#name").is_visible():
             page.fill("#name", "measured")
             page.keyboard.press("Enter")
+        yield page
+        browser.close()
+
+
+def findings() -> Samples:
+    """Return the times from a key that makes or mends a mistake until the page says so [ms]."""
+    with _editor(LONGEST) as page:
+        page.locator(".editor-text .cm-line", has_text="check: 3 >= 0").first.click()
+        page.keyboard.press("End")
+        page.evaluate(_FINDINGS)
+        for turn in range(EDITS):
+            page.keyboard.press("x" if turn % 2 == 0 else "Backspace")
+            page.wait_for_timeout(SETTLED)
+        return Samples(tuple(page.evaluate("window.delays")))
+
+
+def measured() -> tuple[float, float, Samples]:
+    """Return the scripting of an edit in the text and in the outline [s], and the frames of scrolling [ms]."""
+    with _editor(NODES) as page:
         looked = _Measured(page)
         page.wait_for_timeout(SETTLED)
         before = looked.scripting()
@@ -130,7 +164,6 @@ def measured() -> tuple[float, float, Samples]:
         page.keyboard.press("Home")
         moved = looked.edits(lambda turn: page.keyboard.press("Alt+ArrowDown" if turn % 2 == 0 else "Alt+ArrowUp"))
         frames = Samples(tuple(page.evaluate(_FRAMES, SCROLL)))
-        browser.close()
     return typed.median - idle, moved.median - idle, frames
 
 
@@ -139,6 +172,7 @@ def rows() -> list[Row]:
     if shutil.which("chromium") is None:
         return []
     typed, moved, frames = measured()
+    found = findings()
     how = f"a mission of {NODES} nodes, with all that follows from it"
     return [
         Row("editor of missions: scripting of a key in the text", "ms", how, typed * 1e3, most=16),
@@ -150,5 +184,13 @@ def rows() -> list[Row]:
             frames.median,
             frames.p99,
             most=17,
+        ),
+        Row(
+            "editor of missions: findings of a key in the text",
+            "ms",
+            f"a mission of {LONGEST} nodes, from the key until the page says so",
+            found.median,
+            found.p99,
+            most=200,
         ),
     ]
