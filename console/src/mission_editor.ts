@@ -29,7 +29,7 @@ import { showDryRun, showTests, type DryRun, type Statuses, type TestReport } fr
 import type { TextEditor } from "./text_editor";
 import "./mission_editor.css";
 
-const PAUSE = 50; // [ms] after a key, until the text is looked at; what is typed meanwhile waits for the answer
+const PAUSE = 20; // [ms] after a key, until the text is looked at; what is typed meanwhile waits for the answer
 const TRYING = 95_000; // [ms] for a dry run
 const FORM = 150; // [ms] after a choice, until its form is drawn
 const LOOK = 500; // [ms] between two looks at the mission on the robot
