@@ -12,7 +12,7 @@ from rbxcompose.base.requests import Refused
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.tools.mission_editor.editor import MissionEditor
 from rbxcompose.tools.mission_editor.process import answer_line
-from rbxcompose.tools.mission_editor.units import Utf16
+from rbxcompose.tools.mission_editor.utf16 import Utf16
 
 ROBOT = """rbx: 1
 kind: Robot

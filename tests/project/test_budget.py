@@ -62,12 +62,12 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "runtime": Cost(code=7574, files=46, small=1, imports=707),
     "sdk": Cost(code=1467, files=12, small=2, imports=156),
     "testing": Cost(code=629, files=7, small=2, imports=78),
-    "tools": Cost(code=18037, files=141, small=10, imports=1942),
+    "tools": Cost(code=18043, files=141, small=10, imports=1942),
 }
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 113541,
+    "lines of code": 113547,
     "files": 946,
     "files of 1 to 30 lines of code": 74,
     "lines of imports": 11133,

@@ -113,7 +113,7 @@ class BoardLink:
         self._next: int | None = None  # number of the next frame of the board
 
     def forget(self) -> None:
-        """Begin anew: the port was opened."""
+        """Start over: the port was opened."""
         self._frames.forget()
         self.version, self.is_greeted, self._next = None, False, None
         self._heard_at = self._greeted_at = -math.inf

@@ -644,7 +644,7 @@ class _TreeImporter:
                 if isinstance(written, dict) and assignments_script(written) == text:
                     return [written]
             except (ValueError, ScriptError, AttributeError, TypeError):
-                pass
+                pass  # another program has changed it: the script counts, as for BehaviorTree.CPP
         groups: list[dict[str, str]] = []
         for each in statements(text):
             if not each.to:
@@ -893,7 +893,7 @@ class _TreeImporter:
             if twin and queue_of(found := json.loads(twin))[1] == text:
                 return list(found)
         except (ValueError, ScriptError, TypeError, AttributeError):
-            pass
+            pass  # another program has changed it: the queue counts, as for BehaviorTree.CPP
         return [text_of(_literal(each, wanted)) for each in text.split(";")] if text else []
 
     def script(self, element: XmlElement) -> ImportedStep:

@@ -33,30 +33,47 @@ _PERIOD = 0.2  # [s] between two requests to a robot that is followed
 _FORMATS = "text", "tree", "mermaid", "dot", "html"
 
 
+_Row = tuple[str, str, Callable[[argparse.Namespace], int], tuple[Declare, ...]]
+"""A subcommand: its name, what it does, its function and its arguments."""
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    mission = argument("name", nargs="?", default="", metavar="MISSION", help="which one")
-    the_mission = argument("name", metavar="MISSION", help="which one")
-    robot = argument("path", nargs="?", metavar="ROBOT", help="the robot's file; without it, the running robot")
-    sets = argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")
-    json_ = argument("--json", action="store_true", help="answer in JSON")
-    named = (mission, add_asking_options)
+    rows = (*_operating(), *_debugging(), *_watching(), *_of_files())
+    add_actions(parser, (Subcommand(name, words, do, own, words) for name, words, do, own in rows), metavar="ACTION")
+
+
+_NAMED: tuple[Declare, ...] = (
+    argument("name", nargs="?", default="", metavar="MISSION", help="which one"),
+    add_asking_options,
+)
+_SETS = argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")
+
+
+def _operating() -> tuple[_Row, ...]:
+    """Return the subcommands that start, hold and end missions."""
     started = (
         argument("name", nargs=None, default="", metavar="MISSION", help="which one"),
         add_asking_options,
-        sets,
+        _SETS,
         argument("--from", dest="start", default="", metavar="STATE", help="start in this state: 'outer.inner'"),
     )
     resumed = (
-        *named,
+        *_NAMED,
         argument("--from-snapshot", action="store_true", help="go on where it was before a crash or a loss of power"),
     )
-    logged = (
-        *named,
-        argument("-f", "--follow", action="store_true", help="follow new records, until interrupted"),
-        argument("--all", action="store_true", help="also its inputs, so that it can be run again"),
+    return (
+        ("ls", "list the robot's missions with their states", _list, (add_asking_options,)),
+        ("triggers", "list what starts missions by itself, with the next times", _triggers, (add_asking_options,)),
+        ("run", "start a mission beside those that run", _run, started),
+        ("cancel", "end a mission for good", _to(requests.CancelMission), _NAMED),
+        ("pause", "hold a mission; its timers stand still", _to(requests.PauseMission), _NAMED),
+        ("resume", "resume a mission where it was held", _resume, resumed),
     )
-    again = (argument("log", metavar="FILE", help="the output of 'mission log --all'"), robot)
+
+
+def _debugging() -> tuple[_Row, ...]:
+    """Return the subcommands that stop a mission at a place, and intervene."""
     where = "FILE:LINE, the name of a node, a state, STATE->STATE, or the node's number"
     which = argument("--mission", dest="name", default="", metavar="MISSION", help="which one, if that is not clear")
     broken = (
@@ -73,6 +90,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     changed = (argument("sets", nargs="+", metavar="NAME=VALUE", help="what to set"), which, add_asking_options)
     jumped = (argument("state", metavar="STATE", help="the state to enter"), which, add_asking_options)
+    return (
+        ("step", "go on to the next leaf or transition", _to(requests.StepMission), _NAMED),
+        ("break", "stop at a node or a transition; without one, list the breakpoints", _break, broken),
+        ("force", "let a node that runs end with an outcome", _force, forced),
+        ("set", "set data of a mission that runs", _set, changed),
+        ("jump", "bring a machine that runs into another state", _jump, jumped),
+    )
+
+
+def _watching() -> tuple[_Row, ...]:
+    """Return the subcommands that show where missions are, and where they were."""
+    logged = (
+        *_NAMED,
+        argument("-f", "--follow", action="store_true", help="follow new records, until interrupted"),
+        argument("--all", action="store_true", help="also its inputs, so that it can be run again"),
+    )
+    return (
+        ("status", "show where a mission is, with its data", _status, _NAMED),
+        ("watch", "show a mission live", _watch, _NAMED),
+        ("log", "print what missions did, as JSON, one line each", _log, logged),
+    )
+
+
+def _of_files() -> tuple[_Row, ...]:
+    """Return the subcommands that need no robot that runs."""
+    the_mission = argument("name", metavar="MISSION", help="which one")
+    robot = argument("path", nargs="?", metavar="ROBOT", help="the robot's file; without it, the running robot")
+    json_ = argument("--json", action="store_true", help="answer in JSON")
+    again = (argument("log", metavar="FILE", help="the output of 'mission log --all'"), robot)
     drawn = (
         the_mission,
         robot,
@@ -83,44 +129,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     explored = (
         the_mission,
         robot,
-        sets,
+        _SETS,
         argument("--states", type=int, default=2000, metavar="N", help="most states to look at"),
         argument("--depth", type=int, default=30, metavar="N", help="most events on a path"),
         json_,
     )
     files = "rbxcompose.tools.mission_files"
-    table: tuple[tuple[str, str, Callable[[argparse.Namespace], int], tuple[Declare, ...]], ...] = (
-        ("ls", "list the robot's missions with their states", _list, (add_asking_options,)),
-        ("triggers", "list what starts missions by itself, with the next times", _triggers, (add_asking_options,)),
-        ("run", "start a mission beside those that run", _run, started),
-        ("cancel", "end a mission for good", _to(requests.CancelMission), named),
-        ("pause", "hold a mission; its timers stand still", _to(requests.PauseMission), named),
-        ("resume", "resume a mission where it was held", _resume, resumed),
-        ("step", "go on to the next leaf or transition", _to(requests.StepMission), named),
-        ("break", "stop at a node or a transition; without one, list the breakpoints", _break, broken),
-        ("force", "let a node that runs end with an outcome", _force, forced),
-        ("set", "set data of a mission that runs", _set, changed),
-        ("jump", "bring a machine that runs into another state", _jump, jumped),
-        ("status", "show where a mission is, with its data", _status, named),
-        ("watch", "show a mission live", _watch, named),
-        ("log", "print what missions did, as JSON, one line each", _log, logged),
-        (
-            "replay",
-            "run missions again from their log, and report the first difference",
-            deferred(files, "replay_log"),
-            again,
-        ),
+    replayed = "run missions again from their log, and report the first difference"
+    story = "run a mission on the simulated robot in virtual time, and show its story"
+    return (
+        ("replay", replayed, deferred(files, "replay_log"), again),
         ("show", "say or draw a mission; a running one with the states of its nodes", deferred(files, "show"), drawn),
         ("skills", "list the skills that missions may use on a robot", deferred(files, "skills"), (robot, json_)),
-        (
-            "try",
-            "run a mission on the simulated robot in virtual time, and show its story",
-            deferred(files, "try_"),
-            tried,
-        ),
+        ("try", story, deferred(files, "try_"), tried),
         ("explore", "look for dead ends by trying everything that may happen", deferred(files, "explore"), explored),
     )
-    add_actions(parser, (Subcommand(name, words, do, own, words) for name, words, do, own in table), metavar="ACTION")
 
 
 def run(arguments: argparse.Namespace) -> int:

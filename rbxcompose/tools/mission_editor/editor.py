@@ -26,7 +26,7 @@ from rbxcompose.tools.mission_editor.outline import MissionOutline, told
 from rbxcompose.tools.mission_editor.palette import palette
 from rbxcompose.tools.mission_editor.patch import path_of
 from rbxcompose.tools.mission_editor.patches import change
-from rbxcompose.tools.mission_editor.units import Utf16
+from rbxcompose.tools.mission_editor.utf16 import Utf16
 from rbxcompose.tools.project_texts import ProjectTexts, ReadText, hash_of, words_of
 
 MOST_FINDINGS = 200

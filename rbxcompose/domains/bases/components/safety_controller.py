@@ -134,7 +134,7 @@ class SafetyController(sdk.Component[SafetyControllerConfig]):
         self.misses_since = min(self.misses_since, self.now + self.core.settings.silence)
 
     def stop(self) -> None:
-        """Begin anew after `release`."""
+        """Start over after `release`."""
         self.core.forget(self.now)
 
     def go_on(self) -> None:
