@@ -171,7 +171,7 @@ def test_without_the_prefork_parent_the_robot_goes_down(robot: Robot) -> None:
 def test_a_suspended_process_is_shown_as_such_and_told_to_the_others_before_it_is_started_again(robot: Robot) -> None:
     robot.up_detached()
     robot.process_of("first").send_signal(signal.SIGSTOP)
-    assert [component["state"] for component in robot.ps()["components"]] == ["suspended", "active"]
+    eventually(lambda: [one["state"] for one in robot.ps()["components"]] == ["suspended", "active"])
     eventually(lambda: robot.has_logged("lost first: process 'robot' was suspended by a signal"))
     eventually(lambda: robot.texts("first").count("started") == 2)
     robot.do("down")
