@@ -9,7 +9,7 @@ PYTEST ?= -n auto
 # Each command that a test starts would compile the package again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: up console vscode npm ros2 test lint types unit soak bench docs site dist release-check messages lock clean
+.PHONY: up console vscode npm ros2 lerobot test lint types unit soak bench docs site dist release-check messages lock clean
 
 # The robot with its page, and what it needs beside rbxcompose, such as libraries for arms, in the versions of the lock file.
 up: $(VENV)/.up
@@ -34,6 +34,13 @@ ros2: .ros2/.made  ## A ROS 2 in an environment of its own, against which tests 
 .ros2/.made: tests/ros2/requirements.lock
 	$(PYTHON) -m venv .ros2
 	.ros2/bin/python -m pip install -q --disable-pip-version-check --require-hashes -r $<
+	@touch $@
+
+lerobot: .lerobot/.made  ## LeRobot in an environment of its own, 8 GB: its reader opens what tests write, which is skipped without
+
+.lerobot/.made:
+	$(PYTHON) -m venv .lerobot
+	.lerobot/bin/python -m pip install -q --disable-pip-version-check lerobot==0.4.4
 	@touch $@
 
 test: lint types unit
@@ -106,4 +113,4 @@ $(VENV)/.site: requirements-docs.lock | $(VENV)/bin/python
 	@touch $@
 
 clean:
-	rm -rf $(VENV) .ros2 build dist *.egg-info
+	rm -rf $(VENV) .ros2 .lerobot build dist *.egg-info

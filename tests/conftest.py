@@ -34,6 +34,7 @@ WITH_ARMS = tuple(
         *(f"components/test_{start}" for start in ("arm", "cloud", "con", "fail", "head", "move", "pick", "s")),
         "interop/",
         "motion/",
+        "policies/test_learning",
         "robots/",
         "testing/",
     )

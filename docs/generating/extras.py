@@ -34,6 +34,7 @@ PURPOSES: Mapping[str, str] = {
     "foxglove": "a server for Foxglove and Lichtblick beside the page",
     "gamepad": "driving by a gamepad",
     "graph": "pictures that Graphviz lays out: `graph`, machines of missions, trees of bodies",
+    "lerobot": "`record --format lerobot`, data sets for learning",
     "lsp": "`rbxcompose lsp`, the server for editors",
     "mcp": "`rbxcompose mcp`, for clients of the Model Context Protocol",
     "monitors": "monitors of processor, memory, disk and network",

@@ -10,7 +10,8 @@ import numpy as np
 from rbxcompose.msgs.sensor_msgs import Image
 
 _CHANNELS = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4, "mono8": 1, "8UC1": 1, "8UC3": 3}
-_DEPTHS: Mapping[str, str] = {"mono16": "u2", "16UC1": "u2", "32FC1": "f4"}
+DEPTHS: Mapping[str, str] = {"mono16": "u2", "16UC1": "u2", "32FC1": "f4"}
+"""Encodings of pictures whose values are depths, and what a value is."""
 
 Pixels = np.ndarray[Any, np.dtype[np.uint8]]
 
@@ -26,9 +27,9 @@ def pixels(message: Image) -> Pixels:
         WrongPictureError: if its size and its data do not fit, or its encoding is not known.
     """
     height, width, step = message.height, message.width, message.step
-    depth, channels = _DEPTHS.get(message.encoding), _CHANNELS.get(message.encoding)
+    depth, channels = DEPTHS.get(message.encoding), _CHANNELS.get(message.encoding)
     if channels is None and depth is None:
-        known = ", ".join((*_CHANNELS, *_DEPTHS))
+        known = ", ".join((*_CHANNELS, *DEPTHS))
         raise WrongPictureError(f"the encoding '{message.encoding[:40]}' is not known; there are {known}")
     item = np.dtype(depth or "u1").itemsize * (channels or 1)
     data = np.frombuffer(bytes(message.data), np.uint8)

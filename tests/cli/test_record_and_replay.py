@@ -212,6 +212,12 @@ def test_two_seconds_of_a_robot_and_a_recorder_that_is_killed(robot: Shell) -> N
     assert "warning[RBX9210]: these topics are being published now: /odom\n" in partly
     assert "replaying 1 topics" in partly
 
+    told = robot.do("record", "--format", "lerobot", "-o", "driven", "--for", "1s", "--fps", "10")
+    assert "episode 0: " in told
+    info = json.loads((robot.folder / "driven/meta/info.json").read_text(encoding="utf-8"))
+    assert (info["robot_type"], info["features"]["action"]["names"]) == (NAME, ["x.vel", "y.vel", "theta.vel"])
+    assert not list(robot.folder.glob("driven-*"))
+
     recorder = robot.start("record", "-o", "cut.mcap")
     part = robot.folder / "cut.mcap.part"
     robot.until(lambda: part.exists() and part.stat().st_size > 10_000)

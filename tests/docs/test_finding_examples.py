@@ -31,7 +31,8 @@ NOT_SHOWN = {
         "the mistake is in a URDF file; tests of these try the examples",
     ),
     **dict.fromkeys(
-        ("RBX2017", "RBX2018", "RBX3640", "RBX3641", "RBX3710", "RBX3720"), "the mistake is on the command line"
+        ("RBX2017", "RBX2018", "RBX3640", "RBX3641", "RBX3710", "RBX3720", "RBX3802"),
+        "the mistake is on the command line",
     ),
     "RBX2020": "the mistake needs a xacro file; a test of it has one",
     **dict.fromkeys(

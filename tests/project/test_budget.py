@@ -67,15 +67,15 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 113547,
-    "files": 946,
+    "lines of code": 114108,
+    "files": 950,
     "files of 1 to 30 lines of code": 74,
-    "lines of imports": 11133,
+    "lines of imports": 11197,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 388,
-    "tell, tells, told": 230,
-    "names that are 'one'": 1667,
+    "tell, tells, told": 231,
+    "names that are 'one'": 1678,
     "modules that 'check robots/turtlebot' imports": 339,
     "pages of findings in code": 0,
 }

@@ -46,6 +46,9 @@ class MuxLockConfig(Config):
     """It engages after this long without a message."""
 
 
+TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+
+
 class MuxConfig(Config):
     """The output, its inputs and locks, and who gets through."""
 
@@ -78,6 +81,11 @@ class MuxConfig(Config):
     def has_priorities(self) -> bool:
         """Return whether priorities count."""
         return self.mode == "priority"
+
+    @property
+    def quality(self) -> str:
+        """Return the class of its messages: a trajectory does not give way to the next one, as a velocity does."""
+        return "state" if self.message == TRAJECTORY else "command"
 
     @property
     def has_rest(self) -> bool:

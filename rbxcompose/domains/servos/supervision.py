@@ -13,6 +13,7 @@ import numpy as np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.servos.bus import ServoBus
+from rbxcompose.domains.servos.curves import JointSample
 from rbxcompose.domains.servos.joint_drive import JointDrive
 from rbxcompose.domains.servos.joint_states import Enable, JointMode
 from rbxcompose.msgs.sensor_msgs import JointState
@@ -176,15 +177,23 @@ class ServoReport:
 
 def joint_state(drives: Iterable[JointDrive], stamp: int) -> JointState | None:
     """Return where the joints are that have been measured, None if none has; `stamp` is in ns."""
-    known = [drive for drive in drives if math.isfinite(drive.measured.position)]
-    if not known:
+    return _joint_state([(drive, drive.measured) for drive in drives], stamp)
+
+
+def joint_command(drives: Iterable[JointDrive], stamp: int) -> JointState | None:
+    """Return where the joints are commanded to be, those without torque where they are; like `joint_state`."""
+    return _joint_state([(each, each.commanded if each.has_torque else each.measured) for each in drives], stamp)
+
+
+def _joint_state(samples: Iterable[tuple[JointDrive, JointSample]], stamp: int) -> JointState | None:
+    if not (known := [(drive, sample) for drive, sample in samples if math.isfinite(sample.position)]):
         return None
     return JointState(
         header=Header(stamp=to_time(stamp)),
-        name=tuple(drive.joint.name for drive in known),
-        position=np.array([drive.measured.position for drive in known]),
-        velocity=np.array([drive.measured.velocity for drive in known]),
-        effort=np.array([drive.effort for drive in known]),
+        name=tuple(drive.joint.name for drive, _ in known),
+        position=np.array([sample.position for _, sample in known]),
+        velocity=np.array([sample.velocity for _, sample in known]),
+        effort=np.array([drive.effort for drive, _ in known]),
     )
 
 

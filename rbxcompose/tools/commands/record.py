@@ -1,7 +1,11 @@
-"""Record the topics of a robot to an MCAP file, until Ctrl-C.
+"""Record the topics of a robot to an MCAP file, until Ctrl-C, or as an episode of a data set to learn from.
 
 Payloads stay as they are on the bus, with the definitions of their types, so Foxglove, Lichtblick and ROS 2 can read
 them. A recorder that is killed loses at most half a second: the next one in its folder recovers its file.
+
+With --format lerobot, what was recorded becomes an episode of a data set of LeRobot: `observation.state` of
+`joint_states` and `odom`, `action` of `joint_commands` and `cmd_vel`, and a video of each camera. --append adds an
+episode to a data set; --from makes episodes of recordings, also of those of ROS 2.
 """
 
 from __future__ import annotations
@@ -11,29 +15,35 @@ import json
 import math
 import re
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import datetime
 from itertools import count
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from rbxcompose.base.findings import Finding, Report
 from rbxcompose.base.printable import plain
 from rbxcompose.bus.names import data_key, decode_attachment
 from rbxcompose.bus.tokens import SPACE, EndpointToken, parse_token
 from rbxcompose.bus.transport import Arrival
-from rbxcompose.commands.console import emit, refuse, table, write_report
+from rbxcompose.commands.console import NotDoneError, emit, misused, refuse
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place, find_robot
 from rbxcompose.commands.options import add_json_option, out_option, seconds
-from rbxcompose.runtime.recording.codes import LOST, RECOVERED, UNWRITABLE
-from rbxcompose.runtime.recording.files import ENDING, Recorder, Split, recover_all
-from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, by_name, definition_of, topic_of
+from rbxcompose.runtime.recording.codes import LOST, UNWRITABLE
+from rbxcompose.runtime.recording.files import ENDING, Recorder, Split
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, definition_of, topic_of
 from rbxcompose.sdk.ports import Qos
+from rbxcompose.tools.recordings import count_table, recover_in, warn
+
+if TYPE_CHECKING:
+    from rbxcompose.tools.datasets import WantedDataset
 
 GROUP = "data"
 _PAUSE = 0.02  # [s] between checks for messages
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([kMG])B")
+MCAP, LEROBOT = "mcap", "lerobot"
+MOST_FRAMES = 120  # per second
 _TIMES = {"k": 1e3, "M": 1e6, "G": 1e9}
 MOST_WAITING = 20_000  # messages that arrived and are not yet written
 MOST_TOPICS = 2_000
@@ -44,30 +54,88 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_bus_options(parser)
     add_selection_options(parser)
     add_json_option(parser)
-    out_option("the file, else ROBOT-DATE-TIME.mcap", "--output", type=Path)(parser)
+    out_option("the file, else ROBOT-DATE-TIME.mcap; or the folder of the data set", "--output", type=Path)(parser)
     parser.add_argument("--for", type=seconds, dest="duration", metavar="30s", help="end after this time")
     parser.add_argument(
         "--split", type=_split, default=Split(), metavar="SIZE|TIME", help="start a new file after 500MB, or 10min"
     )
+    parser.add_argument("--format", choices=(MCAP, LEROBOT), default=MCAP, help=f"of what is written (default: {MCAP})")
+    for_data = parser.add_argument_group("with --format lerobot")
+    for_data.add_argument("--task", metavar="TEXT", help="what the robot does, in words (default: the folder's name)")
+    for_data.add_argument("--fps", type=_rate, default=15, metavar="N", help="frames per second (default: 15)")
+    for_data.add_argument("--append", action="store_true", help="add the episode to a data set that is there")
+    words = "make an episode of each of these recordings, instead of recording one"
+    for_data.add_argument("--from", nargs="+", type=Path, default=[], dest="recordings", metavar="FILE", help=words)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Record, then report what was recorded."""
+    if problem := _problem(arguments):
+        return misused("record", problem)
+    if arguments.format == LEROBOT:
+        return _record_dataset(arguments)
     place = find_place(arguments)
     path = _path(arguments)
     if path.parent.is_dir():
         recover_in(path.parent)
-    return _record(arguments, place, path)
+    return _record(arguments, place, path, selection_of(arguments))
 
 
-def _record(arguments: argparse.Namespace, place: BusPlace, path: Path) -> int:
+def _problem(arguments: argparse.Namespace) -> str:
+    if arguments.format == LEROBOT:
+        is_cut = arguments.split != Split()
+        return "an episode cannot be split" if is_cut else "--json is for recordings" if arguments.json else ""
+    is_used = arguments.task or arguments.append or arguments.recordings
+    return f"--task, --append and --from need --format {LEROBOT}" if is_used else ""
+
+
+def _record_dataset(arguments: argparse.Namespace) -> int:
+    from rbxcompose.tools.datasets import EpisodeTopics, WantedDataset  # imports what few recordings need
+
+    place = None if arguments.recordings else find_place(arguments)
+    is_named = place is not None and not arguments.router
+    robot = find_robot(arguments.robot).path.name if is_named else arguments.robot
+    folder: Path = arguments.out or Path(f"{robot or 'recording'}-{datetime.now():%Y%m%d-%H%M%S}")
+    topics = EpisodeTopics(tuple(arguments.topics), tuple(arguments.classes))
+    wanted = WantedDataset(folder, arguments.task or folder.name, arguments.fps, robot, topics, arguments.append)
+    if (problem := wanted.problem()) is not None:
+        return refuse(problem)
+    return (
+        _record_episode(arguments, place, wanted) if place is not None else _write_dataset(wanted, arguments.recordings)
+    )
+
+
+def _record_episode(arguments: argparse.Namespace, place: BusPlace, wanted: WantedDataset) -> int:
+    """Record a file and make an episode of it; if that cannot be, the file stays."""
+    path = wanted.folder.with_name(f"{wanted.folder.name}-{datetime.now():%Y%m%d-%H%M%S}{ENDING}")
+    if code := _record(arguments, place, path, wanted.topics):
+        return code
+    if code := _write_dataset(wanted, [path]):
+        emit(f"the recording stays: {path}")
+        return code
+    path.unlink()
+    return 0
+
+
+def _write_dataset(wanted: WantedDataset, recordings: list[Path]) -> int:
+    from rbxcompose.tools.datasets import write_dataset
+
+    try:
+        write_dataset(wanted, recordings)
+    except NotDoneError as error:
+        return refuse(error.finding)
+    emit(f"data set {wanted.folder}")
+    return 0
+
+
+def _record(arguments: argparse.Namespace, place: BusPlace, path: Path, topics: Selection) -> int:
     with Guest(place, stays=True) as guest, guest.interruptible():
         start = guest.clock.now()
         try:
             recorder = Recorder(path, start, arguments.split)
         except OSError as error:
             return refuse(UNWRITABLE.at(None, f"'{plain(str(path))}' cannot be written: {_reason(error)}"))
-        tap = Tap(guest, selection_of(arguments))
+        tap = Tap(guest, topics)
         if not arguments.json:
             emit(f"recording to {recorder.paths[0]}; Ctrl-C ends it")
         end = math.inf if arguments.duration is None else start + arguments.duration
@@ -125,6 +193,12 @@ def _split(text: str) -> Split:
         raise argparse.ArgumentTypeError(f"'{text}' is neither a size nor a time; write '500MB' or '10min'") from None
 
 
+def _rate(text: str) -> int:
+    if text.isdecimal() and 1 <= int(text) <= MOST_FRAMES:
+        return int(text)
+    raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1 to {MOST_FRAMES}")
+
+
 def add_selection_options(parser: argparse.ArgumentParser) -> None:
     """Declare `--topics` and `--class`."""
     parser.add_argument(
@@ -157,33 +231,6 @@ def _class(text: str) -> Qos:
         return Qos(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"'{text}' is not a class; choose from {', '.join(Qos)}") from None
-
-
-def recover_in(folder: Path) -> None:
-    """Recover the unfinished recordings of a folder and report them."""
-    for one in recover_all(folder):
-        if one.problem:
-            warn(RECOVERED.at(None, f"'{plain(str(one.path))}' is unfinished and stays so: {plain(one.problem)}"))
-        else:
-            warn(
-                RECOVERED.at(None, f"'{plain(str(one.path))}' was unfinished: {one.messages:,} messages are recovered")
-            )
-
-
-def warn(finding: Finding) -> None:
-    """Report a finding that does not end the command."""
-    report = Report()
-    report.add(finding)
-    write_report(report, {})
-
-
-def count_table(counts: Mapping[RecordedTopic, int]) -> str:
-    """Return one line for each topic: name, type, class, number of messages."""
-    rows = [("topic", "type", "class", "messages")]
-    together = by_name(counts)
-    topics = sorted(together, key=lambda topic: (topic.name, topic.type))
-    rows += [(topic.name, topic.type or "-", topic.qos.value, f"{together[topic]:,}") for topic in topics]
-    return table(rows)
 
 
 class Tap:

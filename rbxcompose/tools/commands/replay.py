@@ -20,7 +20,6 @@ from itertools import count
 from pathlib import Path
 
 from rbxcompose.base.config import HIDDEN
-from rbxcompose.base.files import NotRegularError, open_regular
 from rbxcompose.base.findings import MOST_NAMES, Finding, Severity, suggest
 from rbxcompose.base.printable import plain
 from rbxcompose.base.requests import to_data
@@ -39,18 +38,13 @@ from rbxcompose.compiler.plan.dump import PlanTextError, dump, load
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime.recording import codes
 from rbxcompose.runtime.recording.files import PART, Recorder, write_problem
-from rbxcompose.runtime.recording.reader import (
-    NotARecordingError,
-    RecordingReader,
-    RecordingSummary,
-    playlist,
-    summary_of,
-)
+from rbxcompose.runtime.recording.reader import RecordingReader, RecordingSummary, playlist, summary_of
 from rbxcompose.runtime.recording.tape import PLAN
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, by_name, is_replayable
 from rbxcompose.runtime.replay import ReplayResult, RunDifference, missing_topics, replayed
 from rbxcompose.sdk.ports import Qos
-from rbxcompose.tools.commands.record import add_selection_options, count_table, recover_in, selection_of, warn
+from rbxcompose.tools.commands.record import add_selection_options, selection_of
+from rbxcompose.tools.recordings import count_table, opened, recover_in, warn
 
 GROUP = "data"
 _MATCHING = 1.0  # [s] maximum wait until subscribers have found a new publisher
@@ -125,7 +119,7 @@ def run(arguments: argparse.Namespace) -> int:
     if path.name.endswith(PART) and not path.exists():
         path = path.with_name(path.name.removesuffix(PART))
     if arguments.into is not None:
-        with _opened(path) as reader:
+        with opened(path) as reader:
             return run_again(arguments, path, reader)
     summary = _look_through(path)
     if arguments.info:
@@ -147,29 +141,12 @@ def _misused(arguments: argparse.Namespace) -> str:
 
 
 def _look_through(path: Path) -> RecordingSummary:
-    with _opened(path) as reader:
+    with opened(path) as reader:
         summary = summary_of(reader.messages())
     if reader.damage:
         place = f"after {summary.messages:,} messages"
         warn(codes.DAMAGED.at(None, f"'{plain(str(path))}' is damaged {place}: {reader.damage}"))
     return summary
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[RecordingReader]:
-    try:
-        with open_regular(path) as file:
-            yield RecordingReader(file)
-    except NotRegularError as error:
-        raise NotDoneError(
-            codes.UNREADABLE.at(None, f"'{plain(str(path))}' is not a recording: it is not a file")
-        ) from error
-    except OSError as error:
-        reason = plain(error.strerror or str(error))
-        raise NotDoneError(codes.UNREADABLE.at(None, f"'{plain(str(path))}' cannot be read: {reason}")) from error
-    except NotARecordingError as error:
-        finding = codes.UNREADABLE.at(None, f"'{plain(str(path))}' is not a recording: {error}")
-        raise NotDoneError(finding) from error
 
 
 def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary) -> int:
@@ -230,7 +207,7 @@ def _play(path: Path, player: Player, topics: list[RecordedTopic], arguments: ar
     chosen = set(topics)
     count = 0
     start = guest.clock.now()
-    with _opened(path) as reader:
+    with opened(path) as reader:
         for due, message in playlist(reader.messages(), rate=arguments.rate, start=arguments.start):
             if not _wait(start + due, guest):
                 break
@@ -335,8 +312,8 @@ def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader
         raise NotDoneError(
             codes.NOT_ENOUGH.at(None, f"'{plain(str(path))}' lacks inputs of '{instance.name}': {names}")
         )
-    with open_regular(path) as file, _kept(arguments.write) as keep:
-        found = replayed(plan, instance, RecordingReader(file).messages(), keep)
+    with opened(path) as reader, _kept(arguments.write) as keep:
+        found = replayed(plan, instance, reader.messages(), keep)
     return _report(arguments, instance.name, found)
 
 

@@ -106,7 +106,7 @@ class Mux(Component[MuxConfig]):
         """Return the output, one input per source and one per lock, the announcement, and services to select."""
         message = registry.message(config.message)
         ports: dict[str, Port[Any]] = {
-            "output": Out(message, config.output, qos="command").named("output"),
+            "output": Out(message, config.output, qos=config.quality).named("output"),
             ANNOUNCED: Out(String, f"{config.output}/{config.announced}", qos="latched").named(ANNOUNCED),
         }
         for name, input_config in config.inputs.items():
@@ -429,7 +429,7 @@ class Mux(Component[MuxConfig]):
 
 
 def _input(name: str, topic: str, config: MuxConfig, max_rate: float | None) -> In[Any]:
-    return In(registry.message(config.message), topic, qos="command", is_open=True, max_rate=max_rate).named(name)
+    return In(registry.message(config.message), topic, qos=config.quality, is_open=True, max_rate=max_rate).named(name)
 
 
 def _services(output: str) -> dict[str, Port[Any]]:

@@ -17,7 +17,7 @@ from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, a
 from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type
 
-MUX = "mux"
+MUX, OUTPUT = "mux", "output"
 _BELOW_TOPIC = ("inputs", "locks")  # keys whose keys are topics below that of the mux
 _TWIST = "geometry_msgs/msg/Twist"  # the type that a mux forwards if nothing declares one
 
@@ -53,6 +53,8 @@ class MuxLock(Config):
 class MuxModel(Config):
     """Lets one of several sources command an output."""
 
+    topic: TopicName | None = None
+    """What it commands, if that is not the topic of its name, such as `arm_controller/joint_trajectory`."""
     mode: MuxMode | None = None
     """Who gets through: the live input with the highest `priority`, the one that was selected, or who sent last."""
     profile: MuxProfile = "default"
@@ -181,16 +183,17 @@ def _clash(names: Sequence[str]) -> tuple[str, str] | None:
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     for name, mux in contents.of(muxes).items():
+        topic = mux.topic or name
         config: dict[str, object] = {
             "output": name,
-            "message": wiring.message_of(name) or _TWIST,
+            "message": wiring.message_of(topic) or _TWIST,
             "mode": mux.works_by,
             "profile": mux.profile,
             "inputs": {key: _set(each, "source") for key, each in mux.inputs.items()},
             "locks": {key: _set(each) for key, each in mux.locks.items()},
-            **_set(mux, "inputs", "locks", "mode", "profile"),
+            **_set(mux, "inputs", "locks", "mode", "profile", "topic"),
         }
-        if mux.zero_stops is None and wiring.drives(name):
+        if mux.zero_stops is None and wiring.drives(topic):
             config["zero_stops"] = True
         yield WantedComponent(name, MUX, config, ("muxes", name))
 
@@ -201,16 +204,19 @@ def _set(entry: Config, *left_out: str) -> dict[str, object]:
 
 
 def _connects(contents: Contents) -> dict[str, dict[str, str]]:
-    """Return the topics that muxes give to the outputs they take."""
+    """Return the topics of muxes whose names are others, and those that muxes give to the outputs they take."""
     found: dict[str, dict[str, str]] = {}
     for mux, one in contents.of(muxes).items():
+        topic = one.topic or mux
+        if one.topic is not None:
+            found[mux] = {OUTPUT: one.topic}
         for name, source in one.inputs.items():
             component, _, port = (source.source or "").partition(".")
             if (written := contents.of(components).get(component)) is not None:
-                outputs = _outputs(written, mux, port)
+                outputs = _outputs(written, topic, port)
             else:
                 brought = _brought(contents, component)
-                outputs = [output for output, topic in brought.items() if port == output or (not port and topic == mux)]
+                outputs = [output for output, own in brought.items() if port == output or (not port and own == topic)]
             for output in outputs:
                 found.setdefault(component, {})[output] = source.topic or f"{mux}/{name}"
     return found

@@ -20,7 +20,7 @@ from rbxcompose.domains.servos.controller import ControllerSite, controller_type
 from rbxcompose.domains.servos.joint_drive import JointDrive, PositionDrive, ServoJoint
 from rbxcompose.domains.servos.joint_states import Enable, Hold, JointMode, MoveTo
 from rbxcompose.domains.servos.servo_cycle import ServoCycle, ServoItem, prepare, set_up, with_torque
-from rbxcompose.domains.servos.supervision import Periods, Reboots, be_prompt, joint_report, joint_state
+from rbxcompose.domains.servos.supervision import Periods, Reboots, be_prompt, joint_command, joint_report, joint_state
 from rbxcompose.domains.servos.twins.fault_script import FaultScript, InjectFault, ListFaults
 from rbxcompose.domains.servos.twins.physics_motor import PhysicsJoints, PhysicsMotor
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo, IdealMotor, ServoMotor
@@ -93,7 +93,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
     Each joint has a topic `JOINT/command` [rad], and the services `JOINT/relax`, `JOINT/enable`, `JOINT/reboot` and
     `JOINT/set_speed`; `BUS/relax_all` and `BUS/enable_all` are for all. A joint starts relaxed; the first command
     switches its torque on, where it is. A servo that has shut down must be rebooted before it takes torque again, in
-    missions by the skill `reboot_JOINT`.
+    missions by the skill `reboot_JOINT`. While somebody listens, `joint_commands` has where joints are commanded to be.
 
     Example:
         servos: {type: servo_bus, twin: servo, joints: {pan: {servos: [{id: 1, model: AX-12}]}}}
@@ -102,12 +102,14 @@ class ServoBusDriver(Component[ServoBusConfig]):
     made_by = "Each entry of `buses` runs one."
     process = "servos"
     joint_states = Out(JointState, "joint_states")
+    joint_commands = Out(JointState, "joint_commands")
 
     @classmethod
     def ports(cls, config: ServoBusConfig) -> dict[str, Port[Any]]:
         """Return the ports: for each joint, for all, and those of the controllers."""
-        states = Out(JointState, "joint_states", rate=config.rate / cycles_between(config))
-        found = super().ports(config) | {"joint_states": states} | joint_ports(config)
+        rate = config.rate / cycles_between(config)
+        found = super().ports(config) | joint_ports(config)
+        found |= {name: Out(JointState, name, rate=rate) for name in ("joint_states", "joint_commands")}
         if config.by_physics:
             found |= {"set_points": Out(JointState, SET_POINTS, rate=config.rate), "moved": In(JointState, MOVED)}
         for name, setup in config.controllers.items():
@@ -397,9 +399,11 @@ class ServoBusDriver(Component[ServoBusConfig]):
     # What is published
 
     def publish(self) -> None:
-        """Publish where the joints are, and what controllers know."""
+        """Publish where the joints are, where they are commanded to be, and what controllers know."""
         if (message := joint_state(self.cycle.drives.values(), self.stamp)) is not None:
             self.joint_states(message)
+        if self.joint_commands.is_wanted and (message := joint_command(self.cycle.drives.values(), self.stamp)):
+            self.joint_commands(message)
         for controller in self.controllers.leading:
             controller.publish()
 

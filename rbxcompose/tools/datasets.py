@@ -1,0 +1,125 @@
+"""Data sets of recordings, for `record --format lerobot`: each recording becomes an episode."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Finding, kind
+from rbxcompose.base.printable import plain
+from rbxcompose.commands.console import NotDoneError, emit
+from rbxcompose.domains.policies.episode import Episode, NoEpisodeError, Sample, features_of, role_of, sample_of
+from rbxcompose.domains.policies.lerobot import Dataset, DatasetError
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.cdr import CdrError, decode
+from rbxcompose.msgs.images import WrongPictureError
+from rbxcompose.runtime.recording.codes import DAMAGED
+from rbxcompose.runtime.recording.topics import CDR, RecordedTopic, Selection
+from rbxcompose.tools.commands.lsp import NOT_INSTALLED
+from rbxcompose.tools.recordings import opened, warn
+
+NO_DATASET = kind("RBX3802")
+_NEEDED = ("av", "pyarrow")
+
+
+class EpisodeTopics(Selection):
+    """Selects topics of which frames are made."""
+
+    def takes(self, topic: RecordedTopic) -> bool:
+        """Return whether a topic is selected."""
+        return topic.encoding == CDR and role_of(topic.name, topic.type) is not None and super().takes(topic)
+
+
+@dataclass(frozen=True, slots=True)
+class WantedDataset:
+    """What data set is to be made, or added to."""
+
+    folder: Path
+    task: str
+    """What the robot does in the episodes, in words."""
+    rate: int
+    """Frames per second."""
+    robot: str | None
+    topics: EpisodeTopics
+    is_added: bool
+    """Whether the data set is there already."""
+
+    def problem(self) -> Finding | None:
+        """Return why it could not be made, to be told before anything is recorded."""
+        if any(find_spec(name) is None for name in _NEEDED):
+            help_text = "install it with: pip install 'rbxcompose[lerobot]'"
+            return NOT_INSTALLED.at(None, "what writes data sets of LeRobot is not installed", help=help_text)
+        name = plain(str(self.folder))
+        if self.is_added:
+            try:
+                Dataset.read(self.folder, self.rate)
+            except DatasetError as error:
+                return NO_DATASET.at(None, plain(str(error)))
+        elif self.folder.exists():
+            return NO_DATASET.at(None, f"'{name}' is there already", help="'--append' adds an episode to it")
+        elif not self.folder.parent.is_dir():
+            return NO_DATASET.at(
+                None, f"'{name}' cannot be made: there is no folder '{plain(str(self.folder.parent))}'"
+            )
+        return None
+
+
+def write_dataset(wanted: WantedDataset, recordings: Sequence[Path]) -> None:
+    """Make a data set with an episode of each recording, or add them; a new one is there wholly or not at all.
+
+    Raises:
+        NotDoneError: if that cannot be.
+    """
+    if wanted.is_added:
+        _add_all(Dataset.read(wanted.folder, wanted.rate), wanted, recordings)
+        return
+    try:
+        folder = Path(tempfile.mkdtemp(prefix=f".{wanted.folder.name}.", dir=wanted.folder.parent))
+    except OSError as error:
+        words = f"'{plain(str(wanted.folder))}' cannot be made: {error.strerror}"
+        raise NotDoneError(NO_DATASET.at(None, words)) from error
+    try:
+        _add_all(Dataset.new(folder, wanted.robot, wanted.rate), wanted, recordings)
+        folder.chmod(0o755)
+        os.rename(folder, wanted.folder)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _add_all(dataset: Dataset, wanted: WantedDataset, recordings: Sequence[Path]) -> None:
+    for path in recordings:
+        name = plain(str(path))
+        try:
+            features = features_of(_samples(path, wanted.topics))
+            episode = Episode(features, wanted.rate)
+            length = dataset.add(features, episode.frames(_samples(path, wanted.topics)), wanted.task)
+        except (NoEpisodeError, WrongPictureError, DatasetError) as error:
+            raise NotDoneError(NO_DATASET.at(None, f"'{name}' is no episode: {plain(str(error))}")) from error
+        except OSError as error:
+            words = f"'{plain(str(wanted.folder))}' cannot be written: {plain(error.strerror or str(error))}"
+            raise NotDoneError(NO_DATASET.at(None, words)) from error
+        emit(f"episode {dataset.info['total_episodes'] - 1}: {length} frames in {length / wanted.rate:.1f} s")
+        for camera, count in episode.repeated.items():
+            if count:
+                emit(f"  {camera}: {count} of them have the picture before")
+
+
+def _samples(path: Path, topics: EpisodeTopics) -> Iterator[Sample]:
+    with opened(path) as reader:
+        for message in reader.messages():
+            topic = message.topic
+            if (role := role_of(topic.name, topic.type)) is None or not topics.takes(topic):
+                continue
+            try:
+                decoded = decode(registry.message(topic.type), message.payload)
+            except CdrError:
+                continue  # of a type with this name and other fields
+            if (sample := sample_of(message.log_time, topic.name, role, decoded)) is not None:
+                yield sample
+        if reader.damage:
+            warn(DAMAGED.at(None, f"'{plain(str(path))}' is damaged: {reader.damage}"))

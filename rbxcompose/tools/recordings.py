@@ -1,0 +1,63 @@
+"""What verbs about recordings share: opening them, recovering those that were cut short, counting what is in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from rbxcompose.base.files import NotRegularError, open_regular
+from rbxcompose.base.findings import Finding, Report
+from rbxcompose.base.printable import plain
+from rbxcompose.commands.console import NotDoneError, table, write_report
+from rbxcompose.runtime.recording.codes import RECOVERED, UNREADABLE
+from rbxcompose.runtime.recording.files import recover_all
+from rbxcompose.runtime.recording.reader import NotARecordingError, RecordingReader
+from rbxcompose.runtime.recording.topics import RecordedTopic, by_name
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[RecordingReader]:
+    """Open a recording.
+
+    Raises:
+        NotDoneError: if it is none.
+    """
+    try:
+        with open_regular(path) as file:
+            yield RecordingReader(file)
+    except NotRegularError as error:
+        raise NotDoneError(UNREADABLE.at(None, f"'{plain(str(path))}' is not a recording: it is not a file")) from error
+    except OSError as error:
+        reason = plain(error.strerror or str(error))
+        raise NotDoneError(UNREADABLE.at(None, f"'{plain(str(path))}' cannot be read: {reason}")) from error
+    except NotARecordingError as error:
+        finding = UNREADABLE.at(None, f"'{plain(str(path))}' is not a recording: {error}")
+        raise NotDoneError(finding) from error
+
+
+def recover_in(folder: Path) -> None:
+    """Recover the unfinished recordings of a folder and report them."""
+    for one in recover_all(folder):
+        if one.problem:
+            warn(RECOVERED.at(None, f"'{plain(str(one.path))}' is unfinished and stays so: {plain(one.problem)}"))
+        else:
+            warn(
+                RECOVERED.at(None, f"'{plain(str(one.path))}' was unfinished: {one.messages:,} messages are recovered")
+            )
+
+
+def warn(finding: Finding) -> None:
+    """Report a finding that does not end the command."""
+    report = Report()
+    report.add(finding)
+    write_report(report, {})
+
+
+def count_table(counts: Mapping[RecordedTopic, int]) -> str:
+    """Return one line for each topic: name, type, class, number of messages."""
+    rows = [("topic", "type", "class", "messages")]
+    together = by_name(counts)
+    topics = sorted(together, key=lambda topic: (topic.name, topic.type))
+    rows += [(topic.name, topic.type or "-", topic.qos.value, f"{together[topic]:,}") for topic in topics]
+    return table(rows)
