@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -48,6 +49,24 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with zipfile.ZipFile(vscode.BUILT) as archive:
         archive.extractall(unpacked)
     return unpacked
+
+
+@pytest.mark.parametrize("program", ["code", "code-server"])
+def test_vs_code_installs_it(package: Path, program: str, tmp_path: Path) -> None:
+    if (found := shutil.which(program)) is None:
+        pytest.skip(f"needs {program}")
+    words = [found, "--user-data-dir", str(tmp_path / "user"), "--extensions-dir", str(tmp_path / "extensions")]
+    environment = {**os.environ, "HOME": str(tmp_path)}
+
+    def said(*more: str) -> str:
+        done = subprocess.run([*words, *more], capture_output=True, text=True, env=environment, timeout=60, check=False)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    said("--install-extension", str(vscode.BUILT))
+    assert (
+        f"rbxcompose.rbxcompose@{rbxcompose.__version__}" in said("--list-extensions", "--show-versions").splitlines()
+    )
 
 
 @pytest.fixture

@@ -79,8 +79,8 @@ function open(known) {
 
 /** Return the regular expression of a pattern of files. */
 function expression(glob) {
-  const parts = { "**/": "(.*/)?", "*": "[^/]*", ".": "\\." };
-  return new RegExp(`^${glob.replace(/\*\*\/|[*.]/g, (part) => parts[part])}$`);
+  const parts = { "**/": "(.*/)?", "*": "[^/]*", ".": "\\.", "{": "(", ",": "|", "}": ")" };
+  return new RegExp(`^${glob.replace(/\*\*\/|[*.{,}]/g, (part) => parts[part])}$`);
 }
 
 function channel(lines) {

@@ -63,7 +63,7 @@ async function drawn(path: string): Promise<string> {
 }
 
 async function robots(): Promise<TextFile[]> {
-  const found = await vscode.workspace.findFiles("**/robots/**/*.yaml", "**/{node_modules,.venv,build}/**", MOST_ROBOTS);
+  const found = await vscode.workspace.findFiles("{**/robots/**/*.yaml,**/robot.yaml}", "**/{node_modules,.venv,build}/**", MOST_ROBOTS);
   const sorted = found.sort((one, other) => (one.fsPath < other.fsPath ? -1 : 1));
   return Promise.all(sorted.map(read));
 }
