@@ -79,7 +79,7 @@ class Network:
         self._processes.append(Connected(self.port))
         return self._processes[-1]
 
-    def until(self, condition: Callable[[], object], within: float = 5.0) -> float:
+    def until(self, condition: Callable[[], object], within: float = 30.0) -> float:
         """Let all processes run until `condition` holds; return how long that took [s]."""
         start = time.monotonic()
         while not condition():

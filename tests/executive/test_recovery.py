@@ -163,12 +163,14 @@ def test_a_changed_mission_starts_again_and_says_what_has_changed() -> None:
     )
 
 
-def test_a_broken_snapshot_is_none(folder: Path) -> None:
+@pytest.mark.parametrize("text", ['{"version": 1', "[]", '{"version": 2}'])
+def test_a_broken_snapshot_is_none_and_the_log_says_so(folder: Path, text: str) -> None:
     crashed()
-    (folder / FILE).write_text('{"version": 1')
+    (folder / FILE).write_text(text)
     robot = Real(policy="continue")
     robot.start()
     assert goals(robot) == [1.0]
+    assert [line for line in robot.lines if f"the snapshot '{folder / FILE}' cannot be used: " in line]
 
 
 def test_a_mission_that_was_stopped_at_a_breakpoint_is_so_again() -> None:

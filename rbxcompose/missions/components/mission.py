@@ -290,6 +290,8 @@ class Mission(Component[MissionConfig]):
         if trouble != self.trouble and trouble:
             self.warn(trouble)
         self.trouble = trouble
+        while self.snapshots.unusable:
+            self.warn(self.snapshots.unusable.popitem()[1])
         if wakes:
             self.plan(min(wakes))
         self.broadcast.publish(self.missions)

@@ -38,6 +38,7 @@ class SnapshotStore:
         self._known: dict[str, Any] = {}  # what the latest snapshot of each mission has
         self._made_of: dict[str, tuple[Engine, Mapping[str, str]]] = {}
         self.trouble = ""  # why the latest one could not be written
+        self.unusable: dict[str, str] = {}  # what is wrong with files, by their paths
 
     def keep(self, run: MissionRun, now: float) -> float | None:
         """Write a snapshot if something has changed; return when to look again [s] if that is too early."""
@@ -68,10 +69,16 @@ class SnapshotStore:
 
     def _found(self, mission: str, asides: Iterable[str]) -> Iterator[tuple[float, Mapping[str, Any]]]:
         for path in (self._path(mission, aside) for aside in asides if self._folder):
-            with suppress(OSError, ValueError):
-                content = json.loads(path.read_bytes())
-                if isinstance(content, dict) and content.get("version") == VERSION:
-                    yield path.stat().st_mtime, content
+            try:
+                content, at = json.loads(path.read_bytes()), path.stat().st_mtime
+                if not isinstance(content, dict) or content.get("version") != VERSION:
+                    raise ValueError("it is of another version")
+            except FileNotFoundError:
+                continue
+            except (OSError, ValueError) as error:
+                self.unusable[str(path)] = f"the snapshot '{path}' cannot be used: {error}"
+            else:
+                yield at, content
 
     def drop(self, mission: str) -> None:
         """Forget the snapshot of a mission that has ended."""
