@@ -36,6 +36,7 @@ def copy_tracked(to: Path) -> None:
         if not path.startswith(NOT_BUILT):
             (to / path).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(ROOT / path, to / path)
+            os.utime(to / path, (when := (ROOT / path).stat().st_mtime, when))
 
 
 def build(
@@ -45,10 +46,12 @@ def build(
     umask: int = 0o022,
     environment: Mapping[str, str] = {},
     wheel_only: bool = False,
+    node_modules: Path | None = None,
 ) -> dict[str, str]:
     """Build into a folder; return the SHA-256 of each file by its name.
 
-    `source` is an unpacked source distribution; else a copy of the files that git knows is built.
+    `source` is an unpacked source distribution; else a copy of the files that git knows is built. `node_modules` are
+    those of the console, installed already: they take as long as all the rest.
 
     Raises:
         BuildError: if that failed.
@@ -58,6 +61,8 @@ def build(
         copy = source or Path(folder, "rbxcompose")
         if source is None:
             copy_tracked(copy)
+            if node_modules is not None:
+                (copy / "console/node_modules").symlink_to(node_modules)
         command = [sys.executable, "-m", "hatchling", "build", "-d", str(out), *(["-t", "wheel"] if wheel_only else [])]
         done = subprocess.run(
             command,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import fcntl
+import gc
 import os
 import shutil
 import sys
@@ -43,6 +44,7 @@ WITH_ARMS = tuple(
 
 def pytest_configure(config: pytest.Config) -> None:
     """Give all workers a folder of caches that goes with the run; say how many examples to try; keep bytecode."""
+    gc.disable()  # thousands of tests are collected, which stay: looking for garbage among them takes half of the time
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     sys.dont_write_bytecode = False
     config.addinivalue_line("markers", "soak: takes long, and runs under --soak alone")
@@ -61,10 +63,12 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Compile what arms need before any test: on a busy machine, that takes longer than a test may.
+    """Leave what was collected out of the search for garbage; compile what arms need before any test.
 
-    One worker does, and the others begin with tests that need none of it.
+    On a busy machine, compiling takes longer than a test may: one worker does, the others begin with other tests.
     """
+    gc.enable()
+    gc.freeze()
     if not session.config.option.collectonly and any(item.nodeid.startswith(WITH_ARMS) for item in session.items):
         with suppress(BlockingIOError):
             compile_for_arms(fcntl.LOCK_NB)

@@ -88,12 +88,12 @@ class Triggered:
 
 @pytest.mark.timeout(100)
 def test_a_time_of_day_starts_a_mission_each_week(tmp_path: Path) -> None:
-    nightly = 'nightly: {at: "22:00", on: [mon, fri], mission: greet, with: {times: 2}}'
+    nightly = 'nightly: {at: "22:00", on: [fri, sun], mission: greet, with: {times: 2}}'
     robot = Triggered(tmp_path, nightly, is_alone=True)
-    robot.bench.advance(9 * DAY)  # the first day of virtual time is a Thursday
+    robot.bench.advance(4 * DAY)  # the first day of virtual time is a Thursday
     begun = [float(line.split()[0]) for line in robot.told if "starts" in line]
-    assert begun == [day * DAY + 22 * 3600 for day in (1, 4, 8)]
-    assert robot.told[:2] == ["165600 trigger nightly (at 22:00 on mon, fri) starts mission greet", "165600 Hello 2"]
+    assert begun == [day * DAY + 22 * 3600 for day in (1, 3)]
+    assert robot.told[:2] == ["165600 trigger nightly (at 22:00 on fri, sun) starts mission greet", "165600 Hello 2"]
 
 
 def test_the_list_has_the_next_time_and_the_last_start(tmp_path: Path) -> None:

@@ -98,6 +98,7 @@ def test_a_block_is_fetched_from_the_living_room_to_the_kitchen() -> None:
     assert max(held) < -0.5
 
 
+@pytest.mark.soak
 def test_a_block_that_is_elsewhere_fails_with_a_reason_and_nothing_is_hit() -> None:
     errand = Errand(shift=-0.2)
     assert errand.outcome == "failure"

@@ -75,6 +75,7 @@ def test_a_kobuki_bumps_backs_off_and_goes_on(repository: Path) -> None:
     assert max(ahead[-len(ahead) // 4 :]) > 0.1
 
 
+@pytest.mark.soak
 def test_the_house_is_cleaned_without_a_touch(repository: Path) -> None:
     plan = compile_robot("robots/house", sets=("simulator=physics",), environment={}).plan
     assert plan is not None

@@ -15,6 +15,7 @@ from rbxcompose.msgs.sensor_msgs import CameraInfo, Image, Imu
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from tests.navigation.test_robot import Room
+from tests.soak import rare
 
 pytestmark = pytest.mark.timeout(120)
 pytest.importorskip("mujoco", reason="mujoco is not installed")
@@ -42,6 +43,8 @@ objects:
   can: {cylinder: {radius: 20 cm, length: 80 cm}, at: {x: 1.5 m, y: -50 cm}, colour: blue}
 """
 SIMULATORS = pytest.mark.parametrize("simulator", ["ideal", "physics"])
+SELDOM_PHYSICS = pytest.mark.parametrize("simulator", ["ideal", *rare("physics")])
+"""Where pictures are those of the engine, and all else as elsewhere."""
 
 
 def bench_in(folder: Path, simulator: str, lens: str = "[]") -> Bench:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[2]
+NODE_MODULES = ROOT / "console/node_modules"
 VERSIONS = ("3.11", "3.12", "3.13", "3.14")
 LONG = 500.0  # [s]
 
@@ -39,16 +41,16 @@ def without_ours(folder: Path) -> dict[str, str]:
 
 
 def pip(program: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    """Run pip of an environment."""
-    command = [str(program), "-m", "pip", "-q", "--disable-pip-version-check", *words]
+    """Run our pip for an environment, which needs none of its own."""
+    command = [sys.executable, "-m", "pip", "--python", str(program), "-q", "--disable-pip-version-check", *words]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 def environment_of(python: str, folder: Path) -> Path:
     """Return the program of a new environment with the locked packages, or skip the test with the reason."""
-    subprocess.run([python, "-m", "venv", str(folder)], check=True)
+    subprocess.run([python, "-m", "venv", "--without-pip", str(folder)], check=True)
     program = folder / "bin" / "python"
-    done = pip(program, "install", "--require-hashes", "-r", str(ROOT / "requirements.lock"))
+    done = pip(program, "install", "--no-compile", "--require-hashes", "-r", str(ROOT / "requirements.lock"))
     if done.returncode != 0:
         pytest.skip(f"the packages cannot be had here: {done.stderr.strip().splitlines()[-1]}")
     return program

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from release.build import build
-from tests.packaging.builds import LONG, VERSIONS, environment_of, pip, python_of, without_ours
+from tests.packaging.builds import LONG, NODE_MODULES, VERSIONS, environment_of, pip, python_of, without_ours
 from tests.soak import rare
 
 pytestmark = pytest.mark.timeout(LONG)
@@ -23,7 +23,8 @@ def digests(folder: Path) -> dict[str, str]:
 
 def test_who_builds_when_and_where_makes_no_difference(built: Path, tmp_path: Path) -> None:
     other = {"TZ": "Asia/Tokyo", "PYTHONHASHSEED": "7", "LC_ALL": "C"}
-    assert build(tmp_path / "out", umask=0o077, environment=other) == digests(built)
+    modules = NODE_MODULES if NODE_MODULES.exists() else None
+    assert build(tmp_path / "out", umask=0o077, environment=other, node_modules=modules) == digests(built)
 
 
 @pytest.mark.soak

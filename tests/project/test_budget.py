@@ -67,7 +67,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114108,
+    "lines of code": 114121,
     "files": 950,
     "files of 1 to 30 lines of code": 74,
     "lines of imports": 11197,

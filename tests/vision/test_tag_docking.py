@@ -21,7 +21,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from tests.navigation.test_eyes import LEVEL
 from tests.navigation.test_robot import Room
-from tests.navigation.test_sensors import SIMULATORS
+from tests.navigation.test_sensors import SELDOM_PHYSICS
 
 pytestmark = pytest.mark.timeout(60)
 DT, RATE, VIEW = 0.05, 8.0, math.radians(30)  # [s], pictures in a second [Hz], half the view
@@ -154,7 +154,7 @@ class Docker:
         self.bench.run_until(lambda: bool(self.ends), 60.0)
 
 
-@SIMULATORS
+@SELDOM_PHYSICS
 def test_a_robot_that_looks_away_finds_its_dock_and_faces_it(tmp_path: Path, simulator: str) -> None:
     pytest.importorskip("cv2", reason="OpenCV is not installed")
     if simulator == "physics":

@@ -30,7 +30,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from tests.navigation.test_eyes import LEVEL
 from tests.navigation.test_robot import Room
-from tests.navigation.test_sensors import SIMULATORS
+from tests.navigation.test_sensors import SELDOM_PHYSICS
 from tests.parts.project import Project
 
 pytestmark = pytest.mark.timeout(60)
@@ -102,7 +102,7 @@ objects:
 """
 
 
-@SIMULATORS
+@SELDOM_PHYSICS
 def test_it_keeps_its_distance_to_somebody_who_walks(tmp_path: Path, simulator: str) -> None:
     pytest.importorskip("cv2", reason="OpenCV is not installed")
     if simulator == "physics":

@@ -199,7 +199,8 @@ def step_joint(
     cycle.observe()
     for request in inputs.requests:
         cycle.answer(request)
-    return replace(cycle.state, note=cycle.note()), tuple(cycle.actions)
+    state = replace(cycle.state, position=cycle.position, measured_at=cycle.measured_at, note=cycle.note())
+    return state, tuple(cycle.actions)
 
 
 class _Cycle:
@@ -208,23 +209,23 @@ class _Cycle:
     def __init__(self, state: JointCondition, inputs: JointInputs, now: float, policy: JointPolicy) -> None:
         self.inputs, self.now, self.policy = inputs, now, policy
         self.actions: list[JointAction] = []
-        if _finite(inputs.position) is not None:
-            state = replace(state, position=inputs.position, measured_at=inputs.measured_at)
+        is_new = _finite(inputs.position) is not None
         self.state = state
-        self.position = state.position
+        self.position, self.measured_at = (
+            (inputs.position, inputs.measured_at) if is_new else (state.position, state.measured_at)
+        )
         self.temperature = _finite(inputs.temperature)
-        self.age = now - state.measured_at
+        self.age = now - self.measured_at
         self.is_stale = self.age > policy.cycle * policy.hold_after
 
     def observe(self) -> None:
         """Take in what was measured: it counts before any request."""
-        was_lost, is_known = self.state.is_lost, self.state.base is not JointMode.UNKNOWN
-        self.state = replace(
-            self.state,
-            is_lost=(was_lost and self.is_stale) or (is_known and self.age > self.policy.fault_after),
-            hardware_error=self.inputs.hardware_error or self.state.hardware_error,
-            rest_until=self._rest_until(),
-        )
+        before, was_lost = self.state, self.state.is_lost
+        is_known = before.base is not JointMode.UNKNOWN
+        is_lost = (was_lost and self.is_stale) or (is_known and self.age > self.policy.fault_after)
+        error, until = self.inputs.hardware_error or before.hardware_error, self._rest_until()
+        if (is_lost, error, until) != (was_lost, before.hardware_error, before.rest_until):  # seldom: a copy takes long
+            self.state = replace(before, is_lost=is_lost, hardware_error=error, rest_until=until)
         if self.state.is_lost:
             self._lose()
         elif self.state.is_blocked:
@@ -316,7 +317,8 @@ class _Cycle:
             self.actions += [WriteGoal(self.position), TorqueOn()]
 
     def _become(self, base: JointMode) -> None:
-        self.state = replace(self.state, base=base)
+        if base is not self.state.base:
+            self.state = replace(self.state, base=base)
 
     def _objection(self, request: JointRequest) -> str:
         match request:

@@ -1,4 +1,4 @@
-"""Record the topics of a robot to an MCAP file, until Ctrl-C, or as an episode of a data set to learn from.
+"""Record the topics of a robot, until Ctrl-C: to an MCAP file, or to a data set to learn from.
 
 Payloads stay as they are on the bus, with the definitions of their types, so Foxglove, Lichtblick and ROS 2 can read
 them. A recorder that is killed loses at most half a second: the next one in its folder recovers its file.

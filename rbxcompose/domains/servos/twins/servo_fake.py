@@ -177,6 +177,7 @@ _READ_ONLY = ("model_number", "firmware", "moving", "hardware_error")
 class _Orders:
     """What the memory orders: positions in ticks, speeds in ticks/s."""
 
+    id: int
     has_torque: bool
     is_wheel: bool
     goal: int
@@ -246,7 +247,7 @@ class FakeServo:
     @property
     def id(self) -> int:
         """Return the id to which it listens."""
-        return self.get("id")
+        return self._orders.id
 
     @property
     def baud(self) -> int:
@@ -291,6 +292,7 @@ class FakeServo:
             per_tick = self.model.per_tick
             has_watchdog = "bus_watchdog" in self.model.items and self.get("bus_watchdog") > 0
             self._known = _Orders(
+                self.get("id"),
                 self.has_torque,
                 self.is_wheel,
                 self.get("goal_position"),
