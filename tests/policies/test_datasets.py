@@ -206,6 +206,7 @@ def test_what_does_not_fit_is_refused_and_nothing_is_lost(data_set: Path, tmp_pa
     write_recording(tmp_path / "wide.mcap", wide)
     numbers = [each for each in arm_with_cameras() if not isinstance(each[2], Image | CompressedImage)]
     write_recording(tmp_path / "blind.mcap", numbers)
+    write_recording(tmp_path / "grows.mcap", [*arm_with_cameras(), (11.0, "/front/image", picture(9, 80))])
     (tmp_path / "text.mcap").write_text("no recording")
     (tmp_path / "file").write_text("")
     for words, said in [
@@ -220,6 +221,10 @@ def test_what_does_not_fit_is_refused_and_nothing_is_lost(data_set: Path, tmp_pa
         (
             ("--append", "--fps", "10", "--from", "wide.mcap", "-o", "picks"),
             "'observation.images.front' is a video of 80 x 48 here, and a video of 64 x 48 in the episodes of 'picks'",
+        ),
+        (
+            ("--append", "--fps", "10", "--from", "grows.mcap", "-o", "picks"),
+            "'grows.mcap' is no episode: a picture has 80 x 48 pixels, others 64 x 48",
         ),
         (
             ("--append", "--fps", "10", "--from", "blind.mcap", "-o", "picks"),

@@ -7,6 +7,7 @@ own, which the format permits: another one is added without touching those that 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import field
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.files import read_regular, replace_file
+from rbxcompose.base.files import TEMPORARY, read_regular, replace_file
 from rbxcompose.domains.policies.episode import ACTION, PICTURES, STATE, EpisodeFrame, Features, NoEpisodeError
 from rbxcompose.msgs.images import Pixels, WrongPictureError, pixels
 from rbxcompose.msgs.sensor_msgs import Image
@@ -86,6 +87,7 @@ class Dataset:
         try:
             info = json.loads(read_regular(folder / _INFO, _LARGEST))
             version, found, paths = info["codebase_version"], info["fps"], (info["data_path"], info["video_path"])
+            dict(info["features"])
             counts = [info[f"total_{what}"] for what in ("episodes", "frames", "tasks")]
         except (OSError, ValueError, TypeError, KeyError):
             raise DatasetError(f"'{folder}' is no data set of LeRobot") from None
@@ -105,22 +107,11 @@ class Dataset:
             OSError: if it cannot be written; the data set is as before.
         """
         number, before = self.info["total_episodes"], self.info["total_frames"]
-        rest = iter(frames)
-        if (first := next(rest, None)) is None:
-            raise NoEpisodeError("it is shorter than a frame")
-        with ExitStack() as stack:
-            cameras = {name: _Camera.of(first.pictures[name]) for name in features.cameras}
-            self._fit(_described(features, cameras, self.info["fps"]))
-            for name, camera in cameras.items():
-                camera.open(stack, self._path(_VIDEO, number, f"{PICTURES}.{name}"), self.info["fps"])
-            state, action = [], []
-            for frame in chain((first,), rest):
-                state.append(frame.state)
-                action.append(frame.action)
-                for name, camera in cameras.items():
-                    camera.add(frame.pictures[name])
-        tasks = self._tasks(task)
-        length = len(state)
+        with ExitStack() as unfinished:
+            state, action, cameras = self._filmed(features, frames, number, unfinished)
+            for camera in cameras.values():
+                os.replace(camera.unfinished, camera.path)
+        tasks, length = self._tasks(task), len(state)
         places = np.arange(length)
         columns: dict[str, Array] = {
             **{STATE: np.array(state, np.float32), ACTION: np.array(action, np.float32)},
@@ -134,6 +125,31 @@ class Dataset:
         stats |= {f"{PICTURES}.{name}": camera.stats() for name, camera in cameras.items()}
         self._write(columns, stats, tasks, task)
         return length
+
+    def _filmed(
+        self, features: Features, frames: Iterable[EpisodeFrame], number: int, unfinished: ExitStack
+    ) -> tuple[list[tuple[float, ...]], list[tuple[float, ...]], dict[str, _Camera]]:
+        """Return the states, the actions and the cameras of an episode, whose videos are written but have no name yet.
+
+        `unfinished` removes those that never get one.
+        """
+        rest = iter(frames)
+        if (first := next(rest, None)) is None:
+            raise NoEpisodeError("it is shorter than a frame")
+        paths = {name: self._path(_VIDEO, number, f"{PICTURES}.{name}") for name in features.cameras}
+        cameras = {name: _Camera.of(first.pictures[name], path) for name, path in paths.items()}
+        self._fit(_described(features, cameras, self.info["fps"]))
+        state, action = [], []
+        with ExitStack() as open_videos:
+            for camera in cameras.values():
+                unfinished.callback(camera.unfinished.unlink, missing_ok=True)
+                camera.open(open_videos, self.info["fps"])
+            for frame in chain((first,), rest):
+                state.append(frame.state)
+                action.append(frame.action)
+                for name, camera in cameras.items():
+                    camera.add(frame.pictures[name])
+        return state, action, cameras
 
     def _fit(self, described: Mapping[str, Any]) -> None:
         known = self.info["features"]
@@ -223,8 +239,9 @@ def _words(feature: Mapping[str, Any] | None) -> str:
 class _Camera:
     """A camera of one episode: writes its pictures to a video."""
 
-    height: int
-    width: int
+    path: Path
+    size: tuple[int, ...]
+    """Of its pictures: rows and columns; a video has even sides."""
     stream: Any = None
     container: Any = None
     last: Pixels | None = None
@@ -233,16 +250,30 @@ class _Camera:
     """What statistics are made of: values of some pictures, for each colour."""
 
     @classmethod
-    def of(cls, message: Any) -> _Camera:
-        """Return one for pictures like this one; a video has even sides."""
-        height, width = _colours(message).shape[:2]
-        return cls(height - height % 2, width - width % 2)
+    def of(cls, message: Any, path: Path) -> _Camera:
+        """Return one for pictures like this one."""
+        return cls(path, _colours(message).shape[:2])
 
-    def open(self, stack: ExitStack, path: Path, rate: int) -> None:
-        """Begin a video."""
+    @property
+    def height(self) -> int:
+        """Return the rows of the video."""
+        return self.size[0] // 2 * 2
+
+    @property
+    def width(self) -> int:
+        """Return the columns of the video."""
+        return self.size[1] // 2 * 2
+
+    @property
+    def unfinished(self) -> Path:
+        """Return the name of the video until it is whole."""
+        return self.path.with_name(self.path.name + TEMPORARY)
+
+    def open(self, stack: ExitStack, rate: int) -> None:
+        """Begin the video."""
         import av
 
-        self.container = stack.enter_context(av.open(str(path), "w"))
+        self.container = stack.enter_context(av.open(str(self.unfinished), "w", format="mp4"))
         self.stream = self.container.add_stream(_CODEC, rate=rate, options=dict(_OPTIONS))
         self.stream.height, self.stream.width, self.stream.pix_fmt = self.height, self.width, "yuv420p"
         stack.callback(lambda: self.container.mux(self.stream.encode()))
@@ -252,19 +283,20 @@ class _Camera:
         import av
 
         try:
-            picture = _colours(message)[: self.height, : self.width]
+            picture = _colours(message)
         except WrongPictureError:
             if self.last is None:
                 raise
             picture = self.last
-        if picture.shape[:2] != (self.height, self.width):
-            height, width = picture.shape[:2]
-            raise WrongPictureError(f"a picture has {width} x {height} pixels, others {self.width} x {self.height}")
+        if picture.shape[:2] != self.size:
+            here, others = (f"{shape[1]} x {shape[0]}" for shape in (picture.shape, self.size))
+            raise WrongPictureError(f"a picture has {here} pixels, others {others}")
         self.last = picture
         if self.count % _SEEN == 0:
             self.seen.append(picture[::_STEP, ::_STEP].reshape(-1, 3))
         self.count += 1
-        self.container.mux(self.stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), "rgb24")))
+        even = np.ascontiguousarray(picture[: self.height, : self.width])
+        self.container.mux(self.stream.encode(av.VideoFrame.from_ndarray(even, "rgb24")))
 
     def stats(self) -> dict[str, Any]:
         """Return the statistics of its colours, from 0 to 1."""
