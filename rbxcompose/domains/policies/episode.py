@@ -69,11 +69,8 @@ class Sample:
 def sample_of(time: int, topic: str, role: SampleRole, message: Any) -> Sample | None:
     """Return what of a message is a sample: no depths, and no numbers that are not finite."""
     if role.feature == PICTURES:
-        return (
-            None
-            if role is SampleRole.PICTURE and message.encoding in DEPTHS
-            else Sample(time, topic, role, {}, message)
-        )
+        is_depth = role is SampleRole.PICTURE and message.encoding in DEPTHS
+        return None if is_depth else Sample(time, topic, role, {}, message)
     if role in (SampleRole.JOINTS, SampleRole.JOINT_COMMANDS):
         found = {f"{name}{POSITION}": float(at) for name, at in zip(message.name, message.position, strict=False)}
     else:
@@ -115,9 +112,8 @@ def features_of(samples: Iterable[Sample]) -> Features:
     if began is None or not first[STATE]:
         raise NoEpisodeError("nothing on 'joint_states' or 'odom': there is no state to learn from")
     if set(VELOCITIES) & first[STATE].keys():
-        first[ACTION] |= dict.fromkeys(
-            VELOCITIES, began
-        )  # a base that is never commanded rests: that is a command, too
+        # That a base rests while nobody commands it is a command, too.
+        first[ACTION] |= dict.fromkeys(VELOCITIES, began)
     if not first[ACTION]:
         raise NoEpisodeError("nothing on 'joint_commands' or 'cmd_vel': there is no command to learn")
     cameras: dict[str, str] = {}
