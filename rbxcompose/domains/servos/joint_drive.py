@@ -350,7 +350,7 @@ class PositionDrive(JointDrive):
 
     def _moved(self, dt: float) -> Iterator[Writes]:
         limiter = self.limiter
-        if limiter is None:
+        if limiter is None or limiter.is_settled:
             return
         before = self.joint.raws(limiter.position)
         goal = self.joint.raws(limiter.step(dt).position)

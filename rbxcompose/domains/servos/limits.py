@@ -148,6 +148,15 @@ class Limiter:
         """Return whether the last command did not move."""
         return self.velocity == 0.0
 
+    @property
+    def is_settled(self) -> bool:
+        """Return whether the next step changes nothing: it is where it is wanted, within its limits, and at rest."""
+        return (
+            self.velocity == self._wanted_velocity == 0.0
+            and self._wanted == self.position
+            and self.limits.least <= self.position <= self.limits.greatest
+        )
+
     def want(self, position: float, velocity: float = 0.0) -> str | None:
         """Set where to be at the end of the next step, and how fast to pass there; return why it is rejected, if it is.
 

@@ -67,7 +67,7 @@ class ControlItem:
                 return (1 << _DIRECTION) - 1
         return (1 << (8 * self.size)) - 1
 
-    def decode(self, data: bytes) -> int:
+    def decode(self, data: bytes | bytearray) -> int:
         """Return the raw value, with its sign, of `size` bytes."""
         value = int.from_bytes(data, "little", signed=self.coding is Coding.SIGNED)
         if self.coding is not Coding.DIRECTION:

@@ -276,7 +276,8 @@ class FakeServo:
     def get(self, item: str) -> int:
         """Return the raw value of an item."""
         where = self.model.item(item)
-        return where.decode(bytes(self.memory[where.address : where.end]))
+        begin = where.address
+        return where.decode(self.memory[begin : begin + where.size])
 
     def set(self, item: str, raw: int) -> None:
         """Set an item from outside, as if the servo had done it; what its table lacks has no effect."""

@@ -40,25 +40,25 @@ class TwinBus:
         """Return how well each servo answers, by id."""
         return self._statistics
 
-    def _asked(self, ids: Iterable[int]) -> Iterator[FakeServo]:
-        """Yield the servos of a request; those with power hear it, and obey also if they do not answer."""
+    def _asked(self, ids: Iterable[int]) -> Iterator[tuple[int, FakeServo]]:
+        """Yield the servos of a request by their ids; those with power hear it, and obey also if they do not answer."""
         if self._is_out:
             raise LostPortError("the simulated bus", "is unplugged")
         self.line.advance()
         wanted, now = set(ids), self._clock()
         for servo in self.line.servos:
-            if servo.id in wanted:
+            if (id_ := servo.id) in wanted:
                 if not servo.faults.is_off:
                     servo.heard = now
-                yield servo
+                yield id_, servo
 
-    def _answering(self, ids: Iterable[int]) -> Iterator[FakeServo]:
+    def _answering(self, ids: Iterable[int]) -> Iterator[tuple[int, FakeServo]]:
         now = self._clock()
-        for servo in self._asked(ids):
+        for id_, servo in self._asked(ids):
             if self._is_understood(servo):
-                statistics = self._statistics[servo.id]
+                statistics = self._statistics[id_]
                 statistics.misses, statistics.last_seen = 0, now
-                yield servo
+                yield id_, servo
 
     def _is_understood(self, servo: FakeServo) -> bool:
         """Tell whether a driver would understand the reply of a servo; count it if not."""
@@ -78,32 +78,32 @@ class TwinBus:
 
     def scan(self, ids: Iterable[int]) -> Iterator[FoundServo]:
         """Yield the servos that answer."""
-        for servo in self._answering(ids):
-            yield FoundServo(servo.id, servo.model.protocol, servo.model.number, servo.baud)
+        for id_, servo in self._answering(ids):
+            yield FoundServo(id_, servo.model.protocol, servo.model.number, servo.baud)
 
     def read(self, ids: Sequence[int], items: Sequence[str], *, budget: float | None = None) -> dict[int, ServoReading]:
         """Return the items of all servos that answered."""
-        found = {}
-        for servo in self._answering(ids):
-            self._statistics[servo.id].reads += 1
-            found[servo.id] = ServoReading({item: servo.get(item) for item in items}, self._clock(), servo.alert)
+        found, now = {}, self._clock()
+        for id_, servo in self._answering(ids):
+            self._statistics[id_].reads += 1
+            found[id_] = ServoReading({item: servo.get(item) for item in items}, now, servo.alert)
         return found
 
     def write(self, values: Mapping[int, Mapping[str, int]], *, is_confirmed: bool = False) -> set[int]:
         """Write raw values, by id and item; return the ids that failed."""
         failed = set(values)
-        for servo in self._asked(values):
+        for id_, servo in self._asked(values):
             if servo.faults.is_off:
                 continue
-            items = ((servo.model.item(name), raw) for name, raw in values[servo.id].items())
+            items = ((servo.model.item(name), raw) for name, raw in values[id_].items())
             results = [servo.write(item.address, item.encode(raw)) for item, raw in items]
             if not any(results) and (not is_confirmed or self._is_understood(servo)):
-                failed.discard(servo.id)
+                failed.discard(id_)
         return failed if is_confirmed else set()
 
     def reboot(self, id: int) -> bool:
         """Start a servo again, torque off."""
-        found = list(self._asked([id]))
+        found = [servo for _, servo in self._asked([id])]
         for servo in found:
             servo.reboot()
         return any(map(self._is_understood, found))
