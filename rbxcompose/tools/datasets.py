@@ -110,6 +110,8 @@ def _add_all(dataset: Dataset, wanted: WantedDataset, recordings: Sequence[Path]
 
 
 def _samples(path: Path, topics: EpisodeTopics) -> Iterator[Sample]:
+    """Yield the samples of a recording; one with an earlier time than the one before came together with that one."""
+    latest = 0
     with opened(path) as reader:
         for message in reader.messages():
             topic = message.topic
@@ -119,7 +121,8 @@ def _samples(path: Path, topics: EpisodeTopics) -> Iterator[Sample]:
                 decoded = decode(registry.message(topic.type), message.payload)
             except CdrError:
                 continue  # of a type with this name and other fields
-            if (sample := sample_of(message.log_time, topic.name, role, decoded)) is not None:
+            latest = max(latest, message.log_time)
+            if (sample := sample_of(latest, topic.name, role, decoded)) is not None:
                 yield sample
         if reader.damage:
             warn(DAMAGED.at(None, f"'{plain(str(path))}' is damaged: {reader.damage}"))

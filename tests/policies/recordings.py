@@ -21,11 +21,11 @@ Timed = tuple[float, str, Message]
 SIZE = 64, 48  # [pixels] of pictures, width and height
 
 
-def write_recording(path: Path, messages: Iterable[Timed]) -> Path:
-    """Write messages in the order of their times."""
+def write_recording(path: Path, messages: Iterable[Timed], *, is_sorted: bool = True) -> Path:
+    """Write messages in the order of their times, or as they come."""
     with path.open("wb") as file:
         writer = RecordingWriter(file)
-        for time, name, message in sorted(messages, key=lambda each: each[0]):
+        for time, name, message in sorted(messages, key=lambda each: each[0]) if is_sorted else messages:
             stamp = round(time * NANOSECONDS)
             topic = RecordedTopic(name, message.TYPE, "RIHS01_00", definition=definition_of(message.TYPE))
             writer.add(Recorded(topic, stamp, stamp, 0, encode(message)))

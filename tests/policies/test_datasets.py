@@ -245,6 +245,14 @@ def test_what_does_not_fit_is_refused_and_nothing_is_lost(data_set: Path, tmp_pa
     assert (done.returncode, "need --format lerobot" in done.stderr) == (2, True)
 
 
+def test_messages_that_came_together_may_stand_in_any_order(tmp_path: Path) -> None:
+    messages: list[Timed] = []
+    for turn in range(20):
+        messages += [(turn / 10 + 0.002, "/cmd_vel", Twist()), (turn / 10 + 0.001, "/odom", Odometry())]
+    write_recording(tmp_path / "r.mcap", messages, is_sorted=False)
+    assert "episode 0: 18 frames" in made(tmp_path, "--fps", "10", "--from", "r.mcap", "-o", "base")
+
+
 def test_a_broken_picture_is_the_one_before_and_a_first_one_is_an_error(tmp_path: Path) -> None:
     numbers = [each for each in arm_with_cameras() if not isinstance(each[2], Image | CompressedImage)]
     broken = (11.0, "/hand/image/compressed", CompressedImage(format="jpeg", data=jpeg(90).data[:200]))
