@@ -95,7 +95,7 @@ def _add_all(dataset: Dataset, wanted: WantedDataset, recordings: Sequence[Path]
     for path in recordings:
         name = plain(str(path))
         try:
-            features = features_of(_samples(path, wanted.topics))
+            features = features_of(_samples(path, wanted.topics, warns=True))
             episode = Episode(features, wanted.rate)
             length = dataset.add(features, episode.frames(_samples(path, wanted.topics)), wanted.task)
         except (NoEpisodeError, WrongPictureError, DatasetError) as error:
@@ -109,7 +109,7 @@ def _add_all(dataset: Dataset, wanted: WantedDataset, recordings: Sequence[Path]
                 emit(f"  {camera}: {count} of them have the picture before")
 
 
-def _samples(path: Path, topics: EpisodeTopics) -> Iterator[Sample]:
+def _samples(path: Path, topics: EpisodeTopics, *, warns: bool = False) -> Iterator[Sample]:
     """Yield the samples of a recording; one with an earlier time than the one before came together with that one."""
     latest = 0
     with opened(path) as reader:
@@ -124,5 +124,5 @@ def _samples(path: Path, topics: EpisodeTopics) -> Iterator[Sample]:
             latest = max(latest, message.log_time)
             if (sample := sample_of(latest, topic.name, role, decoded)) is not None:
                 yield sample
-        if reader.damage:
+        if reader.damage and warns:
             warn(DAMAGED.at(None, f"'{plain(str(path))}' is damaged: {reader.damage}"))

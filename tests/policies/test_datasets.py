@@ -265,6 +265,14 @@ def test_a_broken_picture_is_the_one_before_and_a_first_one_is_an_error(tmp_path
     assert "a compressed picture cannot be read" in made(tmp_path, "--from", "first.mcap", "-o", "first", code=1)
 
 
+def test_what_is_there_of_a_damaged_recording_becomes_an_episode(tmp_path: Path) -> None:
+    whole = write_recording(tmp_path / "whole.mcap", arm_with_cameras())
+    (tmp_path / "cut.mcap").write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    told = made(tmp_path, "--from", "cut.mcap", "-o", "cut")
+    assert told.count("warning[RBX9202]: 'cut.mcap' is damaged: it ends in the middle") == 1
+    assert "episode 0: " in told
+
+
 def test_without_the_extra_it_says_how_to_install_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(datasets, "_NEEDED", ("nothing_of_this_name",))
     assert "pip install 'rbxcompose[lerobot]'" in made(tmp_path, "--from", "r.mcap", code=1)
