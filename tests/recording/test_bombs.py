@@ -12,7 +12,9 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, Chunk, Message, Schema
 
 from rbxcompose.runtime.recording import reader
+from rbxcompose.runtime.recording.files import RecordingWriter
 from rbxcompose.runtime.recording.reader import RecordingReader
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
 
 HEAD = b"\x89MCAP0\r\n"
 CHANNEL_ID = 1
@@ -99,10 +101,20 @@ def test_chunks_that_unpack_to_more_than_a_recording_of_this_size_has_are_refuse
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(reader, "LARGEST", 1_000_000)
+    monkeypatch.setattr(reader, "_MOST_PACKED", 1000)
     data = HEAD + channel() + 20 * chunk(message(900_000))
     count, damage = read(data)
     assert 1 <= count < 5
     assert "it unpacks to more than a recording would" in damage
+
+
+def test_pictures_that_are_black_all_over_are_a_recording() -> None:
+    file, topic = io.BytesIO(), RecordedTopic("/image", "sensor_msgs/msg/Image", "RIHS01_00")
+    writer = RecordingWriter(file)
+    for time in range(40):
+        writer.add(Recorded(topic, time, time, time, bytes(1920 * 1080 * 3)))
+    writer.finish()
+    assert read(file.getvalue()) == (40, "")
 
 
 def test_a_chunk_above_the_limit_is_refused_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:

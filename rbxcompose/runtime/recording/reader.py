@@ -22,8 +22,9 @@ from rbxcompose.runtime.recording.topics import HASH, NODE, Recorded, RecordedTo
 from rbxcompose.sdk.ports import Qos
 
 LARGEST = 64 * 1024 * 1024  # bytes of a record, and of an unpacked chunk
-# No recording compresses better than this. A file that does was made to take memory and time.
-_MOST_PACKED = 1000  # unpacked bytes per byte of the file, beyond `LARGEST`
+# No recording compresses better than this: large pictures that are black all over come near. A file that does was made
+# to take time.
+_MOST_PACKED = 20_000  # unpacked bytes per byte of the file, beyond `LARGEST`
 _MOST_MESSAGES = 100_000  # beyond one per byte of the file: each differs from the one before in its time at least
 _RECORD = struct.Struct("<BQ")  # what a record begins with: its kind and its length
 _MAGIC = b"\x89MCAP0\r\n"
