@@ -71,13 +71,20 @@ def _kept(folder: Path) -> tuple[float, float]:
     with _up(folder, f"rbx: 1\nkind: Overlay\nname: measured\ncomponents:\n{cameras}") as environment:
         words = ["record", "--format", "lerobot", "-o", "data", "--fps", str(PICTURES), "--for", f"{SECONDS}s"]
         recorder = subprocess.Popen(
-            [*COMMAND, *words], cwd=folder, env={**os.environ, **environment}, stdout=subprocess.PIPE, text=True
+            [*COMMAND, *words],
+            cwd=folder,
+            env={**os.environ, **environment},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
         )
         time.sleep(SECONDS / 2)
         before, began = processor_time(recorder.pid), time.monotonic()
         time.sleep(SECONDS / 4)
         share = (processor_time(recorder.pid) - before) / (time.monotonic() - began)
         told, _ = recorder.communicate(timeout=60)
+    if recorder.returncode != 0:
+        raise RuntimeError(f"nothing was recorded: {told}")
     info = json.loads((folder / "data/meta/info.json").read_text(encoding="utf-8"))
     lines = [line.split() for line in told.splitlines() if line.startswith("/camera_")]
     if len(lines) != CAMERAS or sum("images" in name for name in info["features"]) != CAMERAS:
@@ -104,7 +111,7 @@ def rows() -> list[Row]:
         Row(
             name=f"data set: {CAMERAS} cameras of 640 x 480 at {PICTURES} Hz",
             unit="% of pictures",
-            how=f"`record --format lerobot`: those of the camera with fewest that are in it; the recorder took {recorder:.0f} % of a core",
+            how=f"those of the camera with fewest that are in it; the recorder took {recorder:.0f} % of a core",
             ours=kept,
             least=99,
         ),

@@ -18,6 +18,7 @@ from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, definit
 
 Timed = tuple[float, str, Message]
 """When a message came [s], its topic, and the message."""
+BEGIN = 1_795_000_000 * NANOSECONDS + 1  # [ns since 1970] of all times
 SIZE = 64, 48  # [pixels] of pictures, width and height
 
 
@@ -26,7 +27,7 @@ def write_recording(path: Path, messages: Iterable[Timed], *, is_sorted: bool = 
     with path.open("wb") as file:
         writer = RecordingWriter(file)
         for time, name, message in sorted(messages, key=lambda each: each[0]) if is_sorted else messages:
-            stamp = round(time * NANOSECONDS)
+            stamp = BEGIN + round(time * NANOSECONDS)
             topic = RecordedTopic(name, message.TYPE, "RIHS01_00", definition=definition_of(message.TYPE))
             writer.add(Recorded(topic, stamp, stamp, 0, encode(message)))
         writer.finish()

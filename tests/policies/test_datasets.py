@@ -31,7 +31,7 @@ from rbxcompose.msgs.sensor_msgs import CompressedImage, Image
 from rbxcompose.tools import datasets
 from tests.commands import command
 from tests.conftest import ROOT
-from tests.policies.recordings import SIZE, Timed, arm_with_cameras, joints, jpeg, picture, write_recording
+from tests.policies.recordings import BEGIN, SIZE, Timed, arm_with_cameras, joints, jpeg, picture, write_recording
 
 av = pytest.importorskip("av", reason="av is not installed")
 parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
@@ -44,7 +44,7 @@ def samples(messages: Sequence[Timed]) -> list[Sample]:
     for time, topic, message in sorted(messages, key=lambda each: each[0]):
         role = role_of(topic, message.TYPE)
         assert role
-        if (made := sample_of(round(time * NANOSECONDS), topic, role, message)) is not None:
+        if (made := sample_of(BEGIN + round(time * NANOSECONDS), topic, role, message)) is not None:
             found.append(made)
     return found
 
@@ -62,7 +62,7 @@ def test_a_frame_has_the_newest_state_and_the_last_command_before_the_next_frame
     features = features_of(made)
     frames = list(Episode(features, rate).frames(made))
     start, end = max(min(states), min(commands)), max(*states, *commands)
-    assert features.start == round(start * NANOSECONDS)
+    assert features.start == BEGIN + round(start * NANOSECONDS)
     for number, frame in enumerate(frames):
         now, then = start + number / rate, start + (number + 1) / rate
         assert then < end + 1e-6

@@ -166,9 +166,9 @@ class Episode:
             elif (name := names.get(sample.topic)) is not None:
                 self._pictures[name] = sample.picture
 
-    def _due(self) -> float:
-        """Return when the next frame begins [ns]."""
-        return self.features.start + self._count * NANOSECONDS / self.rate
+    def _due(self) -> int:
+        """Return when the next frame begins [ns]: a whole number, as a float of times since 1970 misses by 100 ns."""
+        return self.features.start + self._count * NANOSECONDS // self.rate
 
     def _next(self) -> Iterator[EpisodeFrame]:
         if self._seen is not None:
