@@ -195,6 +195,16 @@ def test_it_is_seen_how_components_are_wired_and_which_processes_run_them(
     expect(row).to_be_visible()
 
 
+def test_a_long_status_leaves_the_name_on_its_line(open_page: Callable[..., Page], robot: FakeGateway) -> None:
+    words = "head_pan_joint: it was too hot and rests for 49 s, then until 45 degC: it has 80 degC"
+    robot.windows[RUNNING] = {"stop": None, "components": [state("servos", state="failed", note=words)]}
+    page = open_page(page_name="robot")
+    card = page.get_by_label("servos", exact=True)
+    expect(card.get_by_role("status").first).to_contain_text(words)
+    heights = [heading.bounding_box() for heading in page.locator(".component h2").all()]
+    assert len({round(box["height"]) for box in heights if box}) == 1
+
+
 def test_it_fits_a_phone(open_page: Callable[..., Page], robot: FakeGateway) -> None:
     page = open_page(page_name="robot", viewport=PHONE, has_touch=True)
     expect(page.get_by_label("sprayer", exact=True)).to_be_visible()
