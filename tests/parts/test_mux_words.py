@@ -34,6 +34,21 @@ def test_the_first_selected_input_and_the_topic_of_a_lock_follow_their_new_names
     assert (mux.initial, list(mux.inputs), mux.locks["pause"].topic) == ("first", ["by_hand", "first"], "halt")
 
 
+def test_the_topic_that_a_mux_of_another_name_commands_follows_its_new_name(project: Project) -> None:
+    robot = """\
+        include:
+          one:
+            part: ../../parts/picker.yaml
+            connect: {cmd_vel: rear/cmd_vel}
+    """
+    picker = PICKER.replace("  cmd_vel:\n", "  wheels:\n    topic: cmd_vel\n")
+    checked = project.check(robot, {"picker": picker})
+    assert checked.codes == [], checked.text
+    mux = project.manifest.contents.of(muxes)["wheels"]
+    assert (mux.topic, list(mux.inputs)) == ("rear/cmd_vel", ["by_hand", "follow"])
+    assert project.value("components", "one_base", "connect") == {"cmd_vel": "rear/cmd_vel"}
+
+
 def test_a_profile_of_the_robot_chooses_another_mode(project: Project) -> None:
     robot = """\
         include:

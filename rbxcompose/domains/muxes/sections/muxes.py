@@ -163,6 +163,8 @@ def _rename(renames: Renames, name: str, node: TreeNode) -> TreeNode:
             changed[key] = Entry(entry.key, renames.topics(entry.value, f"{name}/"))
         elif key == "initial":
             changed[key] = Entry(entry.key, renames.texts(entry.value, renamed))
+        elif key == "topic":
+            changed[key] = Entry(entry.key, renames.texts(entry.value, renames.topic))
     return MappingNode(changed, node.span, node.tag)
 
 
