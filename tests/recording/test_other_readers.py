@@ -77,7 +77,8 @@ def test_rosbags_reads_events_of_actions_but_has_no_name_for_those_of_services(t
 @pytest.fixture
 def rerun(tmp_path: Path) -> list[str]:
     """The command of Rerun, in a home of its own, in which it tells nobody what it is used for."""
-    if (program := shutil.which("rerun")) is None:
+    here = str(Path(sys.executable).parent)  # of the environment that runs the tests, even if that is not active
+    if (program := shutil.which("rerun", path=f"{here}{os.pathsep}{os.environ.get('PATH', '')}")) is None:
         pytest.skip("rerun is not installed: pip install rerun-sdk")
     words = ["env", f"HOME={tmp_path}", f"XDG_CONFIG_HOME={tmp_path}/config", program]
     subprocess.run([*words, "analytics", "disable"], capture_output=True, timeout=30, check=True)
