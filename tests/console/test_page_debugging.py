@@ -214,10 +214,10 @@ def test_who_only_looks_sees_breakpoints_and_no_buttons(open_page: Callable[...,
 
 def test_breakpoints_are_set_before_the_first_run(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
     patrol.windows["mission/ListMissions"] = listed("idle")
-    patrol.windows[LOOK_AT] = None
+    del patrol.windows[LOOK_AT]
+    patrol.latched[f"/console/windows/{LOOK_AT}"] = {"refused": "mission patrol has not been running"}
     patrol.answers["mission.ShowPicture"] = lambda _: picture()
     page = open_page(page_name="mission")
-    patrol.say(f"/console/windows/{LOOK_AT}", {"refused": "mission patrol has not been running"})
     page.get_by_role("button", name="Breakpoint at go_to dock").click()
     done(page, "SetBreakpoint")
 
