@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -75,20 +77,34 @@ def write_dataset(wanted: WantedDataset, recordings: Sequence[Path]) -> None:
     Raises:
         NotDoneError: if that cannot be.
     """
-    if wanted.is_added:
-        _add_all(Dataset.read(wanted.folder, wanted.rate), wanted, recordings)
-        return
     try:
+        if wanted.is_added:
+            with _alone_in(wanted.folder):
+                _add_all(Dataset.read(wanted.folder, wanted.rate), wanted, recordings)
+            return
         folder = Path(tempfile.mkdtemp(prefix=f".{wanted.folder.name}.", dir=wanted.folder.parent))
+        try:
+            _add_all(Dataset.new(folder, wanted.robot, wanted.rate), wanted, recordings)
+            folder.chmod(0o755)
+            os.rename(folder, wanted.folder)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+    except DatasetError as error:  # it has changed since the recording began
+        raise NotDoneError(NO_DATASET.at(None, plain(str(error)))) from error
     except OSError as error:
-        words = f"'{plain(str(wanted.folder))}' cannot be made: {error.strerror}"
+        words = f"'{plain(str(wanted.folder))}' cannot be written: {plain(error.strerror or str(error))}"
         raise NotDoneError(NO_DATASET.at(None, words)) from error
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Wait until nobody else adds an episode to a data set: both would be the same one."""
+    descriptor = os.open(folder, os.O_RDONLY)
     try:
-        _add_all(Dataset.new(folder, wanted.robot, wanted.rate), wanted, recordings)
-        folder.chmod(0o755)
-        os.rename(folder, wanted.folder)
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
     finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        os.close(descriptor)
 
 
 def _add_all(dataset: Dataset, wanted: WantedDataset, recordings: Sequence[Path]) -> None:
@@ -98,11 +114,10 @@ def _add_all(dataset: Dataset, wanted: WantedDataset, recordings: Sequence[Path]
             features = features_of(_samples(path, wanted.topics, warns=True))
             episode = Episode(features, wanted.rate)
             length = dataset.add(features, episode.frames(_samples(path, wanted.topics)), wanted.task)
-        except (NoEpisodeError, WrongPictureError, DatasetError) as error:
+        except DatasetError as error:
+            raise NotDoneError(NO_DATASET.at(None, f"'{name}' is not added: {plain(str(error))}")) from error
+        except (NoEpisodeError, WrongPictureError) as error:
             raise NotDoneError(NO_DATASET.at(None, f"'{name}' is no episode: {plain(str(error))}")) from error
-        except OSError as error:
-            words = f"'{plain(str(wanted.folder))}' cannot be written: {plain(error.strerror or str(error))}"
-            raise NotDoneError(NO_DATASET.at(None, words)) from error
         emit(f"episode {dataset.info['total_episodes'] - 1}: {length} frames in {length / wanted.rate:.1f} s")
         for camera, count in episode.repeated.items():
             if count:

@@ -253,6 +253,18 @@ def test_messages_that_came_together_may_stand_in_any_order(tmp_path: Path) -> N
     assert "episode 0: 18 frames" in made(tmp_path, "--fps", "10", "--from", "r.mcap", "-o", "base")
 
 
+def test_a_data_set_with_damaged_files_is_refused_and_nothing_is_added(data_set: Path, tmp_path: Path) -> None:
+    write_recording(tmp_path / "r.mcap", arm_with_cameras())
+    for name in ("meta/stats.json", "meta/tasks.parquet"):
+        copy = tmp_path / Path(name).stem
+        shutil.copytree(data_set, copy)
+        (copy / name).write_bytes(b"{}")
+        before = sorted(copy.rglob("*.mp4*"))
+        told = made(tmp_path, "--append", "--fps", "10", "--from", "r.mcap", "-o", copy.name, code=1)
+        assert f"'r.mcap' is not added: '{copy.name}/{name}' cannot be read" in told
+        assert sorted(copy.rglob("*.mp4*")) == before
+
+
 def test_a_broken_picture_is_the_one_before_and_a_first_one_is_an_error(tmp_path: Path) -> None:
     numbers = [each for each in arm_with_cameras() if not isinstance(each[2], Image | CompressedImage)]
     broken = (11.0, "/hand/image/compressed", CompressedImage(format="jpeg", data=jpeg(90).data[:200]))

@@ -50,7 +50,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/diagnostics": Cost(code=2349, files=24, small=4, imports=214),
     "domains/muxes": Cost(code=2034, files=15, small=1, imports=122),
     "domains/navigation": Cost(code=3952, files=30, small=2, imports=384),
-    "domains/policies": Cost(code=841, files=9, small=0, imports=91),
+    "domains/policies": Cost(code=856, files=9, small=0, imports=91),
     "domains/power": Cost(code=461, files=6, small=0, imports=37),
     "domains/programs": Cost(code=3781, files=30, small=1, imports=374),
     "domains/servos": Cost(code=7905, files=52, small=1, imports=582),
@@ -62,15 +62,15 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "runtime": Cost(code=7574, files=46, small=1, imports=707),
     "sdk": Cost(code=1467, files=12, small=2, imports=156),
     "testing": Cost(code=629, files=7, small=2, imports=78),
-    "tools": Cost(code=18200, files=143, small=10, imports=1972),
+    "tools": Cost(code=18212, files=143, small=10, imports=1974),
 }
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114148,
+    "lines of code": 114175,
     "files": 950,
     "files of 1 to 30 lines of code": 74,
-    "lines of imports": 11198,
+    "lines of imports": 11200,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 388,

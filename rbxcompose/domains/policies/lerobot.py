@@ -87,11 +87,11 @@ class Dataset:
         try:
             info = json.loads(read_regular(folder / _INFO, _LARGEST))
             version, found, paths = info["codebase_version"], info["fps"], (info["data_path"], info["video_path"])
-            dict(info["features"])
             counts = [info[f"total_{what}"] for what in ("episodes", "frames", "tasks")]
+            is_whole = all(isinstance(count, int) for count in counts) and isinstance(info["features"], dict)
         except (OSError, ValueError, TypeError, KeyError):
             raise DatasetError(f"'{folder}' is no data set of LeRobot") from None
-        if version != VERSION or paths != (_DATA, _VIDEO) or not all(isinstance(count, int) for count in counts):
+        if version != VERSION or paths != (_DATA, _VIDEO) or not is_whole:
             raise DatasetError(f"'{folder}' is a data set of another kind ('{version}')")
         if found != rate:
             raise DatasetError(f"'{folder}' has {found} frames per second, not {rate}")
@@ -101,7 +101,7 @@ class Dataset:
         """Add an episode; return how many frames it has.
 
         Raises:
-            DatasetError: if it does not fit to those that are there.
+            DatasetError: if it does not fit to those that are there, or a file of theirs is damaged.
             NoEpisodeError: if it has no frames.
             WrongPictureError: if a picture is none.
             OSError: if it cannot be written; the data set is as before.
@@ -109,21 +109,22 @@ class Dataset:
         number, before = self.info["total_episodes"], self.info["total_frames"]
         with ExitStack() as unfinished:
             state, action, cameras = self._filmed(features, frames, number, unfinished)
+            tasks, length = self._tasks(task), len(state)
+            places = np.arange(length)
+            columns: dict[str, Array] = {
+                **{STATE: np.array(state, np.float32), ACTION: np.array(action, np.float32)},
+                "timestamp": (places / self.info["fps"]).astype(np.float32),
+                "frame_index": places,
+                "episode_index": np.full(length, number),
+                "index": before + places,
+                "task_index": np.full(length, tasks.index(task)),
+            }
+            stats = {name: _stats(values.reshape(length, -1)) for name, values in columns.items()}
+            stats |= {f"{PICTURES}.{name}": camera.stats() for name, camera in cameras.items()}
+            whole = self._all_stats(stats)
             for camera in cameras.values():
                 os.replace(camera.unfinished, camera.path)
-        tasks, length = self._tasks(task), len(state)
-        places = np.arange(length)
-        columns: dict[str, Array] = {
-            **{STATE: np.array(state, np.float32), ACTION: np.array(action, np.float32)},
-            "timestamp": (places / self.info["fps"]).astype(np.float32),
-            "frame_index": places,
-            "episode_index": np.full(length, number),
-            "index": before + places,
-            "task_index": np.full(length, tasks.index(task)),
-        }
-        stats = {name: _stats(values.reshape(length, -1)) for name, values in columns.items()}
-        stats |= {f"{PICTURES}.{name}": camera.stats() for name, camera in cameras.items()}
-        self._write(columns, stats, tasks, task)
+        self._write(columns, stats, whole, tasks, task)
         return length
 
     def _filmed(
@@ -161,7 +162,15 @@ class Dataset:
                 there, here = (_words(each.get(name)) for each in (known, described))
                 raise DatasetError(f"'{name}' is {here} here, and {there} in the episodes of '{self.folder}'")
 
-    def _write(self, columns: Mapping[str, Array], stats: Mapping[str, Any], tasks: Sequence[str], task: str) -> None:
+    def _write(
+        self,
+        columns: Mapping[str, Array],
+        stats: Mapping[str, Any],
+        whole: Mapping[str, Any],
+        tasks: Sequence[str],
+        task: str,
+    ) -> None:
+        """Write the tables of an episode, and with them the statistics of the `whole` data set."""
         number, length = self.info["total_episodes"], len(columns["index"])
         place = {"chunk_index": number // _CHUNK, "file_index": number % _CHUNK}
         row: dict[str, Any] = {"episode_index": number, "tasks": [task], "length": length}
@@ -173,14 +182,12 @@ class Dataset:
                 row |= {f"videos/{name}/from_timestamp": 0.0, f"videos/{name}/to_timestamp": length / self.info["fps"]}
         row |= {f"stats/{name}/{key}": value for name, each in stats.items() for key, value in each.items()}
         row |= {f"meta/episodes/{key}": value for key, value in place.items()}
-        known = self.folder / _STATS
-        whole = _together(json.loads(read_regular(known, _LARGEST)), stats) if number else stats
         counts = {"total_episodes": number + 1, "total_frames": row["dataset_to_index"], "total_tasks": len(tasks)}
         info = self.info | counts | {"splits": {"train": f"0:{number + 1}"}}
         replace_file(self._path(_DATA, number), _parquet(columns))
         replace_file(self._path(_EPISODES, number), _parquet({key: [value] for key, value in row.items()}))
         replace_file(self.folder / _TASKS, _task_table(tasks))
-        replace_file(known, _json(whole))
+        replace_file(self.folder / _STATS, _json(whole))
         replace_file(self.folder / _INFO, _json(info))  # the last one: it says what counts
         self.info = info
 
@@ -196,10 +203,26 @@ class Dataset:
             return [task]
         from pyarrow import parquet
 
-        table = parquet.read_table(self.folder / _TASKS).to_pydict()
-        pairs = sorted(zip(table["task_index"], next(v for k, v in table.items() if k != "task_index"), strict=True))
-        found = [name for _, name in pairs]
+        try:
+            table = parquet.read_table(self.folder / _TASKS).to_pydict()
+            texts = next(values for name, values in table.items() if name != "task_index")
+            found = [name for _, name in sorted(zip(table["task_index"], texts, strict=True))]
+        except (OSError, ValueError, KeyError, StopIteration) as error:
+            raise DatasetError(f"'{self.folder / _TASKS}' cannot be read") from error
         return found if task in found else [*found, task]
+
+    def _all_stats(self, added: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return the statistics of all episodes, with those of one that is added.
+
+        Quantiles are the means of those of the episodes, as LeRobot has them.
+        """
+        if not self.info["total_episodes"]:
+            return added
+        try:
+            before = json.loads(read_regular(self.folder / _STATS, _LARGEST))
+            return {name: _merged(before[name], stats) for name, stats in added.items()}
+        except (OSError, ValueError, TypeError, KeyError) as error:
+            raise DatasetError(f"'{self.folder / _STATS}' cannot be read") from error
 
 
 def _described(features: Features, cameras: Mapping[str, _Camera], rate: int) -> dict[str, Any]:
@@ -326,17 +349,12 @@ def _unpacked(data: bytes) -> Pixels:
 
 
 def _stats(values: Array) -> dict[str, list[Any]]:
-    """Return the statistics of columns, as LeRobot normalises by them."""
+    """Return the statistics of each column of `values`, rows x columns, as LeRobot normalises by them."""
     found = {"min": values.min(0), "max": values.max(0)}
     found |= {"mean": values.mean(0, np.float64), "std": values.std(0, np.float64)}
     shares = np.quantile(values, list(_SHARES.values()), axis=0)
     found |= dict(zip(_SHARES, shares, strict=True))
     return {name: each.tolist() for name, each in found.items()} | {"count": [len(values)]}
-
-
-def _together(before: Mapping[str, Any], added: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the statistics of all episodes; quantiles are the means of those of the episodes, as LeRobot has them."""
-    return {name: _merged(before[name], added[name]) for name in added}
 
 
 def _merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
