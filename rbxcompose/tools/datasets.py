@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import alone_in
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import NotDoneError, emit
@@ -79,7 +78,7 @@ def write_dataset(wanted: WantedDataset, recordings: Sequence[Path]) -> None:
     """
     try:
         if wanted.is_added:
-            with _alone_in(wanted.folder):
+            with alone_in(wanted.folder):  # two recorders would write the same episode
                 _add_all(Dataset.read(wanted.folder, wanted.rate), wanted, recordings)
             return
         folder = Path(tempfile.mkdtemp(prefix=f".{wanted.folder.name}.", dir=wanted.folder.parent))
@@ -94,17 +93,6 @@ def write_dataset(wanted: WantedDataset, recordings: Sequence[Path]) -> None:
     except OSError as error:
         words = f"'{plain(str(wanted.folder))}' cannot be written: {plain(error.strerror or str(error))}"
         raise NotDoneError(NO_DATASET.at(None, words)) from error
-
-
-@contextmanager
-def _alone_in(folder: Path) -> Iterator[None]:
-    """Wait until nobody else adds an episode to a data set: both would be the same one."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(descriptor)
 
 
 def _add_all(dataset: Dataset, wanted: WantedDataset, recordings: Sequence[Path]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.clock import NANOSECONDS
+from rbxcompose.base.files import alone_in
 from rbxcompose.domains.policies.episode import (
     Episode,
     NoEpisodeError,
@@ -288,3 +290,14 @@ def test_what_is_there_of_a_damaged_recording_becomes_an_episode(tmp_path: Path)
 def test_without_the_extra_it_says_how_to_install_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(datasets, "_NEEDED", ("nothing_of_this_name",))
     assert "pip install 'rbxcompose[lerobot]'" in made(tmp_path, "--from", "r.mcap", code=1)
+
+
+def test_of_two_who_add_to_a_data_set_one_waits(data_set: Path, tmp_path: Path) -> None:
+    shutil.copytree(data_set, tmp_path / "picks")
+    write_recording(tmp_path / "r.mcap", arm_with_cameras())
+    words = ("record", "--format", "lerobot", "--append", "--fps", "10", "--from", "r.mcap", "-o", "picks")
+    command_line = [sys.executable, "-m", "rbxcompose", *words]
+    with alone_in(tmp_path / "picks"):
+        two = [subprocess.Popen(command_line, cwd=tmp_path, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    told = sorted(each.communicate(timeout=60)[0].partition(":")[0] for each in two)
+    assert told == ["episode 3", "episode 4"]
