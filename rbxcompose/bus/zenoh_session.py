@@ -16,11 +16,12 @@ from rbxcompose.bus.endpoints import LINK_LEASE, is_private, socket_of, tcp_endp
 
 LEASE = round(1000 * LINK_LEASE)  # [ms] until a silent link counts as lost
 PATIENCE, LONGER = 1000, 5000  # [ms] that a visitor waits for a router, and a process that cannot do without it
-THREADS = "(rx: (worker_threads: 2), acc: (handover: rx), net: (handover: rx), app: (handover: rx))"
-"""Which threads Zenoh has: two that receive and do all else, and one that sends.
+THREADS = "(rx: (worker_threads: 2), acc: (handover: rx), app: (handover: rx))"
+"""Which threads Zenoh has: two that receive, one that sends, and one that keeps the network.
 
 By default there are six, and a message passes three of them: one sees it, one reads it, one watches meanwhile. Those
-that send must not be those that receive, or Zenoh waits for itself.
+that send must not be those that receive, or Zenoh waits for itself. And what keeps the network must not wait for
+Python: withdrawing a latched publisher holds Python's lock until that thread has ended a task.
 """
 _THREADS_WITH_LINKS = "(rx: (worker_threads: 2))"
 """Which threads a router has that is linked with others: those of Zenoh's defaults.

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import zenoh
 from zenoh import ext
-from zenoh.handlers import Callback
+from zenoh.handlers import Callback, RingChannel
 
 from rbxcompose.bus.local import Post
 from rbxcompose.bus.transport import EXPIRED, Arrival, Closable, OnReply, Question, RemotePublisher, TransportReply
@@ -193,9 +193,16 @@ class _Publisher(_Sender):
     def __init__(
         self, declared: dict[_Declared, None], declare: Callable[[], Any], on_own: OnOwn, *, blocks: bool
     ) -> None:
-        self.has_match = False
+        self._matches = False
+        self._statuses: Any = None
         self._blocks = blocks
         super().__init__(declared, declare, on_own)
+
+    @property
+    def has_match(self) -> bool:
+        if self._statuses is not None and (status := self._statuses.try_recv()) is not None:
+            self._matches = status.matching
+        return self._matches
 
     def put(self, payload: bytes, attachment: bytes) -> None:
         if self._blocks or self._entity is None:
@@ -207,15 +214,16 @@ class _Publisher(_Sender):
         super()._declare(declare)
         if (publisher := self._entity) is None:
             return
-        # A listener, since querying the status costs as much as sending. It reports only changes; and contrary to its
+        # A listener, since querying the status costs as much as sending; without a callback, since Zenoh runs one where
+        # it ends tasks, which may be awaited by who holds Python's lock. It reports only changes; and contrary to its
         # type stub, the status is an object, which is always true.
-        publisher.declare_matching_listener(_direct(self._match))
+        self._statuses = publisher.declare_matching_listener(RingChannel(1))
         status: Any = publisher.matching_status
-        if status.matching:
-            self.has_match = True
+        self._matches = status.matching
 
-    def _match(self, status: zenoh.MatchingStatus) -> None:
-        self.has_match = status.matching
+    def _withdraw(self) -> None:
+        self._statuses, self._matches = None, False
+        super()._withdraw()
 
 
 class _LatchedPublisher(_Sender):

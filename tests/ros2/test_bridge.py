@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -229,20 +230,22 @@ def test_what_ros_has_is_listed_and_pinned(robot: Robot, tmp_path: Path) -> None
 
 @pytest.mark.parametrize("what", ["node.py", "ros_side.py"])
 def test_a_side_that_is_killed_comes_back_and_meanwhile_the_base_rests(robot: Robot, what: str) -> None:
-    ours = robot.told("ps")["components"]
-    process = next(one["pid"] for one in ours if one["name"] == "somebody")
-    victims = [pid for pid in descendants(process) if what in command_of(pid)]
-    assert victims
-    for pid in victims:
+    until(robot, lambda: pids_of(robot, what))
+    restarted = int(somebody(robot)["restarts"])
+    for pid in pids_of(robot, what):
         os.kill(pid, signal.SIGKILL)
-    until(robot, lambda: restarts(robot) > 0)
+    until(robot, lambda: int(somebody(robot)["restarts"]) > restarted)
     before = x_of(robot)
     until(robot, lambda: x_of(robot) > before + 0.05)
     assert "was killed by SIGKILL" in robot.do("logs").stdout
 
 
-def restarts(robot: Robot) -> int:
-    return next(int(one["restarts"]) for one in robot.told("ps")["components"] if one["name"] == "somebody")
+def somebody(robot: Robot) -> dict[str, Any]:
+    return next(one for one in robot.told("ps")["components"] if one["name"] == "somebody")
+
+
+def pids_of(robot: Robot, what: str) -> list[int]:
+    return [pid for pid in descendants(somebody(robot)["pid"]) if what in command_of(pid)]
 
 
 def descendants(pid: int) -> Iterator[int]:
@@ -257,8 +260,7 @@ def command_of(pid: int) -> str:
 
 
 def test_nothing_is_left_after_down(robot: Robot) -> None:
-    process = next(one["pid"] for one in robot.told("ps")["components"] if one["name"] == "somebody")
-    left = [Process.of(pid) for pid in descendants(process)]
+    left = [Process.of(pid) for pid in descendants(somebody(robot)["pid"])]
     robot.do("down")
     assert not any(one.is_running for one in left)
 
