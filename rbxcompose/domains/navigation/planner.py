@@ -106,7 +106,22 @@ def _plan_for(
         elif costs.clear_at(goal) < 0:
             words = "with its heading, the robot does not fit at the goal"
         raise NoPathError(words, away, is_final=costs.is_wall(goal.x, goal.y))
-    return _smoothed(costs, weights, found.cells, start, goal)
+    end = _end_with_room(costs, found.cells, start, goal)
+    return _smoothed(costs, weights, found.cells, start, end if end.distance(goal) <= tolerance else goal)
+
+
+def _end_with_room(costs: LayeredCosts, cells: list[Cell], start: Pose2, goal: Pose2) -> Pose2:
+    """Return the goal, or the middle of its cell if the last step has room only there: it is short, so that its heading
+    depends much on where in the cell it ends."""
+    if len(cells) == 1 or costs.cell_of(goal.x, goal.y) != cells[-1]:
+        return goal
+    places = costs.grid.to_points(np.array([(column + 0.5, row + 0.5) for row, column in cells[-3:]]))
+    if len(cells) <= len(places):
+        places[0] = start.x, start.y
+    *_, before = start.heading, *np.arctan2(*np.diff(places[:-1], axis=0).T[::-1])
+    if _has_room(costs, places[-2], np.array((goal.x, goal.y)), before, goal.heading):
+        return goal
+    return Pose2(*places[-1].tolist(), goal.heading)
 
 
 def _weights(costs: LayeredCosts) -> Grid:
