@@ -43,15 +43,14 @@ lerobot: .lerobot/.made  ## LeRobot in an environment of its own, 8 GB: its read
 	.lerobot/bin/python -m pip install -q --disable-pip-version-check lerobot==0.4.4
 	@touch $@
 
-test: lint  ## Types are checked in the time in which tests wait
-	$(MAKE) --no-print-directory -j2 types unit
+test: lint types unit
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
 types: messages
-	nice -n 19 $(BIN)/mypy
+	$(BIN)/mypy
 
 unit: $(VENV)/.test  ## On all cores; `make unit PYTEST="-n 0 tests/bus"` runs some tests in one process
 	$(BIN)/python -m pytest -q $(PYTEST)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,15 @@ ROBOT = "robots/turtlebot/robot.yaml"
 MISSION = "missions/patrol.yaml"
 AT = {"line": 0, "character": 1}
 RANGE = {"start": AT, "end": AT}
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
+    """One server for all tests: no question spoils the answers to the next ones."""
+    with Client(tmp_path_factory.mktemp("editor")) as client:
+        yield client
+    assert client.process.returncode == 0
+    assert client.errors == b""
 
 
 @pytest.fixture
@@ -46,95 +56,78 @@ def answers(client: Client, uri: str, at: dict[str, int] = AT) -> list[Any]:
 NOTHING: list[Any] = [[], None, None, [], [], []]
 
 
-def ends_well(client: Client) -> None:
-    assert client.process.returncode == 0
-    assert client.errors == b""
+def test_of_a_file_that_never_was_nothing_is_known(client: Client, project: Path) -> None:
+    for uri in ((project / "none.yaml").as_uri(), project.as_uri(), "untitled:1", "git:/a?b", "file:///a%00b", ""):
+        assert answers(client, uri) == NOTHING, uri
+        spot = {"textDocument": {"uri": uri}, "position": AT}
+        assert client.ask("textDocument/prepareRename", **spot) is None
+        assert client.ask("textDocument/rename", **spot, newName="other") is None
+        client.tell("textDocument/didSave", textDocument={"uri": uri})
+        client.tell("textDocument/didClose", textDocument={"uri": uri})
 
 
-def test_of_a_file_that_never_was_nothing_is_known(project: Path) -> None:
-    with Client(project) as client:
-        for uri in ((project / "none.yaml").as_uri(), project.as_uri(), "untitled:1", "git:/a?b", "file:///a%00b", ""):
-            assert answers(client, uri) == NOTHING, uri
-            spot = {"textDocument": {"uri": uri}, "position": AT}
-            assert client.ask("textDocument/prepareRename", **spot) is None
-            assert client.ask("textDocument/rename", **spot, newName="other") is None
-            client.tell("textDocument/didSave", textDocument={"uri": uri})
-            client.tell("textDocument/didClose", textDocument={"uri": uri})
-    ends_well(client)
-
-
-def test_of_a_file_that_is_no_text_nothing_is_known(project: Path) -> None:
+def test_of_a_file_that_is_no_text_nothing_is_known(client: Client, project: Path) -> None:
     (project / "picture.yaml").write_bytes(b"\x89PNG\xff\xfe")
-    with Client(project) as client:
-        assert answers(client, (project / "picture.yaml").as_uri()) == NOTHING
-    ends_well(client)
+    assert answers(client, (project / "picture.yaml").as_uri()) == NOTHING
 
 
 @pytest.mark.parametrize("name", [ROBOT, MISSION])
-def test_a_file_that_is_deleted_while_it_is_open_keeps_its_answers_until_it_is_closed(name: str, project: Path) -> None:
+def test_a_file_that_is_deleted_while_it_is_open_keeps_its_answers_until_it_is_closed(
+    name: str, client: Client, project: Path
+) -> None:
     path = project / name
-    with Client(project) as client:
-        opened(client, path)
-        assert client.diagnostics(path.as_uri()) == []
-        path.unlink()
-        client.tell("textDocument/didSave", textDocument={"uri": path.as_uri()})
-        client.diagnostics(path.as_uri())
-        assert client.ask("textDocument/documentSymbol", textDocument={"uri": path.as_uri()})
-        client.tell("textDocument/didClose", textDocument={"uri": path.as_uri()})
-        assert client.diagnostics(path.as_uri()) == []
-        assert answers(client, path.as_uri()) == NOTHING
-    ends_well(client)
+    opened(client, path)
+    assert client.diagnostics(path.as_uri()) == []
+    path.unlink()
+    client.tell("textDocument/didSave", textDocument={"uri": path.as_uri()})
+    client.diagnostics(path.as_uri())
+    assert client.ask("textDocument/documentSymbol", textDocument={"uri": path.as_uri()})
+    client.tell("textDocument/didClose", textDocument={"uri": path.as_uri()})
+    assert client.diagnostics(path.as_uri()) == []
+    assert answers(client, path.as_uri()) == NOTHING
 
 
-def test_a_file_that_is_renamed_is_known_by_its_new_name(project: Path) -> None:
+def test_a_file_that_is_renamed_is_known_by_its_new_name(client: Client, project: Path) -> None:
     path, new = project / ROBOT, project / "robots/turtlebot/other.yaml"
     wrong = path.read_text("utf-8").replace("runtime: 45", "runtme: 45")
-    with Client(project) as client:
-        opened(client, path, wrong)
-        assert [found["code"] for found in client.diagnostics(path.as_uri())] == ["RBX1001"]
-        path.rename(new)
-        client.tell("textDocument/didClose", textDocument={"uri": path.as_uri()})
-        assert client.diagnostics(path.as_uri()) == []
-        opened(client, new, wrong)
-        assert [found["code"] for found in client.diagnostics(new.as_uri())] == ["RBX1001"]
-        assert answers(client, path.as_uri()) == NOTHING
-        assert client.ask("textDocument/documentSymbol", textDocument={"uri": new.as_uri()})
-    ends_well(client)
+    opened(client, path, wrong)
+    assert [found["code"] for found in client.diagnostics(path.as_uri())] == ["RBX1001"]
+    path.rename(new)
+    client.tell("textDocument/didClose", textDocument={"uri": path.as_uri()})
+    assert client.diagnostics(path.as_uri()) == []
+    opened(client, new, wrong)
+    assert [found["code"] for found in client.diagnostics(new.as_uri())] == ["RBX1001"]
+    assert answers(client, path.as_uri()) == NOTHING
+    assert client.ask("textDocument/documentSymbol", textDocument={"uri": new.as_uri()})
 
 
-def test_a_project_that_is_moved_while_it_is_open_is_known_where_it_is(project: Path) -> None:
+def test_a_project_that_is_moved_while_it_is_open_is_known_where_it_is(client: Client, project: Path) -> None:
     path = project / MISSION
     text = path.read_text("utf-8")
-    with Client(project.parent) as client:
-        opened(client, path, text)
-        assert client.diagnostics(path.as_uri()) == []
-        new = project.rename(project.with_name("moved")) / MISSION
-        answers(client, path.as_uri())
-        client.tell("textDocument/didClose", textDocument={"uri": path.as_uri()})
-        opened(client, new, text.replace("go_to: dock", "go_to: dok"))
-        (finding,) = client.diagnostics(new.as_uri())
-        assert "no place 'dok'" in finding["message"]
-        assert answers(client, path.as_uri()) == NOTHING
-    ends_well(client)
+    opened(client, path, text)
+    assert client.diagnostics(path.as_uri()) == []
+    new = project.rename(project.with_name("moved")) / MISSION
+    answers(client, path.as_uri())
+    client.tell("textDocument/didClose", textDocument={"uri": path.as_uri()})
+    opened(client, new, text.replace("go_to: dock", "go_to: dok"))
+    (finding,) = client.diagnostics(new.as_uri())
+    assert "no place 'dok'" in finding["message"]
+    assert answers(client, path.as_uri()) == NOTHING
 
 
-def test_a_change_of_a_document_that_is_not_open_changes_nothing(project: Path) -> None:
+def test_a_change_of_a_document_that_is_not_open_changes_nothing(client: Client, project: Path) -> None:
     path = project / ROBOT
     changed = {"textDocument": {"uri": path.as_uri(), "version": 2}, "contentChanges": [{"range": RANGE, "text": "x"}]}
-    with Client(project) as client:
-        client.tell("textDocument/didChange", **changed)
-        assert client.ask("textDocument/documentSymbol", textDocument={"uri": path.as_uri()})
-    ends_well(client)
+    client.tell("textDocument/didChange", **changed)
+    assert client.ask("textDocument/documentSymbol", textDocument={"uri": path.as_uri()})
 
 
-def test_a_position_beyond_the_text_has_no_name(project: Path) -> None:
+def test_a_position_beyond_the_text_has_no_name(client: Client, project: Path) -> None:
     path = project / ROBOT
-    with Client(project) as client:
-        opened(client, path)
-        for at in ({"line": 9999, "character": 0}, {"line": 2, "character": 9999}):
-            spot = {"textDocument": {"uri": path.as_uri()}, "position": at}
-            assert client.ask("textDocument/definition", **spot) is None
-            client.ask("textDocument/completion", **spot)
-            client.ask("textDocument/hover", **spot)
-            client.ask("textDocument/references", **spot, context={"includeDeclaration": True})
-    ends_well(client)
+    opened(client, path)
+    for at in ({"line": 9999, "character": 0}, {"line": 2, "character": 9999}):
+        spot = {"textDocument": {"uri": path.as_uri()}, "position": at}
+        assert client.ask("textDocument/definition", **spot) is None
+        client.ask("textDocument/completion", **spot)
+        client.ask("textDocument/hover", **spot)
+        client.ask("textDocument/references", **spot, context={"includeDeclaration": True})

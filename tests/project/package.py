@@ -36,9 +36,17 @@ def imported_by(path: Path) -> tuple[tuple[str, str], ...]:
     return tuple(imported(tree_of(path)))
 
 
+def statements(tree: ast.AST) -> Iterator[ast.AST]:
+    """Yield all statements below a node; expressions, of which there are many more, have none."""
+    for field in ("body", "handlers", "orelse", "finalbody", "cases"):
+        for node in getattr(tree, field, ()):
+            yield node
+            yield from statements(node)
+
+
 def imported(tree: ast.Module) -> Iterator[tuple[str, str]]:
     """Yield the modules that a file imports anywhere, each with what is taken from it."""
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.Import):
             yield from ((alias.name, "") for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:

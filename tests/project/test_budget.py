@@ -49,7 +49,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/devices": Cost(code=1957, files=23, small=0, imports=209),
     "domains/diagnostics": Cost(code=2349, files=24, small=4, imports=214),
     "domains/muxes": Cost(code=2034, files=15, small=1, imports=122),
-    "domains/navigation": Cost(code=3963, files=30, small=2, imports=384),
+    "domains/navigation": Cost(code=3965, files=30, small=2, imports=384),
     "domains/policies": Cost(code=856, files=9, small=0, imports=91),
     "domains/power": Cost(code=461, files=6, small=0, imports=37),
     "domains/programs": Cost(code=3781, files=30, small=1, imports=374),
@@ -67,7 +67,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114193,
+    "lines of code": 114195,
     "files": 950,
     "files of 1 to 30 lines of code": 74,
     "lines of imports": 11201,

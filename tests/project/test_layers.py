@@ -8,7 +8,7 @@ from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-from tests.project.package import tree_of
+from tests.project.package import statements, tree_of
 
 PACKAGE = Path(__file__).parents[2] / "rbxcompose"
 
@@ -46,7 +46,7 @@ PLUG_IN = re.compile(r"bridge|components|sections|commands|command_\w+|controlle
 def imports(path: Path) -> set[str]:
     """Return the modules of the package that a file imports, wherever in it."""
     found: set[str] = set()
-    for node in ast.walk(tree_of(path)):
+    for node in statements(tree_of(path)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:

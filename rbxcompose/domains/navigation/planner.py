@@ -118,10 +118,12 @@ def _end_with_room(costs: LayeredCosts, cells: list[Cell], start: Pose2, goal: P
     places = costs.grid.to_points(np.array([(column + 0.5, row + 0.5) for row, column in cells[-3:]]))
     if len(cells) <= len(places):
         places[0] = start.x, start.y
-    *_, before = start.heading, *np.arctan2(*np.diff(places[:-1], axis=0).T[::-1])
+    columns, rows = np.diff(places[:-1], axis=0).T
+    before = math.atan2(rows[-1], columns[-1]) if rows.size else start.heading
     if _has_room(costs, places[-2], np.array((goal.x, goal.y)), before, goal.heading):
         return goal
-    return Pose2(*places[-1].tolist(), goal.heading)
+    x, y = places[-1].tolist()
+    return Pose2(x, y, goal.heading)
 
 
 def _weights(costs: LayeredCosts) -> Grid:
