@@ -33,6 +33,7 @@ from rbxcompose.domains.arms.motion.figures import (
 )
 from rbxcompose.domains.arms.motion.groups import ArmJoint, JointSpace, chain, interpolated
 from rbxcompose.domains.arms.motion.inverse_kinematics import SolverSettings
+from rbxcompose.domains.arms.motion.planner import first_bad
 from rbxcompose.domains.arms.motion.second_checker import SecondChecker
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.link_pairs import pair_of
@@ -127,7 +128,8 @@ def _problems() -> list[Row]:
     works = panda(path)
     given = [one.problem(works.space.names) for one in problems(works, PROBLEMS)]
     mine, theirs = _tried(works, path.read_text(encoding="utf-8"), given)
-    return _told("a motion of the Panda into boxes", f"{OWN}; searched, timed and examined", mine, None, theirs)
+    how = f"{OWN}; searched, timed and examined, the scene is known before"
+    return _told("a motion of the Panda into boxes", how, mine, None, theirs, most_ratio=2.0)
 
 
 def _published() -> list[Row]:
@@ -162,6 +164,7 @@ def _tried(works: ArmWorks, urdf: str, given: Sequence[MotionProblem]) -> tuple[
         works.place_objects(problem.objects)
         second = works.second_checker(problem.objects, others)
         ends = [np.array([at[name] for name in names]) for at in (problem.start, problem.goal)]
+        first_bad(works.planner.checker, ends[0][None])  # takes over the scene, which RoboPlan has before it is timed
         total = total.with_(motion_tries(works.planner, [(ends[0], ends[1])], second.is_free_along, time.process_time))
         seconds.append(second)
         asked.append(_asked(works, problem, others, [end.tolist() for end in ends]))
@@ -193,12 +196,24 @@ def _asked(works: ArmWorks, problem: MotionProblem, others: Mapping[str, float],
     }
 
 
-def _told(what: str, how: str, tries: Tries, most: float | None, peer: Tries | None = None) -> list[Row]:
+def _told(
+    what: str, how: str, tries: Tries, most: float | None, peer: Tries | None = None, most_ratio: float | None = None
+) -> list[Row]:
     name = "RoboPlan, path only" if peer is not None else ""
     theirs = peer or NO_TRIES
     share = 100 * theirs.solved / theirs.count if theirs.count else None
     return [
-        Row(what, "ms", how, 1e3 * tries.median, 1e3 * tries.p95, 1e3 * theirs.median if peer else None, name, most),
+        Row(
+            what,
+            "ms",
+            how,
+            1e3 * tries.median,
+            1e3 * tries.p95,
+            1e3 * theirs.median if peer else None,
+            name,
+            most,
+            most_ratio=most_ratio,
+        ),
         Row(f"{what}: planned", "%", how, 100 * tries.solved / tries.count, None, share, name),
         Row(f"{what}: length", "rad", how, tries.length, None, theirs.length if peer else None, name),
         Row(

@@ -1,7 +1,8 @@
 """Measures every subject: `python -m benchmarks.run [SUBJECT ...]` writes the results and the page of the docs.
 
 A subject is a file of this folder with a function `rows()`, and the paths that it `MEASURES`. Each runs in a process of
-its own. Rows that got worse go to the changelog. `--marks` measures nothing; it marks rows whose paths have changed.
+its own. Rows that got worse go to the changelog; those that cannot be measured here, since their peer or their files
+are missing, stay as they are. `--marks` measures nothing; it marks rows whose paths have changed.
 """
 
 from __future__ import annotations
@@ -40,8 +41,8 @@ has the date and the commit; where what is measured **has changed since**, the f
 
 {tables}
 
-Measured on {machine}; load of other work at the start: {load:.1f}. The rows of ROS 1 and dora appear only where these
-are installed, and the figures of RoboPlan where `RBXCOMPOSE_ROBOPLAN` names a Python that has it.
+Last measured on {machine}; load of other work at the start: {load:.1f}. Rows beside ROS 1 and dora are measured only
+where these are installed, and those beside RoboPlan where `RBXCOMPOSE_ROBOPLAN` names a Python that has it.
 """
 
 
@@ -168,7 +169,11 @@ def _measured_now(subject: str, before: list[dict[str, Any]]) -> list[dict[str, 
     if lines := worse(before, rows):
         text = CHANGELOG.read_text(encoding="utf-8")
         CHANGELOG.write_text(text.replace(CHANGED, "\n".join([CHANGED.strip(), *lines, ""]), 1), encoding="utf-8")
-    return rows
+    known = {(row["name"], row["against"]) for row in rows}
+    kept = [row for row in before if (row["name"], row["against"]) not in known]
+    for row in kept:
+        sys.stderr.write(f"{row['name']}: not measured here, kept as it was on {row['date']}\n")
+    return [*rows, *kept]
 
 
 if __name__ == "__main__":
