@@ -102,8 +102,9 @@ class Parent:
         supervisor = os.getpid()
         give_back_large_memory()
         _import_what_is_common(launch.plan)
-        gc.collect()
-        gc.freeze()  # a collection writes to every object that it inspects, which would copy all pages
+        # A collection writes to every object that it inspects, which would copy all pages. There is none before either:
+        # what it frees are holes in pages that all processes share, and each would fill them for itself.
+        gc.freeze()
         collect_as_usual()  # not before: it would begin with a collection of everything
         signal.pthread_sigmask(signal.SIG_BLOCK, _HELD_BACK)
         pid = os.fork()
