@@ -177,6 +177,11 @@ def give_back_large_memory() -> None:
     _LIBC.mallopt(_M_MMAP_THRESHOLD, _LARGE)
 
 
+def give_back_free_memory() -> None:
+    """Return to the system what the C library has of freed memory: all that was needed only to get started."""
+    _LIBC.malloc_trim(0)
+
+
 def boot_id() -> str:
     """Return an id that differs between boots of this machine."""
     return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()

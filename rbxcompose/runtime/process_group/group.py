@@ -41,6 +41,7 @@ from rbxcompose.runtime.process_group.connection import (
 )
 from rbxcompose.runtime.process_group.host import Host, Notice
 from rbxcompose.runtime.process_group.parameters import Deciders
+from rbxcompose.runtime.processes import give_back_free_memory
 from rbxcompose.runtime.recording.tape import PLAN, Tape
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
 from rbxcompose.sdk.parameters import RobotRules
@@ -364,6 +365,7 @@ class ProcessGroup:
     def _start(self) -> None:
         gc.collect()
         gc.freeze()  # what lives now lives until the end: later collections need not inspect it
+        give_back_free_memory()
         self._made_host().start()
         if isinstance(self._driver, SteppedDriver):
             self._driver.go(self._options.duration)
