@@ -200,7 +200,8 @@ class _Publisher(_Sender):
 
     @property
     def has_match(self) -> bool:
-        if self._statuses is not None and (status := self._statuses.try_recv()) is not None:
+        statuses = self._statuses
+        if statuses is not None and (status := statuses.try_recv()) is not None:
             self._matches = status.matching
         return self._matches
 
