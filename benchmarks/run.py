@@ -169,7 +169,7 @@ def _measured_now(subject: str, before: list[dict[str, Any]]) -> list[dict[str, 
     if lines := worse(before, rows):
         text = CHANGELOG.read_text(encoding="utf-8")
         CHANGELOG.write_text(text.replace(CHANGED, "\n".join([CHANGED.strip(), *lines, ""]), 1), encoding="utf-8")
-    known = {(row["name"], row["against"]) for row in rows}
+    known = {(row["name"], row["against"]) for row in rows} | {(row["name"], "") for row in rows}
     kept = [row for row in before if (row["name"], row["against"]) not in known]
     for row in kept:
         sys.stderr.write(f"{row['name']}: not measured here, kept as it was on {row['date']}\n")
