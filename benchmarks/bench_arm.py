@@ -44,6 +44,7 @@ from rbxcompose.domains.servos.limits import MotionLimits
 MEASURES = ("rbxcompose/domains/arms", "rbxcompose/domains/body")
 
 TARGETS, MOTIONS, PROBLEMS, SOME, EXACT, STEP = 1000, 40, 10, 30, 1e-4, 0.005
+TRIED = "searched, timed and examined, the scene is known before"
 PEER = "RBXCOMPOSE_ROBOPLAN"  # names a Python that has RoboPlan, if this one has not
 PUBLISHED = "RBXCOMPOSE_PROBLEMS"  # names the folder of a robot with an arm, and of published problems below it
 ARMS = {
@@ -128,8 +129,7 @@ def _problems() -> list[Row]:
     works = panda(path)
     given = [one.problem(works.space.names) for one in problems(works, PROBLEMS)]
     mine, theirs = _tried(works, path.read_text(encoding="utf-8"), given)
-    how = f"{OWN}; searched, timed and examined, the scene is known before"
-    return _told("a motion of the Panda into boxes", how, mine, None, theirs, most_ratio=2.0)
+    return _told("a motion of the Panda into boxes", f"{OWN}; {TRIED}", mine, None, theirs, most_ratio=2.0)
 
 
 def _published() -> list[Row]:
@@ -151,7 +151,7 @@ def _published() -> list[Row]:
     found = []
     for scenario, some in given.items():
         mine, theirs = _tried(works, config.urdf, some)
-        found += _told(f"{scenario} of MotionBenchMaker", f"{SOME}; searched, timed and examined", mine, 20.0, theirs)
+        found += _told(f"{scenario} of MotionBenchMaker", f"{SOME}; {TRIED}", mine, 20.0, theirs)
     return found
 
 

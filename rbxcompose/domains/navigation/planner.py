@@ -111,8 +111,10 @@ def _plan_for(
 
 
 def _end_with_room(costs: LayeredCosts, cells: list[Cell], start: Pose2, goal: Pose2) -> Pose2:
-    """Return the goal, or the middle of its cell if the last step has room only there: it is short, so that its heading
-    depends much on where in the cell it ends."""
+    """Return the goal, or the middle of its cell if there is room for the last step of the way only to that.
+
+    The step is short, so its heading depends much on where in the cell it ends.
+    """
     if len(cells) == 1 or costs.cell_of(goal.x, goal.y) != cells[-1]:
         return goal
     places = costs.grid.to_points(np.array([(column + 0.5, row + 0.5) for row, column in cells[-3:]]))
