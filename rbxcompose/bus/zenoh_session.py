@@ -4,6 +4,7 @@ import errno
 import itertools
 import json
 import os
+import socket
 from collections.abc import Mapping
 from dataclasses import field
 from typing import Any
@@ -12,7 +13,7 @@ import zenoh
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.bus import shared_memory
-from rbxcompose.bus.endpoints import LINK_LEASE, is_private, socket_of, tcp_endpoint, unix_endpoint
+from rbxcompose.bus.endpoints import LINK_LEASE, LOOPBACK, is_private, socket_of, tcp_endpoint, unix_endpoint
 
 LEASE = round(1000 * LINK_LEASE)  # [ms] until a silent link counts as lost
 PATIENCE, LONGER = 1000, 5000  # [ms] that a visitor waits for a router, and a process that cannot do without it
@@ -98,10 +99,21 @@ def peer_settings(router: str) -> dict[str, object]:
     }
 
 
-def guest_settings(router: str, session: str) -> dict[str, object]:
-    """Return the configuration of a program of others: a peer with this id, whose admin space says what it declares."""
+def guest_settings(router: str, session: str) -> tuple[dict[str, object], str]:
+    """Return the configuration of a program of others, and where it listens.
+
+    It is a peer with this id, which tells with whom it is linked.
+    """
+    endpoint = _endpoint_beside(router) if is_private(router) else tcp_endpoint(_free_port())
     admin = {"enabled": True, "permissions": {"read": True, "write": False}}
-    return {**peer_settings(router), "id": session, "adminspace": admin}
+    others = {"id": session, "listen/endpoints": [endpoint], "listen/exit_on_failure": False, "adminspace": admin}
+    return {**peer_settings(router), **others}, endpoint
+
+
+def _free_port() -> int:
+    with socket.socket() as one:
+        one.bind((LOOPBACK, 0))
+        return int(one.getsockname()[1])
 
 
 def as_file(settings: Mapping[str, object]) -> str:
@@ -259,6 +271,22 @@ def open_exchange(link: RouterLink) -> zenoh.Session:
         return _opened(exchange_settings(link))
     except zenoh.ZError as error:
         raise OSError(errno.EADDRINUSE, f"{' and '.join(link.listen)} cannot be opened: {error}") from error
+
+
+def open_beside(endpoint: str) -> zenoh.Session:
+    """Open a session that is linked with nobody but the one that listens at `endpoint`, as soon as it does."""
+    return _opened(
+        {
+            **_common(),
+            "scouting/gossip/enabled": False,
+            "mode": "peer",
+            "listen/endpoints": [],
+            "connect/endpoints": [endpoint],
+            "connect/retry": _RETRY,
+            "connect/timeout_ms": -1,
+            "connect/exit_on_failure": False,
+        }
+    )
 
 
 def _opened(settings: Mapping[str, object], threads: str = THREADS) -> zenoh.Session:

@@ -42,7 +42,6 @@ NAME = "_rbxcompose"  # node name; tools do not list names that begin with `_`
 LONGEST_QUEUE = 1000  # messages waiting to be shown
 PATIENCE = 2.0  # [s] to wait for an answer of the router
 _EACH = zenoh.ConsolidationMode.NONE
-_DECLARED = ("publisher", "subscriber", "queryable", "querier")
 _PAUSE = 0.01  # [s] between two looks for the router
 NO_HASHES = "TypeHashNotSupported"  # ROS 2 Humble writes this in place of a hash
 NO_ROUTER = kind("RBX9020")
@@ -121,20 +120,6 @@ class Guest:
     def ask(self, key: str, seconds: float) -> list[bytes]:
         """Return all answers to a query at a key within `seconds`."""
         return [sample.payload.to_bytes() for sample in self._answers(key, seconds)]
-
-    def declared_by(self, session: str, seconds: float) -> list[tuple[str, str]]:
-        """Return what a session declares, if its admin space answers within `seconds`: kinds and keys.
-
-        The kinds are `publisher`, `subscriber`, `queryable` and `querier`.
-        """
-        start, found = f"@/{session}/", list[tuple[str, str]]()
-        for sample in self._answers(f"{start}**", seconds):
-            _mode, _, rest = str(sample.key_expr).removeprefix(start).partition("/")
-            kind, _, key = rest.partition("/")
-            # The same space has what others declare and this session has learnt of.
-            if kind in _DECLARED and session in json.loads(sample.payload.to_bytes())["clients"]:
-                found.append((kind, key))
-        return found
 
     def _answers(self, key: str, seconds: float) -> Iterator[zenoh.Sample]:
         replies: Iterator[zenoh.Reply] = iter(

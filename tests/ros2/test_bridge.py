@@ -47,6 +47,7 @@ components:
   somebody:
     type: ros2_node
     command: [python3, {node}]
+    restart: always
     parameters: {{gain: 0.5}}
     publishes:
       cmd_vel_ros: {{type: geometry_msgs/Twist, rate: 15 Hz}}

@@ -21,7 +21,7 @@ OWN = re.compile(
 
 
 class EndKind(StrEnum):
-    """What a session has at a key; the words of Zenoh's admin space."""
+    """What a session has at a key."""
 
     PUBLISHER = "publisher"
     SUBSCRIBER = "subscriber"
@@ -53,6 +53,10 @@ class KeyOnBus:
         if head != str(domain) or not name or kind not in list(EndKind) or "::" not in type_:
             return None
         return cls(EndKind(kind), "/" + "/".join(name), type_, hash_)
+
+    def text(self, domain: int) -> str:
+        """Return the key itself."""
+        return f"{domain}{self.name}/{self.type}/{self.hash}"
 
 
 @dataclass(frozen=True, slots=True)

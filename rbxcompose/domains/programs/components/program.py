@@ -15,6 +15,7 @@ from pathlib import Path
 from string import ascii_letters, digits
 from typing import Annotated, Any, Literal, TypeVar, cast
 from uuid import uuid4
+from zlib import crc32
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
@@ -24,7 +25,8 @@ from rbxcompose.base.config import Config, LocalPath, Secret, Time
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import OutsideError
-from rbxcompose.bus.names import ActionNames, data_key, dds_type
+from rbxcompose.bus.names import ActionNames, dds_type
+from rbxcompose.bus.session_link import SessionLink
 from rbxcompose.bus.tokens import SPACE, EndpointToken, EntityKind, NodeToken, parse_token
 from rbxcompose.bus.transport import Closable
 from rbxcompose.bus.wire import WireProfile, ros_qos
@@ -54,14 +56,26 @@ from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Qos, Serves,
 from rbxcompose.sdk.updater import FrequencyTask, TaskStatus
 
 LOOKS = 1.0  # [s] between two looks at what its session declares, and at its memory
-_ANSWERS = 0.3  # [s] for its admin space to answer
+_ANSWERS = 0.3  # [s] for its session to answer with whom it is linked
 _STARTS = 10.0  # [s] for a program to run that has nothing else to wait for
+_LISTENS, _AGAIN = 10.0, 60.0  # [s] for which all that it publishes is heard at first, and between two looks later
 _LINKS = 2.0  # [s] for it to be linked with the robot's processes
 _STRANGER = 0.5  # [s] after which it does not seem to use the configuration that it was given
 _PAUSE = 0.05  # [s] between two looks at a program that is not ready yet
-_TOKENS = {EndKind.PUBLISHER: EntityKind.PUBLISHER, EndKind.SUBSCRIBER: EntityKind.SUBSCRIPTION}
-_TOKENS |= {EndKind.QUERYABLE: EntityKind.SERVER}
+_TOKENS = {
+    EndKind.PUBLISHER: EntityKind.PUBLISHER,
+    EndKind.SUBSCRIBER: EntityKind.SUBSCRIPTION,
+    EndKind.QUERYABLE: EntityKind.SERVER,
+    EndKind.QUERIER: EntityKind.CLIENT,
+}
+_OF_TOKENS = {token: kind for kind, token in _TOKENS.items()}
 _ACTIONS = ServesAction, CallsAction
+_KINDS = {Out: EndKind.PUBLISHER, In: EndKind.SUBSCRIBER, Serves: EndKind.QUERYABLE, Calls: EndKind.QUERIER}
+_SERVED = (
+    *(EndKind.QUERYABLE,) * 3,
+    *(EndKind.PUBLISHER,) * 2,
+)  # the five ends of an action, in the order of their names
+_CALLED = *(EndKind.QUERIER,) * 3, *(EndKind.SUBSCRIBER,) * 2
 _MEGABYTE = 1_000_000
 
 
@@ -246,9 +260,11 @@ class Runner(Component[R]):
         self.is_ending = False
         self.ends_at: float | None = None
         self.looked = -LOOKS
-        self.tokens: dict[KeyOnBus, Closable] = {}
+        self.link: SessionLink | None = None
+        self.linked = 0.0
+        self.tokens: dict[str, Closable] = {}
         self.heard: dict[str, Closable] = {}
-        self.session = ""
+        self.session = self.endpoint = ""
         self.joining: dict[str, str] = {}
         self.output = OutputLog({level: text for level, text in self._levels() if text})
         ready = self.config.ready
@@ -281,6 +297,9 @@ class Runner(Component[R]):
         self.joining = self._joining()
         self.is_over = False
         order = self.order({**os.environ, **self.joining})
+        if self.joins_bus and order is not None:
+            subscribed, served = self._keys_of(EndKind.SUBSCRIBER), self._keys_of(EndKind.QUERYABLE)
+            self.link, self.linked = SessionLink(self.endpoint, subscribed, served), self.real_time.now()
         self.connect()
         if order is not None:
             self.child = Child(order)
@@ -352,9 +371,10 @@ class Runner(Component[R]):
         """Return the variables by which a program joins the robot."""
         address = self.context.address
         self.session = f"{uuid4().int % 15 + 1:x}{uuid4().hex[1:]}"
+        settings, self.endpoint = guest_settings(address.router, self.session)
         file = RobotFolder.of(address.robot).path / f"{self.name}.zenoh.json5"
-        replace_file(file, as_file(guest_settings(address.router, self.session)).encode())
-        keys = {f"RBXCOMPOSE_KEY_{name.upper()}": key for name, key in self._keys()}
+        replace_file(file, as_file(settings).encode())
+        keys = {f"RBXCOMPOSE_KEY_{name.upper()}": key.text(address.domain) for name, _, key in self._keys()}
         return {
             "ZENOH_CONFIG": str(file),
             "ZENOH_SESSION_CONFIG_URI": str(file),
@@ -369,40 +389,40 @@ class Runner(Component[R]):
             **{name: secret.reveal() for name, secret in self.config.secrets.items()},
         }
 
-    def _keys(self) -> Iterator[tuple[str, str]]:
-        """Yield the Zenoh key of each end; an action has five."""
+    def _keys(self) -> Iterator[tuple[str, str, KeyOnBus]]:
+        """Yield the name of each end, that of its port, and its key; an action has five."""
+        wire = WireProfile(self.context.address.wire)
         for name, port in self._elsewhere():
+            full, interface = str(self.bound[name]), cast(Any, port.interface)
             if not isinstance(port, _ACTIONS):
-                yield name, self._key(str(self.bound[name]), port.interface)
+                yield name, name, KeyOnBus(_KINDS[type(port)], full, dds_type(interface.TYPE), wire.hash_of(interface))
                 continue
-            names, action = ActionNames.of(str(self.bound[name])), cast(Any, port.interface)
-            parts = action.SendGoal, action.GetResult, CancelGoal, action.FeedbackMessage, GoalStatusArray
-            for part, interface in zip(ActionNames.__slots__, parts, strict=True):
-                yield f"{name}_{part}", self._key(getattr(names, part), interface)
+            kinds = _SERVED if isinstance(port, ServesAction) else _CALLED
+            parts = interface.SendGoal, interface.GetResult, CancelGoal, interface.FeedbackMessage, GoalStatusArray
+            for kind, part, of_part in zip(kinds, ActionNames.__slots__, parts, strict=True):
+                key = KeyOnBus(kind, getattr(ActionNames.of(full), part), dds_type(of_part.TYPE), wire.hash_of(of_part))
+                yield f"{name}_{part}", name, key
 
-    def _key(self, name: str, interface: Any) -> str:
-        address = self.context.address
-        return data_key(address.domain, name, interface.TYPE, WireProfile(address.wire).hash_of(interface))
+    def _keys_of(self, kind: EndKind) -> list[str]:
+        return [key.text(self.context.address.domain) for _, _, key in self._keys() if key.kind is kind]
 
     def _elsewhere(self) -> Iterator[tuple[str, Port[Any]]]:
         return ((name, port) for name, port in self.ports(self.config).items() if port.is_elsewhere)
 
     def _declared(self) -> Iterator[DeclaredKey]:
-        kinds = {Out: EndKind.PUBLISHER, In: EndKind.SUBSCRIBER, Serves: EndKind.QUERYABLE, Calls: EndKind.QUERIER}
-        wire = WireProfile(self.context.address.wire)
-        for name, port in self._elsewhere():
-            full, kind, interface = str(self.bound[name]), kinds.get(type(port)), cast(Any, port.interface)
-            if isinstance(port, ServesAction):  # one of its ends stands for all
-                full, kind, interface = ActionNames.of(full).send_goal, EndKind.QUERYABLE, interface.SendGoal
-            if kind is not None:
-                key = KeyOnBus(kind, full, dds_type(interface.TYPE), wire.hash_of(interface))
+        ports = dict(self._elsewhere())
+        for end, name, key in self._keys():
+            port = ports[name]
+            if isinstance(port, ServesAction) and end.endswith("_send_goal"):  # one of its ends stands for all
+                yield DeclaredKey(name, key)
+            elif not isinstance(port, _ACTIONS):
                 yield DeclaredKey(name, key, port.rate if isinstance(port, Out) else None)
 
     def _listen(self, guest: Guest) -> None:
         """Count the messages of its topics: of those with a rate all, of the others until one has come."""
         for name, port in self._elsewhere():
             if isinstance(port, Out):
-                key = self._key(str(self.bound[name]), port.interface)
+                key = self.ends[name].key.text(guest.domain)
                 self.heard[name] = guest.transport.subscribe(key, port.qos, partial(self._arrived, name))
 
     def _arrived(self, name: str, arrival: object) -> None:
@@ -520,9 +540,14 @@ class Runner(Component[R]):
 
     def _compare(self, guest: Guest) -> None:
         """Find what its session has, name it to the others, and report what does not fit."""
-        keys = (KeyOnBus.of(*end, guest.domain) for end in guest.declared_by(self.session, _ANSWERS))
-        found = {key for key in keys if key is not None}
-        self._announce(guest, found)
+        tokens = map(parse_token, guest.tokens(f"{SPACE}/{guest.domain}/{self.session}/**"))
+        own = [token for token in tokens if isinstance(token, EndpointToken) and token.key not in self.tokens]
+        if own or self.link is None:
+            found = {_key_of(token) for token in own}  # a node of ROS 2 says itself what it has
+            self._announce(guest, set())
+        else:
+            found = self._seen(self.link, guest.domain)
+            self._announce(guest, found)
         for name in [name for name in self.heard if self.watched.count(name) and self.ends[name].rate is None]:
             self.heard.pop(name).close()
         status = self.watched.look(found, self.now)
@@ -530,26 +555,32 @@ class Runner(Component[R]):
             self.warn(text)
         self.state = TaskStatus(status.level, f"runs; {status.message}", status.values)
 
+    def _seen(self, link: SessionLink, domain: int) -> set[KeyOnBus]:
+        """Return what is seen of its session.
+
+        A publisher that is silent cannot be seen. If there is anything else, those that are declared count as there.
+        """
+        since = self.real_time.now() - self.linked
+        link.listen(f"{domain}/**" if since < _LISTENS or since % _AGAIN < 2 * LOOKS else None)
+        declared = {key.text(domain): key for _, _, key in self._keys()}
+        found = {declared[text] for text in link.matching()}
+        found |= {key for text in link.heard() if (key := KeyOnBus.of(EndKind.PUBLISHER, text, domain)) is not None}
+        return found | {key for key in declared.values() if found and key.kind is EndKind.PUBLISHER}
+
     def _announce(self, guest: Guest, found: set[KeyOnBus]) -> None:
-        """Declare tokens for the ends that have none, so that tools and clients find them as those of ROS 2."""
-        tokens = map(parse_token, guest.tokens(f"{SPACE}/{guest.domain}/{self.session}/**") if found else ())
-        own = {(token.kind, token.name) for token in tokens if isinstance(token, EndpointToken)}
-        own -= {(_TOKENS[key.kind], key.name) for key in self.tokens if key != _NODE}
+        """Declare tokens for its ends, so that tools and clients find them as those of ROS 2."""
         qos = {str(self.bound[name]): port.qos for name, port in self._elsewhere() if isinstance(port, Out | In)}
         address = self.context.address
-        node = NodeToken(
-            address.domain, self.session, 0, self.name, f"/{address.namespace}" if address.namespace else ""
-        )
-        if found and not own and not self.tokens:
-            self.tokens[_NODE] = guest.transport.announce(node.key)
-        for number, key in enumerate(sorted(found - self.tokens.keys(), key=str), len(self.tokens) + 1):
-            if (kind := _TOKENS.get(key.kind)) is None or (kind, key.name) in own:
-                continue
-            words = WireProfile(address.wire).qos_text(ros_qos(qos.get(key.name, Qos.EVENT)))
-            token = node.endpoint_key(kind, number, key.name, key.type, key.hash, words)
-            self.tokens[key] = guest.transport.announce(token)
-        for gone in [key for key in self.tokens if key not in found and key != _NODE]:
-            self.tokens.pop(gone).close()
+        namespace = f"/{address.namespace}" if address.namespace else ""
+        node, wire = NodeToken(address.domain, self.session, 0, self.name, namespace), WireProfile(address.wire)
+        wanted = {node.key} if found else set[str]()
+        for key in found:
+            words, number = wire.qos_text(ros_qos(qos.get(key.name, Qos.EVENT))), crc32(str(key).encode())
+            wanted.add(node.endpoint_key(_TOKENS[key.kind], number, key.name, key.type, key.hash, words))
+        for text in wanted - self.tokens.keys():
+            self.tokens[text] = guest.transport.announce(text)
+        for text in self.tokens.keys() - wanted:
+            self.tokens.pop(text).close()
 
     def _cancel_goals(self) -> None:
         if self.guest is None:
@@ -583,12 +614,16 @@ class Runner(Component[R]):
             closable.close()
         self.tokens, self.heard = {}, {}
         self.disconnect()
+        if self.link is not None:
+            self.link.close()
+            self.link = None
         if self.guest is not None:
             self.guest.__exit__(None, None, None)
             self.guest = None
 
 
-_NODE = KeyOnBus(EndKind.QUERIER, "", "", "")  # stands for the token of the node
+def _key_of(token: EndpointToken) -> KeyOnBus:
+    return KeyOnBus(_OF_TOKENS[token.kind], token.name, token.dds_type, token.type_hash)
 
 
 class ProgramConfig(RunConfig):
