@@ -27,8 +27,9 @@ export function stopButtons(link: Rosbridge, stopped: Signal<boolean>, notify: (
     try {
       await ask(link, "/console/release");
       owed = false;
+      const focused = document.activeElement; // not taken away from where somebody types meanwhile
       stopped.set(false);
-      stop.focus();
+      if (focused === null || focused === document.body || focused === release) stop.focus();
     } catch (error) {
       notify(`The robot stays stopped: ${(error as Error).message}.`);
     } finally {

@@ -65,7 +65,7 @@ class PrepareChange:
 
 @dataclass(frozen=True, slots=True)
 class CommitChange:
-    """Apply the settings that were prepared, then send `ChangeFollowed`.
+    """Apply the settings that were prepared, for this change or when it was asked for, then send `ChangeFollowed`.
 
     With the number of an `AskForChange`, nothing else is to be applied elsewhere: once applied, it is decided and over.
     """
@@ -113,10 +113,16 @@ class AskRules:
 
 @dataclass(frozen=True, slots=True)
 class AskForChange:
-    """Somebody wants to change settings of components, by their nodes; `ChangeDecided` carries the same number."""
+    """Somebody wants to change settings of components, by their nodes; `ChangeDecided` carries the same number.
+
+    With `new`, the process has prepared the change, since it has the only component that is concerned. `now` and `new`
+    are those of `ChangePrepared`.
+    """
 
     number: int
     wanted: WantedChange
+    now: str = ""
+    new: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ import itertools
 import time
 from collections.abc import Callable
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import pytest
@@ -14,7 +15,7 @@ from playwright.sync_api import Page, expect
 
 from tests.console.browser import CHROMIUM
 from tests.console.conftest import Pages
-from tests.console.fake_gateway import CONFIG, FakeGateway
+from tests.console.fake_gateway import CONFIG, RUNNING, FakeGateway
 from tests.console.looks import PHONE, expect_readable, overflows, too_small, violations
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
@@ -147,13 +148,23 @@ def test_a_finger_drives_until_it_is_lifted_or_taken_away(
 def test_stop_needs_no_lease_and_nothing_moves_until_release(
     open_page: Callable[..., Page], gateway: FakeGateway
 ) -> None:
+    is_typed = Event()
+
+    def release(args: object) -> dict[str, Any]:
+        is_typed.wait()
+        gateway.show(RUNNING, {"stop": None})
+        return {"success": True, "message": ""}
+
+    gateway.answers["/console/release"] = release
     page = open_page(name="")
     page.keyboard.press("Space")
     wait_for(lambda: gateway.calls("/console/stop") == [{}], page)
     page.get_by_role("button", name="Release").click()
-    wait_for(lambda: gateway.calls("/console/release") == [{}], page)
     page.fill("#name", "Ada")
-    page.keyboard.press("Enter")
+    is_typed.set()
+    expect(page.get_by_role("button", name="Release")).to_be_hidden()
+    assert gateway.calls("/console/release") == [{}]
+    page.keyboard.press("Enter")  # still in the field: else it would press STOP
     drive_by_keys(page, gateway)
     since = time.monotonic()
     page.get_by_role("button", name="STOP").click()

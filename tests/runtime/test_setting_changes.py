@@ -25,6 +25,7 @@ class Robot:
     def __init__(self) -> None:
         self.values = dict.fromkeys(NAMES, 0)
         self.prepared: dict[str, tuple[int, int]] = {}  # wanted value, value before
+        self.offered: dict[int, int] = {}  # what "a" has prepared for itself, by the number of its request
         self.orders: list[tuple[str, say.ChannelOrder]] = []
         self.judged: list[tuple[WhenJudged, bool]] = []
         self.answers: dict[int, ChangeRefusal | None] = {}
@@ -46,7 +47,13 @@ class Robot:
     def want(self, values: dict[str, int]) -> int:
         parts = {f"/{name}": str(value) for name, value in values.items()}
         number = next(self._numbers)
-        self.changes.receive("a", tell.AskForChange(number, WantedChange(parts, "somebody", "x")))
+        new = ""
+        if values.keys() == {"a"} and not self.offered and "a" not in self.prepared:
+            if values["a"] == REFUSED:
+                self.answers[number] = ChangeRefusal("no")
+                return number
+            self.offered[number], new = values["a"], str(values["a"])
+        self.changes.receive("a", tell.AskForChange(number, WantedChange(parts, "somebody", "x"), "", new))
         return number
 
     def step(self, which: int) -> None:
@@ -67,6 +74,8 @@ class Robot:
                     self.prepared[name] = int(text), self.values[name]
                 self.changes.receive(name, tell.ChangePrepared(number, "no" if text == str(REFUSED) else "", "", text))
             case tell.CommitChange(number, decides):
+                if decides in self.offered:
+                    self.prepared.setdefault(name, (self.offered.pop(decides), self.values[name]))
                 wanted_value, _ = self.prepared[name]
                 is_taken = wanted_value != LATE
                 if is_taken:
@@ -82,12 +91,15 @@ class Robot:
                 self.prepared.pop(name, None)
             case tell.ChangeDecided(number, refusal):
                 self.answers[number] = refusal
+                self.offered.pop(number, None)
 
     def die(self, name: str) -> None:
         """End a process, which comes back with the values of its plan."""
         self.orders = [order for order in self.orders if order[0] != name]
         self.values[name] = 0
         self.prepared.pop(name, None)
+        if name == "a":
+            self.offered.clear()
         self.changes.gone(name)
 
 
@@ -142,7 +154,35 @@ def test_while_another_plan_is_applied_changes_wait() -> None:
     robot.want({"a": 1})
     assert robot.orders == []
     robot.changes.go_on()
-    assert len(robot.orders) == len(NAMES)
+    assert [name for name, _ in robot.orders] == ["a"]
+
+
+def test_only_processes_that_a_change_concerns_or_that_have_made_one_are_asked() -> None:
+    robot = Robot()
+
+    def asked(values: dict[str, int]) -> list[str]:
+        robot.want(values)
+        names = sorted({name for name, order in robot.orders if isinstance(order, tell.PrepareChange)})
+        while robot.orders or robot.judged:
+            robot.step(0)
+        return names
+
+    assert asked({"a": 1}) == []  # it has prepared that itself, when it asked
+    assert asked({"b": 1}) == ["a", "b"]
+    assert asked({"a": 2}) == ["b"]
+    robot.die("b")  # and comes back with the settings of the plan
+    assert asked({"a": 3}) == []
+    assert robot.values == {"a": 3, "b": 0, "c": 0}
+
+
+def test_what_was_prepared_behind_another_change_is_prepared_again() -> None:
+    robot = Robot()
+    first = robot.want({"a": 1, "b": 1})
+    second = robot.want({"a": 2})
+    while robot.orders or robot.judged:
+        robot.step(0)
+    assert (robot.answers[first], robot.answers[second]) == (None, None)
+    assert (robot.values["a"], robot.values["b"]) == (2, 1)
 
 
 def test_a_component_of_another_host_is_told() -> None:

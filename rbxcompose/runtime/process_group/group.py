@@ -12,14 +12,13 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 from rbxcompose.base.clock import DISPUTE, Clock, ExternalClock, MonotonicClock, SteppedClock, Turn
-from rbxcompose.base.config import Config
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Command, Refused, to_data
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import admin_key
 from rbxcompose.bus.transport import Closable, Question, Transport
-from rbxcompose.compiler.plan.dump import dump, dump_configs, load
+from rbxcompose.compiler.plan.dump import dump, load
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.msgs.rosgraph_msgs import Clock as ClockMessage
 from rbxcompose.msgs.stamps import to_nanoseconds
@@ -85,7 +84,7 @@ def change_settings(host: Host, order: messages.SettingOrder, channel: messages.
         case messages.PrepareChange():
             channel.send(_prepared(host, order))
         case messages.CommitChange(number, decides):
-            reason = changes.commit(number)
+            reason = changes.commit(number if decides is None else changes.claim(number, decides))
             channel.send(messages.ChangeFollowed(number, reason))
             if decides is not None and not reason:
                 changes.end(number)
@@ -105,16 +104,7 @@ def _prepared(host: Host, order: messages.PrepareChange) -> messages.ChangePrepa
     except Refused as refusal:
         return messages.ChangePrepared(order.number, str(refusal))
     new = {change.hosted.instance.name: change.new for change in found if change.is_ruled}
-    return messages.ChangePrepared(order.number, "", _text(host, changes.live), _text(host, new))
-
-
-def _text(host: Host, configs: dict[str, Config]) -> str:
-    """Return configurations of components as text; empty if there are none."""
-    return (
-        dump_configs({name: (host.hosted[name].instance.type, config) for name, config in configs.items()})
-        if configs
-        else ""
-    )
+    return messages.ChangePrepared(order.number, "", changes.text(changes.live), changes.text(new))
 
 
 class Taping:

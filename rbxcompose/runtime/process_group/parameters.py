@@ -13,6 +13,7 @@ from rbxcompose.base.units import format_quantity
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import resolve
 from rbxcompose.bus.services import ServedRequest
+from rbxcompose.compiler.plan.dump import dump_configs
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.rbxcompose_parameters import ChangeParameters, NodeChange
 from rbxcompose.msgs.stamps import to_time
@@ -71,6 +72,16 @@ class LiveChanges:
     def live(self) -> dict[str, Config]:
         """Return the configurations that are not those of the plan, by component."""
         return {name: entry.config for name, entry in self.hosted.items() if entry.config != entry.instance.config}
+
+    def text(self, configs: Mapping[str, Config]) -> str:
+        """Return configurations of components as text; empty if there are none."""
+        types = {name: (self.hosted[name].instance.type, config) for name, config in configs.items()}
+        return dump_configs(types) if types else ""
+
+    def claim(self, number: int, asked: int) -> int:
+        """Let what was prepared when it was asked for be that of a change, unless that was prepared itself."""
+        self._prepared.setdefault(number, self._prepared.pop(-asked, ()))
+        return number
 
     def is_open(self, name: str) -> bool:
         """Return whether no change of a component is prepared."""
@@ -150,7 +161,8 @@ class LiveChanges:
 
 EVENTS = "/parameter_events"
 BY_APPLY = ChangeCause("apply")
-OWN = 0  # the number of a change that needs nobody else; those of the supervisor begin at 1
+OWN = 0  # the number of a change where there is no supervisor
+# The supervisor numbers its changes from 1; what is prepared when it is asked for has the negative of that number.
 
 WhenDecided = Callable[[ChangeRefusal | None], None]
 _SetParameters = Callable[[Sequence[rcl.Parameter], Callable[[rcl.SetParametersResult], None]], None]
@@ -228,18 +240,27 @@ class Parameters:
         if self._deciders.ask is None:
             then(self._decided(wanted, self._deciders.rules))
             return
-        (name, *others) = self._own(wanted).parts or [""]
+        number, own = next(self._numbers), self._own(wanted)
+        (name, *others) = own.parts or [""]
+        new = ""
         if len(wanted.parts) == 1 and not others and name and self.changes.is_open(name):
-            is_over, refusal = self._alone(wanted)
-            if is_over:
-                then(refusal)
+            try:
+                (change,) = self.changes.prepare(-number, own)
+            except Refused as refusal:
+                then(ChangeRefusal(str(refusal)))
                 return
-        number = next(self._numbers)
+            if not change.is_ruled:
+                reason = self.changes.commit(-number)
+                self.changes.end(-number)
+                then(ChangeRefusal(reason) if reason else None)
+                return
+            new = self.changes.text({name: change.new})
         self._asked[number] = then
-        self._deciders.ask(AskForChange(number, wanted))
+        self._deciders.ask(AskForChange(number, wanted, self.changes.text(self.changes.live), new))
 
     def decided(self, number: int, refusal: ChangeRefusal | None) -> None:
         """Take what the supervisor has decided."""
+        self.changes.end(-number)
         self._asked.pop(number)(refusal)
 
     def _own(self, wanted: WantedChange) -> WantedChange:
@@ -247,16 +268,6 @@ class Parameters:
         names = {self.node(name): name for name in self.changes.hosted}
         parts = {names[node]: part for node, part in wanted.parts.items() if node in names}
         return WantedChange(parts, wanted.by, wanted.together)
-
-    def _alone(self, wanted: WantedChange) -> tuple[bool, ChangeRefusal | None]:
-        """Decide about a change of one component if no rule could notice it; return whether that was so."""
-        try:
-            (change,) = self.changes.prepare(OWN, self._own(wanted))
-        except Refused as refusal:
-            return True, ChangeRefusal(str(refusal))
-        reason = "" if change.is_ruled else self.changes.commit(OWN)
-        self.changes.end(OWN)
-        return not change.is_ruled, ChangeRefusal(reason) if reason else None
 
     def _decided(self, wanted: WantedChange, rules: RobotRules | None) -> ChangeRefusal | None:
         """Carry out a change here, where all components are in this process."""

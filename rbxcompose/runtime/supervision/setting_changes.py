@@ -1,8 +1,8 @@
 """Changes of live settings: one after the other, each in all of its components or in none. Pure.
 
-Who wants a change need not live until it is over. All processes are asked first whether their components would accept
-it, then the judge whether it keeps the rules about the whole robot, then it is carried out. If anything goes wrong in
-between, also the end of a process, the others go back.
+Who wants a change need not live until it is over. The processes that it concerns are asked first whether their
+components would accept it, then the judge whether it keeps the rules about the whole robot, then it is carried out. If
+anything goes wrong in between, also the end of a process, the others go back.
 """
 
 from collections import deque
@@ -79,6 +79,7 @@ class SettingChanges:
         self._change: _Change | None = None
         self._count = 0
         self._is_held = False
+        self._changed = set[str]()  # the processes that have carried out a change: their settings are not the plan's
 
     @property
     def is_busy(self) -> bool:
@@ -98,6 +99,8 @@ class SettingChanges:
         """Take a message of a process; others than those about settings are ignored."""
         match message:
             case messages.AskForChange():
+                if self._change is not None or self._queue or self._is_held:  # it may look different afterwards
+                    message = messages.AskForChange(message.number, message.wanted)
                 self._queue.append((process, message))
                 self._begin()
             case messages.ChangePrepared(number=number) | messages.ChangeFollowed(number=number):
@@ -108,6 +111,7 @@ class SettingChanges:
     def gone(self, process: str) -> None:
         """Handle the end of a process: what it had applied is lost with it, since it comes back with its plan."""
         self._queue = deque(pair for pair in self._queue if pair[0] != process)
+        self._changed.discard(process)
         change = self._change
         if change is None:
             return
@@ -132,11 +136,15 @@ class SettingChanges:
                 continue
             self._count += 1
             change = self._change = _Change(process, asked, self._count, parts)
-            change.waiting = set(self._effects.reached())
             # Those without a part of it tell the values that they have now; the others have more to do, so they begin.
+            change.waiting = (parts.keys() | self._changed) & set(self._effects.reached())
+            if asked.new:
+                change.waiting.discard(process)
+                change.prepared, change.now, change.new = [process], [asked.now] if asked.now else [], [asked.new]
             for name in sorted(change.waiting, key=lambda name: (name not in parts, name)):
                 part = parts.get(name, WantedChange({}, asked.wanted.by))
                 self._effects.send(name, messages.PrepareChange(change.number, part))
+            self._proceed(change)
 
     def _parts(self, wanted: WantedChange) -> tuple[dict[str, WantedChange], ChangeRefusal | None]:
         """Return what is wanted of each process, or why that is impossible."""
@@ -166,6 +174,7 @@ class SettingChanges:
                 change.stuck += [reason] if reason else []
             case messages.ChangeFollowed():
                 change.done += [] if reason else [process]
+                self._changed |= set() if reason else {process}
         if reason and change.step is not _Step.GOING_BACK:
             change.refusal = change.refusal or ChangeRefusal(reason)
         self._proceed(change)
