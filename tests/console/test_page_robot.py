@@ -11,6 +11,7 @@ from playwright.sync_api import Page, expect
 from tests.console.browser import CHROMIUM
 from tests.console.fake_gateway import RUNNING, FakeGateway
 from tests.console.looks import PHONE, expect_fit, violations
+from tests.console.test_page import wait_for
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
 
@@ -216,5 +217,7 @@ def test_it_fits_a_phone(open_page: Callable[..., Page], robot: FakeGateway) -> 
 def test_without_an_answer_it_says_why(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
     page = open_page(page_name="robot")
     expect(page.get_by_text("Asking the robot what it is made of")).to_be_visible()
-    gateway.say(f"/console/windows/{DESCRIBED}", {"refused": "the supervisor does not answer"})
+    window = f"/console/windows/{DESCRIBED}"
+    wait_for(lambda: any(window in topics for topics in list(gateway.subscribed.values())), page)
+    gateway.say(window, {"refused": "the supervisor does not answer"})
     expect(page.get_by_text("the supervisor does not answer")).to_be_visible()

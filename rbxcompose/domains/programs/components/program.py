@@ -71,10 +71,8 @@ _TOKENS = {
 _OF_TOKENS = {token: kind for kind, token in _TOKENS.items()}
 _ACTIONS = ServesAction, CallsAction
 _KINDS = {Out: EndKind.PUBLISHER, In: EndKind.SUBSCRIBER, Serves: EndKind.QUERYABLE, Calls: EndKind.QUERIER}
-_SERVED = (
-    *(EndKind.QUERYABLE,) * 3,
-    *(EndKind.PUBLISHER,) * 2,
-)  # the five ends of an action, in the order of their names
+# Of the five ends of an action, in the order of their names:
+_SERVED = *(EndKind.QUERYABLE,) * 3, *(EndKind.PUBLISHER,) * 2
 _CALLED = *(EndKind.QUERIER,) * 3, *(EndKind.SUBSCRIBER,) * 2
 _MEGABYTE = 1_000_000
 
