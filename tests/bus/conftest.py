@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import socket
 import threading
 import time
@@ -17,6 +16,8 @@ from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.zenoh_session import open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
+
+_PAUSE = 0.002  # [s] between two looks at what is awaited, unless something arrives
 
 
 class Alone:
@@ -38,12 +39,13 @@ class Alone:
 class Connected:
     """A process with a Zenoh session, driven by the thread of the test."""
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, is_woken: threading.Event) -> None:
         self.log: list[tuple[str, str]] = []
         self.errors: list[tuple[str, Exception]] = []
         self.clock = MonotonicClock()
         self.scheduler = Scheduler(on_error=lambda owner, error: self.errors.append((owner, error)))
         self._woken: deque[tuple[str, Callable[[], None]]] = deque()
+        self._is_woken = is_woken
         self.transport = ZenohTransport(open_peer(f"tcp/127.0.0.1:{port}"), self._wake)
         self.bus = Bus(self.scheduler, self.clock, transport=self.transport, log=self._note)
 
@@ -52,6 +54,7 @@ class Connected:
 
     def _wake(self, owner: str, callback: Callable[[], None]) -> None:
         self._woken.append((owner, callback))
+        self._is_woken.set()
 
     def turn(self) -> None:
         while self._woken:
@@ -67,6 +70,7 @@ class Network:
             probe.bind(("127.0.0.1", 0))
             self.port: int = probe.getsockname()[1]
         self._processes: list[Connected] = []
+        self._is_woken = threading.Event()
         self.start_router()
 
     def start_router(self) -> None:
@@ -76,7 +80,7 @@ class Network:
         self._router.close()  # type: ignore[no-untyped-call]
 
     def process(self) -> Connected:
-        self._processes.append(Connected(self.port))
+        self._processes.append(Connected(self.port, self._is_woken))
         return self._processes[-1]
 
     def until(self, condition: Callable[[], object], within: float = 30.0) -> float:
@@ -84,9 +88,10 @@ class Network:
         start = time.monotonic()
         while not condition():
             assert time.monotonic() - start < within, "it did not happen in time"
+            self._is_woken.wait(_PAUSE)
+            self._is_woken.clear()
             for process in self._processes:
                 process.turn()
-            os.sched_yield()
         return time.monotonic() - start
 
     def close(self) -> None:

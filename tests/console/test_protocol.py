@@ -509,13 +509,13 @@ def test_no_frame_raises_and_whatever_is_sent_is_json(frames: list[tuple[int, An
 def test_a_long_message_holds_up_nobody(type_: str, field: str, item: str) -> None:
     room = Room()
     client = room.client()
-    frame = f'{{"op":"publish","topic":"/x","type":"{type_}","msg":{{"{field}":[{",".join([item] * 1_000_000)}]}}}}'
+    frame = f'{{"op":"publish","topic":"/x","type":"{type_}","msg":{{"{field}":[{",".join([item] * 300_000)}]}}}}'
     began = time.process_time()
     client.sends(frame)
     taken = time.process_time() - began
     began = time.process_time()
     json.loads(frame)
-    assert taken < 6 * (time.process_time() - began) + 0.2
+    assert taken < 6 * (time.process_time() - began) + 0.1
 
 
 def test_many_wrong_fields_hold_up_nobody() -> None:

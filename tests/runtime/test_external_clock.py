@@ -220,12 +220,14 @@ class Simulator:
         self.time = 1000.0
         self._publish, self._last = publish, time.monotonic()
 
-    def run(self) -> None:
-        """Tell the next step, if it is due."""
-        if time.monotonic() - self._last >= self.STEP:
-            self._last = time.monotonic()
-            self.time += self.STEP
-            self._publish(Clock(clock=to_time(round(self.time * NANOSECONDS))))
+    def run(self) -> bool:
+        """Publish the next step if it is due; return whether it is."""
+        if time.monotonic() - self._last < self.STEP:
+            return False
+        self._last = time.monotonic()
+        self.time += self.STEP
+        self._publish(Clock(clock=to_time(round(self.time * NANOSECONDS))))
+        return True
 
 
 @pytest.fixture
@@ -236,7 +238,7 @@ def follower(network: Network) -> Iterator[subprocess.Popen[str]]:
     file.write_text(MANIFEST.format(port=network.port), encoding="utf-8")
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder), "NO_COLOR": "1"}
     robot = subprocess.Popen(
-        [sys.executable, "-m", "rbxcompose", "up", str(file), "--for", "0.6s"],
+        [sys.executable, "-m", "rbxcompose", "up", str(file), "--for", "1.5s"],
         env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -267,10 +269,10 @@ def test_a_real_robot_follows_stands_goes_on_jumps_and_bears_a_dispute(
     process.bus.subscribe("simulator", "/diagnostics", DiagnosticArray, Qos.STATE, take)
 
     def drive() -> None:
-        simulator.run()
-        steer(FORWARD)
+        if simulator.run():
+            steer(FORWARD)
 
-    def until(holds: Callable[[], object], meanwhile: Callable[[], None]) -> None:
+    def until(holds: Callable[[], object], meanwhile: Callable[[], object]) -> None:
         def look() -> object:
             meanwhile()
             return holds()
