@@ -113,7 +113,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if group_of(item.nodeid):
             item.add_marker(pytest.mark.flaky(reruns=2))
             if not item.get_closest_marker("timeout"):
-                item.add_marker(pytest.mark.timeout(LONGEST))  # what must be quick is asserted by the test itself
+                item.add_marker(pytest.mark.timeout(LONGEST))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -185,7 +185,6 @@ def marked(draw: st.DrawFn, depth: int = 0) -> str:
     return "\n ".join(parts)
 
 
-@pytest.mark.timeout(60)
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(inside=marked())
 def test_the_fix_of_any_file_gives_back_the_prefixes_that_it_lost(inside: str, tmp_path: Path) -> None:

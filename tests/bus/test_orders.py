@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from rbxcompose.bus.topics import OrderPublisher
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.sdk.ports import Qos
@@ -57,7 +55,6 @@ def test_orders_wait_until_the_component_is_open(alone: Alone) -> None:
     assert got == [1.0, 2.0, 3.0]
 
 
-@pytest.mark.timeout(20)
 def test_a_listener_of_another_process_is_found_gets_the_first_order_and_is_missed(network: Network) -> None:
     here, there = network.process(), network.process()
     send = orders(here)

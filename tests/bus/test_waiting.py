@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from rbxcompose.bus.services import LOST
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.std_srvs import Trigger
@@ -53,7 +51,6 @@ def test_a_goal_waits_and_is_judged_by_what_holds_then(alone: Alone) -> None:
     assert server.current is not None
 
 
-@pytest.mark.timeout(20)
 def test_a_request_of_another_process_waits_too(network: Network) -> None:
     here, there = network.process(), network.process()
     there.bus.serve_later("bell", "ring", Trigger, lambda asked: asked.reply(Trigger.Response()), waits=True)

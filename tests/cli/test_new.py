@@ -27,7 +27,6 @@ def files(folder: Path) -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
-@pytest.mark.timeout(60)  # several commands, one of which runs tests
 def test_a_robot_a_part_and_a_mission_make_a_project_whose_tests_pass(project: Path) -> None:
     assert command.main(["new", "robot", "cart", "--yes"]) == 0
     assert command.main(["new", "mission", "lap", "--yes"]) == 0

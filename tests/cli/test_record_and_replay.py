@@ -187,7 +187,6 @@ def test_a_full_disk_ends_the_recording_with_a_finding_and_what_was_written_is_r
     assert found
 
 
-@pytest.mark.timeout(60)
 def test_two_seconds_of_a_robot_and_a_recorder_that_is_killed(robot: Shell) -> None:
     topics = ("odom", "/cmd_vel*", "tf_static")
     told = json.loads(robot.do("record", "--for", "2s", "-o", "whole.mcap", "--json", "--topics", *topics))

@@ -17,7 +17,6 @@ from tests.cli.live_robot import PATIENCE, Robot
 from tests.console.test_gateway_live import free_port
 from tests.runtime.real_robot import eventually
 
-pytestmark = pytest.mark.timeout(60)
 PORT = free_port()
 MANIFEST = f"""
 rbx: 1

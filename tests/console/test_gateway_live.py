@@ -39,7 +39,6 @@ from tests.conftest import ROOT
 from tests.console.browser import CHROMIUM, chromium, console
 
 TELEOP = "/cmd_vel/teleop"
-pytestmark = pytest.mark.timeout(60)
 
 
 def free_port() -> int:

@@ -33,7 +33,6 @@ robots: {{{NAME}: {{robot: robots/turtlebot/robot.yaml}}}}
 LONGEST = 30.0  # [s] for a loaded machine to start the robot
 
 
-@pytest.mark.timeout(60)
 def test_a_unit_is_ready_and_alive_and_ends_in_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for folder in ("robots/turtlebot", "missions"):

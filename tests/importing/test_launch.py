@@ -288,7 +288,6 @@ BAD = {
 }  # fmt: skip
 
 
-@pytest.mark.timeout(60)
 @pytest.mark.parametrize("name", BAD)
 def test_python_that_does_more_than_declare_is_a_finding(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -23,7 +23,6 @@ from rbxcompose.sdk.robot_events import MissionOver
 from rbxcompose.testing import Bench, instance
 from tests.conftest import ROOT
 
-pytestmark = pytest.mark.timeout(60)
 TAGS = {"west": Pose2(0.0, 2.0, 0.0), "north": Pose2(3.0, 5.0, -math.pi / 2), "east": Pose2(6.0, 1.0, math.pi)}
 POSES = st.builds(Pose2, st.floats(1, 5), st.floats(0.5, 4), st.floats(-3.1, 3.1))
 NOISE = (0.01, 0.01, 0.02)  # [m], [m], [rad]

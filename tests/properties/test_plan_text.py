@@ -124,7 +124,6 @@ def test_the_robot_of_these_tests_is_one(tmp_path: Path) -> None:
     assert load(dump(checked.plan)) == checked.plan
 
 
-@pytest.mark.timeout(60)
 def test_a_plan_that_came_back_runs_to_the_same_log() -> None:
     plan = shipped(ROOT / "robots/turtlebot/robot.yaml")
     assert run_robot(load(dump(plan))).log == run_robot(plan).log

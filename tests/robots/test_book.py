@@ -54,7 +54,6 @@ def test_a_robot_has_no_findings(robot: str) -> None:
     assert list(compiled(robot, "tired").report) == []
 
 
-@pytest.mark.timeout(60)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_each_mission_does_what_it_should(robot: str, subtests: pytest.Subtests) -> None:
     for mission in missions_of(robot):

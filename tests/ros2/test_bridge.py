@@ -21,7 +21,6 @@ from rbxcompose.sdk.ports import Qos
 from tests.cli.live_robot import Robot
 from tests.console.test_gateway_live import free_port
 
-pytestmark = pytest.mark.timeout(60)  # discovery of DDS takes its time, most of all after a kill
 HERE = Path(__file__).parent
 DOMAIN = 57
 MANIFEST = """rbx: 1

@@ -144,7 +144,6 @@ class Overlaid(dict[str, Structure]):
 NOT_THERE = "control nav2 object_recognition octomap people rbxcompose tf2 vision"
 
 
-@pytest.mark.timeout(60)  # a generator in another Python
 @for_all("package", [*(f"{name}_msgs" for name in NOT_THERE.split()), "example_interfaces", "topic_tools_interfaces"])
 def test_rosidl_gives_our_texts_of_what_this_ros_2_lacks_the_same_hashes(ros2_python: Path, package: str) -> None:
     theirs = _rosidl(ros2_python, INTERFACES / package)

@@ -23,7 +23,6 @@ from tests.navigation.test_eyes import LEVEL
 from tests.navigation.test_robot import Room
 from tests.navigation.test_sensors import SELDOM_PHYSICS
 
-pytestmark = pytest.mark.timeout(60)
 DT, RATE, VIEW = 0.05, 8.0, math.radians(30)  # [s], pictures in a second [Hz], half the view
 STARTS = 100
 

@@ -33,7 +33,6 @@ from tests.navigation.test_robot import Room
 from tests.navigation.test_sensors import SELDOM_PHYSICS
 from tests.parts.project import Project
 
-pytestmark = pytest.mark.timeout(60)
 SETTINGS = FollowingSettings()
 DT = 0.05
 AWAY, BEARINGS = st.floats(0.05, 8), st.floats(-math.pi, math.pi)
