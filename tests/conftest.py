@@ -123,8 +123,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Return how many workers `-n auto` starts: another beside each processor, since two of them mostly wait."""
-    return (os.cpu_count() or 1) + 1
+    """Return how many workers `-n auto` starts: two beside the processors, since two of them mostly wait."""
+    return (os.cpu_count() or 1) + 2
 
 
 @pytest.hookimpl(optionalhook=True)
