@@ -27,7 +27,7 @@ class CounterConfig(Config):
     """Cannot be configured."""
 
 
-@component("counter_for_changes")
+@component("toy_counter")
 class Counter(Component[CounterConfig]):
     """Counts, and keeps the count of whose place it takes."""
 
@@ -62,7 +62,7 @@ class Counter(Component[CounterConfig]):
 
 
 def bench() -> Bench:
-    return Bench(instance("counter", "counter_for_changes"), instance("other", "counter_for_changes"))
+    return Bench(instance("counter", "toy_counter"), instance("other", "toy_counter"))
 
 
 def test_what_is_retired_brakes_and_is_heard_of_no_more() -> None:
@@ -80,7 +80,7 @@ def test_another_takes_the_place_and_goes_on_while_the_neighbour_does_not_notice
     one.advance(1.0)
     neighbour = one.component("other")
     one.host.retire(["counter"])
-    one.host.prepare([instance("counter", "counter_for_changes", {"by": 2.0, "start": 100.0})])
+    one.host.prepare([instance("counter", "toy_counter", {"by": 2.0, "start": 100.0})])
     assert one.host.states()["counter"] == ("inactive", 0)
     one.host.activate(["counter"])
     one.advance(1.0)
@@ -90,8 +90,8 @@ def test_another_takes_the_place_and_goes_on_while_the_neighbour_does_not_notice
 
 
 def test_a_component_that_waits_for_its_restart_does_not_come_back_beside_its_successor() -> None:
-    one = Bench(instance("counter", "counter_for_changes", {"fails": True}))
-    one.host.prepare([instance("counter", "counter_for_changes")])
+    one = Bench(instance("counter", "toy_counter", {"fails": True}))
+    one.host.prepare([instance("counter", "toy_counter")])
     one.host.activate(["counter"])
     one.advance(5.0)
     assert not any("restarted" in text for text in one.texts())
@@ -102,7 +102,7 @@ def test_settings_that_changed_are_followed_and_what_a_person_has_set_stays() ->
     one = bench()
     hosted = one.host.hosted["counter"]
     hosted.reconfigure(CounterConfig(by=5.0))
-    new = replace(instance("counter", "counter_for_changes", {"by": 7.0}), restart=Restart(when="never"))
+    new = replace(instance("counter", "toy_counter", {"by": 7.0}), restart=Restart(when="never"))
     assert one.host.follow([new], {"counter": ["restart.when"]}) == {}
     assert hosted.config == CounterConfig(by=5.0)
     assert one.host.follow([new], {"counter": ["by"]}) == {}
@@ -112,7 +112,7 @@ def test_settings_that_changed_are_followed_and_what_a_person_has_set_stays() ->
 
 def test_a_setting_that_is_refused_stays_as_it_was() -> None:
     one = bench()
-    new = instance("counter", "counter_for_changes", {"by": -1.0})
+    new = instance("counter", "toy_counter", {"by": -1.0})
     assert one.host.follow([new], {"counter": ["by"]}) == {"counter": "'counter' refuses: it counts upwards only"}
     assert one.host.hosted["counter"].config == CounterConfig()
 
