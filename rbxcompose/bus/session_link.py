@@ -20,9 +20,13 @@ class SessionLink:
     write. On a link of its own, what matches is that session's, as is what is heard.
     """
 
-    def __init__(self, endpoint: str, subscribed: Iterable[str], served: Iterable[str]) -> None:
-        """Link with the session that listens, or will listen, at an endpoint, and look for it at these keys."""
+    def __init__(self, endpoint: str, id: str, subscribed: Iterable[str], served: Iterable[str]) -> None:
+        """Link with the session that listens, or will listen, at an endpoint; look for what it has at these keys.
+
+        `id` is that of the session: somebody else may have taken its port.
+        """
         self._session = session = open_beside(endpoint)
+        self._id = id
         self._partners: dict[str, Any] = {}  # Zenoh's stubs have another type for how they match
         for key in subscribed:
             self._partners[key] = session.declare_publisher(key, allowed_destination=_REMOTE)
@@ -30,6 +34,11 @@ class SessionLink:
             self._partners[key] = session.declare_querier(key, allowed_destination=_REMOTE)
         self._heard: set[str] = set()
         self._subscriber: zenoh.Subscriber[None] | None = None
+
+    @property
+    def is_linked(self) -> bool:
+        """Return whether that session is at the other end."""
+        return self._id in map(str, self._session.info.peers_zid())
 
     def listen(self, keys: str | None) -> None:
         """Hear from now on what it publishes at `keys`, an expression; with None, nothing."""

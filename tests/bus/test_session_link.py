@@ -24,7 +24,7 @@ def sessions() -> Iterator[Sessions]:
     with ExitStack() as stack:
         router = stack.enter_context(open_router(at := tcp_endpoint(free_port())))
         settings, endpoint = guest_settings(at, "a1")
-        link = SessionLink(endpoint, ["0/cmd_vel"], ["0/reset"])  # before the program is there
+        link = SessionLink(endpoint, "a1", ["0/cmd_vel"], ["0/reset"])  # before the program is there
         stack.callback(link.close)
         program = stack.enter_context(zenoh.open(zenoh.Config.from_json5(as_file(settings))))
         other = stack.enter_context(open_peer(at))
@@ -46,6 +46,18 @@ def test_what_a_session_subscribes_to_and_serves_is_seen_and_what_others_do_is_n
     for end in ends:
         end.undeclare()
     eventually(lambda: link.matching() == [])
+
+
+def test_another_session_at_its_endpoint_is_not_taken_for_it() -> None:
+    with ExitStack() as stack:
+        stack.enter_context(open_router(at := tcp_endpoint(free_port())))
+        settings, endpoint = guest_settings(at, "a1")
+        right, wrong = (SessionLink(endpoint, name, [], []) for name in ("a1", "b2"))
+        stack.callback(right.close)
+        stack.callback(wrong.close)
+        stack.enter_context(zenoh.open(zenoh.Config.from_json5(as_file(settings))))
+        eventually(lambda: right.is_linked and bool(wrong._session.info.peers_zid()))
+        assert not wrong.is_linked
 
 
 def test_what_a_session_publishes_is_heard_and_nobody_else_knows_of_that(sessions: Sessions) -> None:

@@ -38,7 +38,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "__init__": Cost(code=1, files=1, small=1, imports=0),
     "__main__": Cost(code=4, files=1, small=1, imports=2),
     "base": Cost(code=3745, files=33, small=4, imports=234),
-    "bus": Cost(code=2441, files=21, small=1, imports=174),
+    "bus": Cost(code=2445, files=21, small=0, imports=174),
     "commands": Cost(code=2495, files=25, small=1, imports=291),
     "compiler": Cost(code=7720, files=76, small=9, imports=933),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
@@ -67,7 +67,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114283,
+    "lines of code": 114287,
     "files": 951,
     "files of 1 to 30 lines of code": 75,
     "lines of imports": 11211,

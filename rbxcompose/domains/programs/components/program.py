@@ -297,7 +297,8 @@ class Runner(Component[R]):
         order = self.order({**os.environ, **self.joining})
         if self.joins_bus and order is not None:
             subscribed, served = self._keys_of(EndKind.SUBSCRIBER), self._keys_of(EndKind.QUERYABLE)
-            self.link, self.linked = SessionLink(self.endpoint, subscribed, served), self.real_time.now()
+            self.link = SessionLink(self.endpoint, self.session, subscribed, served)
+            self.linked = self.real_time.now()
         self.connect()
         if order is not None:
             self.child = Child(order)
@@ -554,10 +555,12 @@ class Runner(Component[R]):
         self.state = TaskStatus(status.level, f"runs; {status.message}", status.values)
 
     def _seen(self, link: SessionLink, domain: int) -> set[KeyOnBus]:
-        """Return what is seen of its session.
+        """Return what is seen of its session; nothing, if it is not the one that it was given.
 
         A publisher that is silent cannot be seen. If there is anything else, those that are declared count as there.
         """
+        if not link.is_linked:
+            return set()
         since = self.real_time.now() - self.linked
         link.listen(f"{domain}/**" if since < _LISTENS or since % _AGAIN < 2 * LOOKS else None)
         declared = {key.text(domain): key for _, _, key in self._keys()}
