@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -103,13 +104,30 @@ def robot(ros2_python: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterat
         ours=sys.executable,
         base=HERE.parent / "programs/bare_base.py",
     )
-    made = Robot(tmp_path_factory.mktemp("ros"), text)
+    made, before = Robot(tmp_path_factory.mktemp("ros"), text), shared_memory()
     (made.file.parent / "ask.yaml").write_text(MISSION)
     up = made.do("up", "-d", str(made.file))
     assert up.returncode == 0, up.stdout + up.stderr
     until(made, lambda: "true" in made.do("service", "call", "beep").stdout)
     yield made
     made.do("down")
+    used = in_use()
+    for path in shared_memory() - before:  # Fast DDS leaves what killed nodes had
+        if str(path).removesuffix("_el") not in used:
+            path.unlink(missing_ok=True)
+
+
+def shared_memory() -> set[Path]:
+    return set(Path("/dev/shm").glob("*fastdds_*"))
+
+
+def in_use() -> set[str]:
+    """Return the files in shared memory that a process has."""
+    found = set[str]()
+    for path in Path("/proc").glob("[0-9]*/maps"):
+        with suppress(OSError):  # it has ended
+            found |= {line.split()[-1] for line in path.read_text().splitlines() if "/dev/shm/" in line}
+    return found
 
 
 def until(robot: Robot, holds: object, rounds: int = 200) -> None:
