@@ -57,8 +57,8 @@ class Talker:
         return found.processes
 
     def hear(self) -> None:
-        """Wait until the program has spoken."""
-        for process in self.processes:
+        """Wait until the program has spoken, unless it was so quick that nothing is left of it."""
+        for process in self.processes if self.utterance is not None else ():
             process.wait(timeout=10)
         self.bench.advance(0.2)
 
