@@ -106,14 +106,13 @@ def guest_settings(router: str, session: str) -> tuple[dict[str, object], str]:
     """
     endpoint = _endpoint_beside(router) if is_private(router) else tcp_endpoint(_free_port())
     admin = {"enabled": True, "permissions": {"read": True, "write": False}}
-    others = {"id": session, "listen/endpoints": [endpoint], "listen/exit_on_failure": False, "adminspace": admin}
-    return {**peer_settings(router), **others}, endpoint
+    return {**peer_settings(router), "id": session, "listen/endpoints": [endpoint], "adminspace": admin}, endpoint
 
 
 def _free_port() -> int:
-    with socket.socket() as one:
-        one.bind((LOOPBACK, 0))
-        return int(one.getsockname()[1])
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        return int(probe.getsockname()[1])
 
 
 def as_file(settings: Mapping[str, object]) -> str:

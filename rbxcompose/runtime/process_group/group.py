@@ -84,7 +84,9 @@ def change_settings(host: Host, order: messages.SettingOrder, channel: messages.
         case messages.PrepareChange():
             channel.send(_prepared(host, order))
         case messages.CommitChange(number, decides):
-            reason = changes.commit(number if decides is None else changes.claim(number, decides))
+            if decides is not None:
+                changes.claim(number, decides)
+            reason = changes.commit(number)
             channel.send(messages.ChangeFollowed(number, reason))
             if decides is not None and not reason:
                 changes.end(number)

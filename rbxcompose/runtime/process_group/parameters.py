@@ -78,10 +78,9 @@ class LiveChanges:
         types = {name: (self.hosted[name].instance.type, config) for name, config in configs.items()}
         return dump_configs(types) if types else ""
 
-    def claim(self, number: int, asked: int) -> int:
+    def claim(self, number: int, asked: int) -> None:
         """Let what was prepared when it was asked for be that of a change, unless that was prepared itself."""
         self._prepared.setdefault(number, self._prepared.pop(-asked, ()))
-        return number
 
     def is_open(self, name: str) -> bool:
         """Return whether no change of a component is prepared."""

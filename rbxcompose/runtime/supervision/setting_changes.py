@@ -79,7 +79,7 @@ class SettingChanges:
         self._change: _Change | None = None
         self._count = 0
         self._is_held = False
-        self._changed = set[str]()  # the processes that have carried out a change: their settings are not the plan's
+        self._changed = set[str]()  # the processes that were to apply a change: their settings may not be the plan's
 
     @property
     def is_busy(self) -> bool:
@@ -174,7 +174,6 @@ class SettingChanges:
                 change.stuck += [reason] if reason else []
             case messages.ChangeFollowed():
                 change.done += [] if reason else [process]
-                self._changed |= set() if reason else {process}
         if reason and change.step is not _Step.GOING_BACK:
             change.refusal = change.refusal or ChangeRefusal(reason)
         self._proceed(change)
@@ -202,6 +201,7 @@ class SettingChanges:
             self._commit(change)
 
     def _commit(self, change: _Change) -> None:
+        self._changed |= change.parts.keys()
         decides = change.asked.number if change.is_own else None
         self._order(change, _Step.COMMITTING, change.parts, messages.CommitChange(change.number, decides))
 
