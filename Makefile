@@ -43,14 +43,15 @@ lerobot: .lerobot/.made  ## LeRobot in an environment of its own, 8 GB: its read
 	.lerobot/bin/python -m pip install -q --disable-pip-version-check lerobot==0.4.4
 	@touch $@
 
-test: lint types unit
+test: lint  ## Types are checked beside the tests, by what these leave of the processors
+	@$(MAKE) --no-print-directory -j2 types unit
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
 types: messages
-	$(BIN)/mypy
+	nice -n 15 $(BIN)/mypy
 
 unit: $(VENV)/.test  ## On all cores; `make unit PYTEST="-n 0 tests/bus"` runs some tests in one process
 	$(BIN)/python -m pytest -q $(PYTEST)

@@ -104,16 +104,26 @@ def compile_for_arms(flags: int = 0) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Begin with what takes longest; let tests of real processes try again, since a busy machine keeps no deadline."""
+    """Begin with what takes longest; let tests try again, since a busy machine keeps no deadline.
+
+    Those of real processes try three times; many others start a program or a session as well, and try twice. The
+    summary lists each test that did. What a test decides without the machine fails again.
+    """
     if not config.getoption("--soak"):
         config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("soak")])
         items[:] = [item for item in items if not item.get_closest_marker("soak")]
     items.sort(key=lambda item: turn_of(item.nodeid))
     for item in items:
-        if group_of(item.nodeid):
-            item.add_marker(pytest.mark.flaky(reruns=2))
-            if not item.get_closest_marker("timeout"):
-                item.add_marker(pytest.mark.timeout(LONGEST))
+        is_real = group_of(item.nodeid) is not None
+        item.add_marker(pytest.mark.flaky(reruns=2 if is_real else 1))
+        if is_real and not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(LONGEST))
+
+
+def pytest_sessionfinish() -> None:
+    """Look for garbage once: pytest does it five times at the end, among all that thousands of tests have left."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

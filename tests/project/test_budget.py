@@ -57,7 +57,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/vision": Cost(code=2602, files=31, small=1, imports=354),
     "domains/worlds": Cost(code=4629, files=41, small=4, imports=561),
     "manifest": Cost(code=3512, files=27, small=1, imports=280),
-    "missions": Cost(code=12295, files=135, small=19, imports=1300),
+    "missions": Cost(code=12299, files=135, small=19, imports=1301),
     "msgs": Cost(code=1558, files=16, small=3, imports=107),
     "runtime": Cost(code=7590, files=46, small=1, imports=708),
     "sdk": Cost(code=1467, files=12, small=2, imports=156),
@@ -67,7 +67,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114287,
+    "lines of code": 114291,
     "files": 951,
     "files of 1 to 30 lines of code": 75,
     "lines of imports": 11211,

@@ -8,7 +8,8 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-from pydantic import InstanceOf, WithJsonSchema
+from pydantic import GetCoreSchemaHandler, WithJsonSchema
+from pydantic_core import CoreSchema, core_schema
 
 from rbxcompose.base.expressions.types import Type
 from rbxcompose.base.requests import Command
@@ -53,7 +54,19 @@ RESTART, ASK = "restart", "ask"  # after a crash
 NO_INPUTS: Mapping[str, str] = {}
 
 T = TypeVar("T")
-Made = Annotated[InstanceOf[T], WithJsonSchema({"type": "object"})]  # made by the compiler, never by people
+
+
+class IsInstance:
+    """Takes an instance of the annotated class as it is.
+
+    `pydantic.InstanceOf` also works out how each field of a dataclass would be read, which takes a tenth of a `check`.
+    """
+
+    def __get_pydantic_core_schema__(self, source: type, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.is_instance_schema(source)
+
+
+Made = Annotated[T, IsInstance(), WithJsonSchema({"type": "object"})]  # made by the compiler, never by people
 
 
 class MissionConfig(Config):
