@@ -120,12 +120,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.timeout(LONGEST))
 
 
-def pytest_sessionfinish() -> None:
-    """Look for garbage once: pytest does it five times at the end, among all that thousands of tests have left."""
-    gc.collect()
-    gc.freeze()
-
-
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-golden", action="store_true", help="write golden files")
     parser.addoption("--soak", action="store_true", help="try many more random examples, and keep the figures")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import rbxcompose
@@ -22,12 +22,15 @@ def families() -> str:
     return table(("codes", "about", "declared in"), rows)
 
 
-def declared() -> Iterator[tuple[str, str]]:
-    """Give the package or module and the code of each kind of finding that ships."""
+@cache
+def declared() -> tuple[tuple[str, str], ...]:
+    """Return the package or module and the code of each kind of finding that ships."""
     [home] = map(Path, rbxcompose.__path__)
-    for path in sorted(home.rglob("*.py")):
-        for code in _DECLARED.findall(path.read_text(encoding="utf-8")):
-            yield path.relative_to(home).parts[0].removesuffix(".py"), code
+    return tuple(
+        (path.relative_to(home).parts[0].removesuffix(".py"), code)
+        for path in sorted(home.rglob("*.py"))
+        for code in _DECLARED.findall(path.read_text(encoding="utf-8"))
+    )
 
 
 def next_code(family: str) -> str:

@@ -3,7 +3,6 @@
 import fcntl
 import os
 import stat
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -18,6 +17,8 @@ def replace_file(path: Path, data: bytes, *, mode: int | None = None) -> None:
     Raises:
         OSError: if it cannot be written; the old file is then unchanged.
     """
+    import tempfile  # with compression and random numbers, which no check needs
+
     mode = _mode_of(path) if mode is None else mode
     descriptor, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=TEMPORARY, dir=path.parent)
     try:

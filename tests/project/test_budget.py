@@ -59,7 +59,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "manifest": Cost(code=3512, files=27, small=1, imports=280),
     "missions": Cost(code=12299, files=135, small=19, imports=1301),
     "msgs": Cost(code=1558, files=16, small=3, imports=107),
-    "runtime": Cost(code=7590, files=46, small=1, imports=708),
+    "runtime": Cost(code=7597, files=46, small=1, imports=712),
     "sdk": Cost(code=1467, files=12, small=2, imports=156),
     "testing": Cost(code=629, files=7, small=2, imports=78),
     "tools": Cost(code=18212, files=143, small=10, imports=1974),
@@ -67,10 +67,10 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114291,
+    "lines of code": 114298,
     "files": 951,
     "files of 1 to 30 lines of code": 75,
-    "lines of imports": 11211,
+    "lines of imports": 11214,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 388,
