@@ -22,6 +22,11 @@ CURES = [
         "    type: lidar_driver\n",
         "if a package brings it, install that; 'rbxcompose new component lidar_driver' begins one of your own",
     ),
+    (
+        GO_TO,
+        "    type: joint_trajectory_controller/JointTrajectoryController\n",
+        "write it below 'controllers', with the type 'joint_trajectory'",
+    ),
     (GO_TO, f"{GO_TO}    depends_on: [base]\n", "did you mean 'starts_after'?"),
     ("muxes:", "diagnostics: {rate: 20 ms}\nmuxes:", "a period as a rate: write '50 Hz'"),
     ("timeout: 0.5 s", "timeout: 2 Hz", "once every 0.5 s: write '0.5 s'"),

@@ -40,7 +40,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "base": Cost(code=3745, files=33, small=4, imports=234),
     "bus": Cost(code=2445, files=21, small=0, imports=174),
     "commands": Cost(code=2495, files=25, small=1, imports=291),
-    "compiler": Cost(code=7720, files=76, small=9, imports=933),
+    "compiler": Cost(code=7724, files=76, small=9, imports=933),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
     "domains/arms": Cost(code=13025, files=77, small=2, imports=1195),
     "domains/bases": Cost(code=2104, files=19, small=0, imports=185),
@@ -67,10 +67,10 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114298,
+    "lines of code": 114302,
     "files": 951,
     "files of 1 to 30 lines of code": 75,
-    "lines of imports": 11214,
+    "lines of imports": 11215,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 388,

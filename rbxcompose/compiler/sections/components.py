@@ -22,6 +22,7 @@ from rbxcompose.base.findings import (
 from rbxcompose.base.plugins import BROKEN, LEFT_OUT, BrokenPluginError
 from rbxcompose.base.printable import plain
 from rbxcompose.manifest.foreign_words import COMPONENTS as FOREIGN_TYPES
+from rbxcompose.manifest.foreign_words import CONTROLLERS
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.salvage import salvaged
 from rbxcompose.manifest.section import (
@@ -251,8 +252,11 @@ def _as_type(node: MappingNode) -> tuple[ScalarNode, ScalarNode] | None:
 def _unknown_type(name: str, written: ScalarNode) -> Finding:
     shown = plain(written.text, 60)
     message = f"component '{name}' has a type that does not exist: '{shown}'"
-    if ours := FOREIGN_TYPES.get(written.text.rpartition("/")[-1]):
+    theirs = written.text.rpartition("/")[-1]
+    if ours := FOREIGN_TYPES.get(theirs):
         return UNKNOWN_TYPE.at(written.span, message, help=f"{DID_YOU_MEAN} '{ours}'?")
+    if ours := CONTROLLERS.get(theirs):
+        return UNKNOWN_TYPE.at(written.span, message, help=f"write it below 'controllers', with the type '{ours}'")
     finding = UNKNOWN_TYPE.misspelt(written.span, message, written.text, _types(), "types")
     if finding.help.startswith(DID_YOU_MEAN) or not is_valid(Name, written.text):
         return finding
