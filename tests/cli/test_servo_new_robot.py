@@ -98,7 +98,7 @@ def test_servos_at_another_rate_are_left_out_with_the_way_to_change_it(made: Mak
     assert "warning[RBX2250]: the XL430-W250 at id 1 has 57600 bit/s, the bus 1000000; it is left out" in told
     assert "rbxcompose servo set-id 1 3 --port FOLDER/servos --baud 57600" in told
     assert "rbxcompose servo write 3 baud=3 --port FOLDER/servos --baud 57600" in told
-    where = ["--port", str(tmp_path / "servos"), "--baud", "57600", "--timeout", "40ms"]
+    where = ["--port", str(tmp_path / "servos"), "--baud", "57600", "--timeout", "200ms"]
     assert main(["servo", "set-id", "1", "3", *where]) == 0
     assert main(["servo", "relax", "3", *where]) == 0
     assert main(["servo", "write", "3", "baud=3", *where]) == 0

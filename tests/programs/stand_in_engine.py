@@ -25,6 +25,7 @@ class Daemon:
 
     def __init__(self) -> None:
         self.containers: dict[str, subprocess.Popen[bytes]] = {}
+        self.starting = threading.Lock()  # what has said its first word can be removed
 
     def serve(self) -> None:
         """Serve clients until it is killed."""
@@ -50,12 +51,12 @@ class Daemon:
         if name in self.containers:
             return 125
         (output,) = files
-        made = subprocess.Popen(
-            command, env=environment, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True
-        )
+        (file := FOLDER / f"container_{name}").touch()
+        with self.starting:
+            made = self.containers[name] = subprocess.Popen(
+                command, env=environment, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True
+            )
         os.close(output)
-        self.containers[name], file = made, FOLDER / f"container_{name}"
-        file.touch()
         threading.Thread(target=self.pass_on, args=(client, made), daemon=True).start()
         code = made.wait()
         del self.containers[name]
@@ -67,9 +68,10 @@ class Daemon:
             container.send_signal(number[0])
 
     def remove(self, name: str) -> int:
-        if name not in self.containers:
+        with self.starting:
+            container = self.containers.get(name)
+        if container is None:
             return 1
-        container = self.containers[name]
         os.killpg(container.pid, signal.SIGKILL)
         container.wait()
         return 0
