@@ -32,7 +32,7 @@ def made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Iterator[Making]
 
         def make(*servos: FakeServo, more: tuple[str, ...] = ()) -> tuple[int, str]:
             port = stack.enter_context(FakePort(FakeLine(servos, SteppedClock().now), tmp_path / "servos"))
-            words = ["--port", str(port.path), "--timeout", "40ms", "--last", "3", "--into", str(tmp_path)]
+            words = ["--port", str(port.path), "--timeout", "120ms", "--last", "3", "--into", str(tmp_path)]
             code = main(["servo", "new-robot", "arm", *words, *more])
             out, err = capsys.readouterr()
             return code, (out + err).replace(str(tmp_path), "FOLDER")
