@@ -25,7 +25,7 @@ from tests.motion.test_ways_ahead import CONFINED, cluttered, outcome, planning
 from tests.motion.toy_arm import ended
 from tests.soak import rare
 
-pytestmark = pytest.mark.timeout(200)  # each takes seconds to start
+pytestmark = pytest.mark.timeout(100)  # each takes seconds to start
 TIMELESS = float  # a clock that stands still: so many positions are the limit, on any machine
 TIME = 0.3  # [s], in which helpers are asked, and answer first
 SCENES = (CONFINED, 175, 727)  # in which motions are hard to find, or are not found
@@ -68,12 +68,12 @@ def warned() -> list[str]:
     return []
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def pair_warned() -> list[str]:
     return []
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def pair(pair_warned: list[str]) -> Iterator[list[PlanningProcess]]:
     """Return two processes that nothing happens to."""
     both = [started(pair_warned) for _ in range(2)]
