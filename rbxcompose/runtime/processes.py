@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import select
 import signal
@@ -10,18 +11,14 @@ import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rbxcompose.base.dataclass import dataclass
-
-if TYPE_CHECKING:  # few of those who ask for processes call the C library
-    from ctypes import CDLL
 
 _PR_SET_CHILD_SUBREAPER = 36
 _M_MMAP_THRESHOLD = -3  # of mallopt(3)
 _LARGE = 1 << 20  # [B]
+_LIBC = ctypes.CDLL(None, use_errno=True)
 _STATE, _USER_TIME, _SYSTEM_TIME, _START_TIME, _RESIDENT = 0, 11, 12, 19, 21
 """Fields of /proc/<pid>/stat, counted after the last bracket."""
 _MOST_STAT = 4096  # [B]
@@ -166,19 +163,10 @@ def wait_until_ended(processes: Sequence[Process], seconds: float) -> list[Proce
     return [process for process in processes if process.is_running]
 
 
-@cache
-def _libc() -> CDLL:
-    from ctypes import CDLL
-
-    return CDLL(None, use_errno=True)
-
-
 def adopt_orphans() -> None:
     """Become the parent of descendants whose own parent ends, so that they can be waited for."""
-    if _libc().prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) != 0:
-        from ctypes import get_errno
-
-        raise OSError(get_errno(), "prctl(PR_SET_CHILD_SUBREAPER) failed")
+    if _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) != 0:
+        raise OSError(ctypes.get_errno(), "prctl(PR_SET_CHILD_SUBREAPER) failed")
 
 
 def give_back_large_memory() -> None:
@@ -186,12 +174,12 @@ def give_back_large_memory() -> None:
 
     Else the C library considers the size of the last freed block usual, and keeps that much.
     """
-    _libc().mallopt(_M_MMAP_THRESHOLD, _LARGE)
+    _LIBC.mallopt(_M_MMAP_THRESHOLD, _LARGE)
 
 
 def give_back_free_memory() -> None:
     """Return to the system what the C library has of freed memory: all that was needed only to get started."""
-    _libc().malloc_trim(0)
+    _LIBC.malloc_trim(0)
 
 
 def boot_id() -> str:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from itertools import combinations
+from statistics import median
 
 from rbxcompose.base.config import Place
 from rbxcompose.base.expressions.tree import Comparison, ExpressionNode, FunctionCall, Number, walk
@@ -41,8 +42,7 @@ def far_places(robot: Robot) -> list[Place]:
     places = list(robot.manifest.places.values())
     if len(places) < _LEAST:
         return []
-    xs, ys = sorted(place.x for place in places), sorted(place.y for place in places)
-    centre = Place("", xs[len(xs) // 2], ys[len(ys) // 2], 0.0)
+    centre = Place("", median(place.x for place in places), median(place.y for place in places), 0.0)
     near = sorted(distance(place, centre) for place in places)[:-1]
     return [place for place in places if distance(place, centre) > max(_FAR, _TIMES * near[-1])]
 

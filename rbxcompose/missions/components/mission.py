@@ -59,7 +59,7 @@ T = TypeVar("T")
 class IsInstance:
     """Takes an instance of the annotated class as it is.
 
-    `pydantic.InstanceOf` also works out how each field of a dataclass would be read, which takes a tenth of a `check`.
+    `pydantic.InstanceOf` also works out how each field of a dataclass would be read: 10 ms of each `check`.
     """
 
     def __get_pydantic_core_schema__(self, source: type, handler: GetCoreSchemaHandler) -> CoreSchema:
