@@ -75,6 +75,12 @@ def pytest_collection_finish(session: pytest.Session) -> None:
             compile_for_arms(fcntl.LOCK_NB)
 
 
+def pytest_sessionfinish() -> None:
+    """Look for garbage once: pytest does so five times at the end, among all that thousands of tests have left."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
     """Wait for what is compiled outside of the time that a test has; leave those of real time the processors."""

@@ -1,115 +1,142 @@
-"""Commands in processes of their own, forked from one that has imported the package: that saves nine tenths of a start.
+"""Programs in processes of their own, forked from one that has imported the package: that saves most of a start.
 
-A command does the same as it does when Python starts it. What is about the start itself, or lasts, is not for this.
+A program does the same as it does when Python starts it, and its process is a child of the test's, as one of `Popen`
+is. What is about the start itself, or needs packages that are installed for it, is not for this.
 """
 
 from __future__ import annotations
 
 import atexit
+import ctypes
+import io
 import json
 import os
-import select
-import signal
+import runpy
+import socket
 import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from threading import Lock
+from typing import Any, NoReturn
+
+from setproctitle import getproctitle
 
 from rbxcompose.commands.main import main as command
 from rbxcompose.commands.verbs import load
+from rbxcompose.compiler.compile import compile_robot
 
 ROOT = Path(__file__).parents[1]
-VERBS = ("action", "body", "diag", "down", "mission", "mux", "param", "ps", "service", "tf", "top", "topic")
-"""Those that are imported before; others have more to do."""
-_SENDING = Lock()
+RBXCOMPOSE = [sys.executable, "-m", "rbxcompose"]
+VERBS = ("action", "body", "diag", "down", "mission", "mux", "param", "ps", "service", "tf", "top", "topic", "up")
+MODULES = ("rbxcompose.bus.zenoh_transport", "rbxcompose.commands.guest", "rbxcompose.runtime.supervision.launch")
+"""Both are imported before; other programs have more to do."""
+_MOST = 1 << 17  # [B] of an order
+_ADOPTS_ORPHANS = 36  # of prctl(2): processes whose parent has ended become children of this one
+_STARTING = Lock()
+_LIBC = ctypes.CDLL(None, use_errno=True)
+
+
+class Forked(subprocess.Popen[str]):
+    """A process as `Popen` starts it; its words are `RBXCOMPOSE` with arguments, or Python with a script of tests."""
+
+    def _execute_child(self, *given: Any) -> None:
+        """Have it forked: `Popen` leaves to this method what differs between systems."""
+        words, _, _, _, _, folder, environment, _, _, _, *pipes = given
+        order = {"words": words[1:], "folder": str(folder), "environment": dict(environment), "leads": given[-2]}
+        ends = [pipes[end] if pipes[end] >= 0 else number for number, end in enumerate((0, 3, 5))]
+        with _STARTING:
+            _LIBC.prctl(_ADOPTS_ORPHANS, 1, 0, 0, 0)
+            socket.send_fds(_server(), [json.dumps(order).encode()], ends)
+            self.pid = int(_server().recv(_MOST))
+            _LIBC.prctl(_ADOPTS_ORPHANS, 0, 0, 0, 0)
+        self._child_created = True
+        self._close_pipe_fds(*pipes[:6])  # type: ignore[attr-defined]
 
 
 def run_command(
-    words: tuple[str, ...], environment: Mapping[str, str], timeout: float
+    words: tuple[str, ...], environment: Mapping[str, str], timeout: float, folder: Path = ROOT
 ) -> subprocess.CompletedProcess[str]:
-    """Run `rbxcompose` with these words in the root of the repository; several threads may.
+    """Run `rbxcompose` with these words, as `subprocess.run` does; where it finds other packages, Python starts it.
 
     Raises:
         subprocess.TimeoutExpired: if it takes longer than `timeout` [s]; it is killed then.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        order = json.dumps({"words": words, "environment": dict(environment), "folder": folder})
-        status, out, err = (Path(folder, name) for name in ("status", "out", "err"))
-        os.mkfifo(status)
-        reading = os.open(status, os.O_RDWR)  # so that it does not end before it has begun
+    pipe = subprocess.PIPE
+    command = [*RBXCOMPOSE, *words]
+    has_more = environment.get("PYTHONPATH", str(ROOT)) != str(ROOT)
+    with (subprocess.Popen if has_more else Forked)(
+        command, env=environment, cwd=folder, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, text=True
+    ) as process:
         try:
-            with _SENDING:
-                server = _server()
-                assert server.stdin
-                server.stdin.write(f"{order}\n")
-                server.stdin.flush()
-            told = b""
-            while told.count(b"\n") < 2:
-                if not select.select([reading], [], [], timeout)[0]:
-                    for child in map(int, told.split()[:1]):
-                        os.kill(child, signal.SIGKILL)
-                    raise subprocess.TimeoutExpired(words, timeout)
-                told += os.read(reading, 100)
-        finally:
-            os.close(reading)
-        code = int(told.split()[1])
-        return subprocess.CompletedProcess(list(words), code, out.read_text("utf-8"), err.read_text("utf-8"))
+            out, err = process.communicate(timeout=timeout)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            raise
+    return subprocess.CompletedProcess(command, process.returncode, out, err)
 
 
 @cache
-def _server() -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "tests.forked"]
-    server = subprocess.Popen(command, stdin=subprocess.PIPE, text=True, cwd=ROOT)
-    atexit.register(server.communicate)
-    return server
+def _server() -> socket.socket:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with theirs:
+        number = str(theirs.fileno())
+        server = subprocess.Popen([sys.executable, "-m", "tests.forked", number], pass_fds=[theirs.fileno()], cwd=ROOT)
+    atexit.register(server.wait)
+    atexit.register(ours.close)
+    return ours
 
 
 def main() -> None:
-    """Fork a process for each line, which waits for the command and says its number and how it ended."""
+    """Fork a process for each order until nobody is left to give one; answer with its number."""
     for verb in VERBS:
         load(verb)
-    for module in ("rbxcompose.bus.zenoh_transport", "rbxcompose.commands.guest"):
-        import_module(module)  # which verbs import when they need them
-    for line in sys.stdin:
-        while _reaped():
-            pass
-        if os.fork():
-            continue
-        order = json.loads(line)
-        folder = Path(order["folder"])
-        with open(folder / "status", "w", encoding="utf-8") as told:
-            if not (child := os.fork()):
-                _become(order["environment"], folder)
-                sys.argv = ["rbxcompose", *order["words"]]
-                sys.exit(command())
-            print(child, file=told, flush=True)
-            _, status = os.waitpid(child, 0)
-            print(os.waitstatus_to_exitcode(status), file=told, flush=True)
-        os._exit(0)
+    for module in MODULES:
+        import_module(module)
+    compile_robot("robots/turtlebot", environment={})  # imports what a robot is made of
+    getproctitle()  # which finds the words of this process while the environment is where it was
+    orders = socket.socket(fileno=int(sys.argv[1]))
+    while True:
+        text, ends, _, _ = socket.recv_fds(orders, _MOST, 3)
+        if not text:
+            return
+        reading, writing = os.pipe()
+        between = os.fork()  # whose end makes the process a child of the one that has asked
+        if not between:
+            if child := os.fork():
+                os.write(writing, str(child).encode())
+                os._exit(0)
+            for number in (reading, writing, orders.detach()):
+                os.close(number)
+            become(json.loads(text), ends)
+        for number in (writing, *ends):
+            os.close(number)
+        os.waitpid(between, 0)
+        orders.send(os.read(reading, _MOST))
+        os.close(reading)
 
 
-def _reaped() -> bool:
-    try:
-        return os.waitpid(-1, os.WNOHANG)[0] > 0
-    except ChildProcessError:
-        return False
-
-
-def _become(environment: dict[str, str], folder: Path) -> None:
-    """Take over what a new process has: variables, and files for input and output."""
+def become(order: dict[str, Any], ends: list[int]) -> NoReturn:
+    """Take over what a new process has, and be the program."""
+    os.chdir(order["folder"])
     os.environ.clear()
-    os.environ.update(environment)
-    null = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(null, 0)
-    for number, name in ((1, "out"), (2, "err")):
-        file = os.open(folder / name, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
-        os.dup2(file, number)
-        os.close(file)
-    os.close(null)
+    os.environ.update(order["environment"])
+    for number, end in enumerate(ends):
+        os.dup2(end, number)
+        os.close(end)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=os.isatty(1))
+    if order["leads"]:
+        os.setsid()
+    first, *words = order["words"]
+    if first == "-m":
+        sys.argv, sys.path[0] = words, order["folder"]
+        sys.exit(command())
+    sys.argv, sys.path[0] = [first, *words], str(Path(first).parent)
+    runpy.run_path(first, run_name="__main__")
+    sys.exit()
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import rbxcompose
 from rbxcompose.base.files import NotRegularError, TooLargeError, open_regular, read_regular
 
 PACKAGE = Path(rbxcompose.__file__).parent
+OPENING = re.compile(r"\bopen\(|\.read_(?:text|bytes)\(")
 # What these open is no file that a user names: the package's own data, what the system tells, files of a running robot.
 MAY_OPEN = {
     "base/fenced_answers.py",
@@ -83,7 +85,7 @@ def test_nobody_else_opens_files_of_users() -> None:
 def opens_in(path: Path) -> Iterator[int]:
     """Lines that open a file by Python's own means; `something.open()` without arguments opens no file."""
     text = path.read_text(encoding="utf-8")
-    for node in ast.walk(ast.parse(text)) if "open(" in text or "read_" in text else ():
+    for node in ast.walk(ast.parse(text)) if OPENING.search(text) else ():
         match node:
             case ast.Call(func=ast.Name("open")):
                 yield node.lineno

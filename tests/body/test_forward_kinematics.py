@@ -8,10 +8,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.base.findings import Report
+from rbxcompose.compiler.composition.robot_file import load_robot
+from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.sections.body import body
-from tests.body.described import described
+from rbxcompose.manifest.reader import ParsedText, Texts
 from tests.body.kinematics import Three, description_of
 from tests.body.random_bodies import positions, urdfs
 from tests.soak import Soak
@@ -20,26 +22,30 @@ ROBOTS = sorted((Path(__file__).parents[2] / "robots").glob("*/robot.yaml"))
 CLOSE = 1e-9
 
 
-def bodies() -> dict[str, Description]:
-    """Return the body of each robot that has one, in each profile."""
-    found = {}
+def bodies(in_profiles: bool) -> dict[str, Description]:
+    """Return each body that robots have, by the first robot and profile that has it."""
+    found: dict[str, tuple[str, Description]] = {}
     for file in ROBOTS:
-        plain = compile_robot(str(file), environment={}).robot
-        assert plain, file
-        if (description := plain.manifest.contents.of(body)) is None:
-            continue
-        found[file.parent.name] = description
-        for profile in plain.manifest.profiles:
-            robot = compile_robot(str(file), profiles=[profile], environment={}).robot
-            assert robot, (file, profile)
-            found[f"{file.parent.name} {profile}"] = described(robot.manifest)
-    return found
+        parsed: dict[tuple[str, str], ParsedText] = {}
+        plain = manifest_of(file, parsed)
+        names = [f"{file.parent.name} {profile}" for profile in plain.profiles] if in_profiles else []
+        others = {name: manifest_of(file, parsed, name.split()[1]) for name in names}
+        for name, manifest in {file.parent.name: plain, **others}.items():
+            if (description := manifest.contents.of(body)) is not None:
+                found.setdefault(description.text, (name, description))
+    return dict(found.values())
+
+
+def manifest_of(file: Path, parsed: dict[tuple[str, str], ParsedText], *profiles: str) -> RobotManifest:
+    manifest = load_robot(file, report=Report(), sources=Texts({}, parsed), profiles=profiles, environment={})
+    assert manifest, file
+    return manifest
 
 
 @pytest.mark.timeout(600)
 def test_three_libraries_agree_on_every_link_of_the_shipped_robots(soak: Soak) -> None:
     examples = soak.examples(2, 1000)
-    found = bodies()
+    found = bodies(soak.is_on)
     for name, description in found.items():
         _agree(name, Three(description), examples)
     links = sum(len(one.body.links) for one in found.values())

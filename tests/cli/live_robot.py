@@ -7,7 +7,6 @@ import os
 import pty
 import select
 import subprocess
-import sys
 import termios
 from argparse import Namespace
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any, Self
 
 from rbxcompose.commands.lookup import BusPlace, find_place
 from tests.conftest import ROOT
-from tests.forked import run_command
+from tests.forked import RBXCOMPOSE, Forked, run_command
 
 PATIENCE = 20.0  # [s]
 
@@ -29,14 +28,10 @@ class Robot:
         self.file.write_text(f"{text}\n", encoding="utf-8")
 
     def command(self, *words: str) -> list[str]:
-        return [sys.executable, "-m", "rbxcompose", *words]
+        return [*RBXCOMPOSE, *words]
 
     def do(self, *words: str) -> subprocess.CompletedProcess[str]:
-        if words[0] != "up":
-            return run_command(words, self.environment, PATIENCE)
-        return subprocess.run(
-            self.command(*words), env=self.environment, capture_output=True, text=True, timeout=PATIENCE, cwd=ROOT
-        )
+        return run_command(words, self.environment, PATIENCE)
 
     def told(self, *words: str) -> Any:
         """Return what a command answers in JSON."""
@@ -57,7 +52,7 @@ class Keyboard:
         self.ours, self.theirs = pty.openpty()
         self.press(early)
         self.before = termios.tcgetattr(self.theirs)
-        self.process = subprocess.Popen(
+        self.process = Forked(
             robot.command(*words),
             env=robot.environment,
             cwd=ROOT,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import shutil
 import signal
-import subprocess
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +16,6 @@ from rbxcompose.commands.guest import Guest
 from rbxcompose.msgs.cdr import decode
 from rbxcompose.msgs.sensor_msgs import JointState
 from tests.cli.live_robot import PATIENCE, Keyboard, Robot
-from tests.conftest import ROOT
 
 MANIFEST = """rbx: 1
 kind: Robot
@@ -130,8 +128,5 @@ def test_an_end_that_was_typed_before_it_was_ready_counts(robot: Robot) -> None:
 
 
 def test_sliders_need_a_terminal(robot: Robot) -> None:
-    words = robot.command("body", "pose")
-    done = subprocess.run(
-        words, env=robot.environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, cwd=ROOT
-    )
+    done = robot.do("body", "pose")
     assert (done.returncode, "RBX9027" in done.stderr) == (1, True)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,6 +18,7 @@ from rbxcompose.sdk.parameters import changed, to_message
 from rbxcompose.testing import check_text
 from rbxcompose.tools.live_rules import LiveRules
 from tests.conftest import ROOT
+from tests.forked import run_command
 
 ROBOT = """rbx: 1
 kind: Robot
@@ -114,8 +113,7 @@ def test_what_a_mission_sets_keeps_the_rules_of_the_robot(tmp_path: Path, pace: 
     (tmp_path / "robot.yaml").write_text(text)
     (tmp_path / "hurry.yaml").write_text(MISSION)
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "PYTHONPATH": str(ROOT), "NO_COLOR": "1"}
-    words = [sys.executable, "-m", "rbxcompose", "up", str(tmp_path), *pace]
-    done = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=30, cwd=ROOT)
+    done = run_command(("up", str(tmp_path), *pace), environment, 30.0)
     assert "set: speed = 0.4 m/s, by mission hurry" in done.stdout, done.stdout + done.stderr
     assert "'base' can do 0.5 m/s at most (RBX3503)" in done.stdout, done.stdout
     assert "set: speed = 0.55 m/s" not in done.stdout

@@ -19,6 +19,7 @@ from rbxcompose.msgs.cdr import decode
 from rbxcompose.msgs.geometry_msgs import Twist
 from tests.cli.live_robot import PATIENCE, Keyboard, Robot
 from tests.conftest import ROOT
+from tests.forked import Forked
 
 FAR = "{pose: {header: {frame_id: map}, pose: {position: {x: 50}, orientation: {w: 1}}}}"
 NEAR = "{pose: {header: {frame_id: map}, pose: {orientation: {w: 1}}}}"
@@ -115,7 +116,7 @@ def test_a_goal_is_sent_and_its_result_printed(robot: Robot) -> None:
 
 def test_an_interrupt_cancels_the_goal(robot: Robot) -> None:
     words = robot.command("action", "send", "/go_to", FAR, "--json")
-    with subprocess.Popen(words, env=robot.environment, stdout=subprocess.PIPE, text=True, cwd=ROOT) as sending:
+    with Forked(words, env=robot.environment, stdout=subprocess.PIPE, text=True, cwd=ROOT) as sending:
         assert sending.stdout is not None
         assert "feedback" in json.loads(sending.stdout.readline())
         sending.send_signal(signal.SIGINT)
@@ -152,7 +153,7 @@ def test_where_a_frame_was_is_shown_and_who_asks_for_too_much_is_told_what_is_kn
 def publishing(robot: Robot, *words: str) -> Iterator[None]:
     """Place a frame, with `tf static`, until the end of the block."""
     command = robot.command("tf", "static", *words)
-    with subprocess.Popen(command, env=robot.environment, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
+    with Forked(command, env=robot.environment, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == f"'{words[1]}' is in '{words[0]}'; Ctrl-C ends it\n"
         yield
@@ -237,12 +238,5 @@ def test_the_end_of_input_ends_driving(robot: Robot) -> None:
 
 
 def test_driving_needs_a_terminal(robot: Robot) -> None:
-    done = subprocess.run(
-        robot.command("drive"),
-        env=robot.environment,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-    )
+    done = robot.do("drive")
     assert (done.returncode, "RBX9027" in done.stderr) == (1, True)

@@ -6,7 +6,6 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -59,10 +58,7 @@ def do(base: Path) -> Iterator[Do]:
     (base / "robot.yaml").write_text(MANIFEST, encoding="utf-8")
 
     def run(*words: str) -> subprocess.CompletedProcess[str]:
-        if words[0] != "up":
-            return run_command(words, environment, PATIENCE)
-        command = [sys.executable, "-m", "rbxcompose", *words]
-        return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PATIENCE, cwd=ROOT)
+        return run_command(words, environment, PATIENCE)
 
     up = run("up", "-d", str(base / "robot.yaml"))
     assert up.returncode == 0, up.stderr

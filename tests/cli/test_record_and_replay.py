@@ -23,6 +23,7 @@ from rbxcompose.commands import main as command
 from rbxcompose.runtime.processes import titled
 from rbxcompose.runtime.recording.reader import RecordingReader
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
+from tests.forked import RBXCOMPOSE, Forked
 from tests.recording.samples import some, written
 
 ROOT = Path(__file__).parents[2]
@@ -39,8 +40,8 @@ class Shell:
         self._environment = {**os.environ, "XDG_RUNTIME_DIR": str(runtime), "PYTHONPATH": str(ROOT), "NO_COLOR": "1"}
 
     def start(self, *words: str) -> subprocess.Popen[str]:
-        return subprocess.Popen(
-            [sys.executable, "-m", "rbxcompose", *words],
+        return Forked(
+            [*RBXCOMPOSE, *words],
             env=self._environment,
             cwd=self.folder,
             stdout=subprocess.PIPE,

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,7 +13,7 @@ from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.targets import robot_path
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
-from tests.conftest import ROOT
+from tests.forked import run_command
 
 ROBOT = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  base: {type: diff_drive_sim}\n"
 
@@ -90,7 +88,5 @@ def test_verbs_take_the_only_robot(words: str, folder: Path, capsys: pytest.Capt
 
 def test_up_takes_the_only_robot_of_the_folder(folder: Path) -> None:
     add_robot(folder / "robot.yaml")
-    words = [sys.executable, "-m", "rbxcompose", "up", "--rate", "max", "--for", "1s"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=30.0)
+    done = run_command(("up", "--rate", "max", "--for", "1s"), os.environ, 30.0, folder)
     assert (done.returncode, "one is up" in done.stdout) == (0, True), done.stderr

@@ -9,7 +9,6 @@ import select
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import termios
 import time
@@ -27,6 +26,7 @@ from rbxcompose.base.printable import FORBIDDEN, columns
 from rbxcompose.runtime.log import Record
 from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.top import ComponentPicture, Load, RobotPicture, Tree, lines_of
+from tests.forked import RBXCOMPOSE, run_command
 from tests.third_party.places import put
 
 ROOT = Path(__file__).parents[2]
@@ -119,12 +119,10 @@ class Robot:
         )
 
     def command(self, *words: str) -> list[str]:
-        return [sys.executable, "-m", "rbxcompose", *words]
+        return [*RBXCOMPOSE, *words]
 
     def do(self, *words: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            self.command(*words), env=self.environment, capture_output=True, text=True, timeout=PATIENCE, cwd=ROOT
-        )
+        return run_command(words, self.environment, PATIENCE)
 
     def seen(self) -> Any:
         """Return what `top` sees."""

@@ -72,10 +72,10 @@ class Chased:
 def test_the_tip_and_the_head_follow_until_the_point_is_lost(robot: str) -> None:
     chased, ahead = Chased(parts_of(robot)), AHEAD[robot]
     there = (ahead, 0.01, -0.05)
-    chased.show(*[there] * 40)
+    chased.show(*[there] * 30)
     assert math.dist(chased.tip, there) < 0.03
     assert chased.told[-1].state == "there"
-    circle = [(ahead, 0.08 * math.sin(step / 15), -0.05) for step in range(60)]
+    circle = [(ahead, 0.08 * math.sin(step / 15), -0.05) for step in range(40)]
     chased.show(*circle)
     assert math.dist(chased.tip, circle[-1]) < 0.06
     head: Any = chased.bench.component("head")
@@ -91,7 +91,7 @@ def test_the_tip_and_the_head_follow_until_the_point_is_lost(robot: str) -> None
 def test_a_point_that_hardly_moves_is_where_it_was(robot: str) -> None:
     chased, ahead = Chased(parts_of(robot)), AHEAD[robot]
     there = (ahead, 0.01, -0.05)
-    chased.show(*[there] * 40)
+    chased.show(*[there] * 30)
     at = chased.tip
     chased.show(*[(there[0], there[1] + 0.009, there[2])] * 20)
     assert math.dist(chased.tip, at) < 1e-3
@@ -104,9 +104,9 @@ def test_a_point_that_hardly_moves_is_where_it_was(robot: str) -> None:
 def test_far_points_are_reached_for_and_very_far_ones_let_the_arm_rest_until_they_are_back(robot: str) -> None:
     chased, ahead = Chased(parts_of(robot)), AHEAD[robot]
     follows: Any = chased.bench.component("chase").config
-    chased.show(*[(ahead + 0.5, -0.1, -0.25)] * 60)
+    chased.show(*[(ahead + 0.5, -0.1, -0.25)] * 40)
     assert math.dist(chased.tip, follows.shoulder) == pytest.approx(0.9 * follows.length, abs=0.05)
-    chased.show(*[(3.0, 0.0, -0.25)] * 80)
+    chased.show(*[(3.0, 0.0, -0.25)] * 60)
     assert chased.told[-1].state == "far"
     arm: Any = chased.bench.component("right_arm")
     resting = arm.config.poses["resting"]

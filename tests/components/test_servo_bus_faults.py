@@ -15,6 +15,7 @@ from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
+from tests.soak import rare
 
 LIMITS = {"lower": -2.0, "upper": 2.0, "velocity": 1.5, "acceleration": 8.0}
 CONFIG: dict[str, Any] = {
@@ -46,7 +47,7 @@ class Head:
         self.robot.advance(0.02)
 
 
-@pytest.mark.parametrize("twin", ["servo", "ideal"])
+@pytest.mark.parametrize("twin", ["servo", *rare("ideal")])
 def test_a_hot_joint_rests_and_can_be_used_again_when_it_has_cooled_down(twin: str) -> None:
     head = Head((1.0, "overheat", "pan", 10.0), twin=twin)
     head.robot.advance(0.5)

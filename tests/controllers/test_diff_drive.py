@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Pose2, wrap_angle
@@ -145,6 +145,7 @@ def test_a_timeout_of_zero_is_none() -> None:
     assert rover.is_still
 
 
+@settings(max_examples=settings().max_examples // 2)
 @given(st.lists(commands, min_size=1, max_size=8))
 def test_no_sequence_of_commands_is_too_fast_for_a_wheel(asked: list[tuple[float, float, float]]) -> None:
     rover = Rover(max_speed=0.3, acceleration=0.6, joint={"velocity": 6.0, "acceleration": 20.0})
@@ -159,6 +160,7 @@ def test_no_sequence_of_commands_is_too_fast_for_a_wheel(asked: list[tuple[float
     assert np.abs(speeds.mean(axis=1)).max() <= 0.3 + UNIT
 
 
+@settings(max_examples=settings().max_examples // 2)
 @given(st.floats(-0.7, 0.7), st.floats(-2.5, 2.5))
 def test_from_rest_to_rest_the_wheels_keep_their_ratio(linear: float, angular: float) -> None:
     rover = Rover(joint={"velocity": 6.0, "acceleration": 20.0})

@@ -21,6 +21,7 @@ from rbxcompose.domains.servos.twins.servo_line import FakeLine
 from rbxcompose.domains.servos.twins.servo_port import FakePort
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from tests.controllers.wheels import DISTANCE, RADIUS, wheels
+from tests.soak import rare
 
 PERIOD = 0.01
 MOST = 60.0  # [s] of real time
@@ -61,7 +62,7 @@ def are_still(line: FakeLine) -> bool:
     return all(abs(line[id_].motor.velocity) < 1.0 for id_ in (1, 2))
 
 
-@pytest.mark.parametrize("model", ["XL430-W250", "MX-28"])
+@pytest.mark.parametrize("model", ["XL430-W250", *rare("MX-28")])
 def test_a_base_drives_by_bytes_and_knows_where_it_is(model: str, tmp_path: Path) -> None:
     config = ServoBusConfig.model_validate(wheels(model, acceleration="2 m/s^2"))
     drives, known = drives_of(config), {id_: servo_models()[model] for id_ in (1, 2)}

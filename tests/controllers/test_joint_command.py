@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.domains.servos.controllers.joint_command import JointCommandConfig, JointCommandController
@@ -49,6 +49,7 @@ class Gaze:
         self.robot.advance(time)
 
 
+@settings(max_examples=settings().max_examples // 2)
 @given(tilt=st.floats(-3.0, 3.0), pan=st.floats(-3.0, 3.0))
 def test_joints_arrive_within_their_limits_and_are_free_then(tilt: float, pan: float) -> None:
     gaze = Gaze()

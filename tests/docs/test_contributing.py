@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -16,6 +17,16 @@ PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 BLOCKS = [block for block in blocks_of(PAGE, "CONTRIBUTING.md") if block.language == "python"]
 FILES = {block.words[1]: block.text for block in BLOCKS}
 DOMAIN = "rbxcompose/domains/sirens"
+COMMANDS = """\
+import json, sys
+from rbxcompose.commands.main import main
+for words in json.loads(sys.argv[1]):
+    try:
+        main(words)
+    except SystemExit:
+        pass  # after help
+    print(end="\\f", flush=True)
+"""
 SITE = """rbx: 1
 kind: Robot
 name: site
@@ -28,8 +39,8 @@ sirens:
 
 
 def run(*words: str, cwd: Path, path: Path) -> str:
-    """Return what a Python command prints, also if it fails."""
-    command = [sys.executable, "-m", *words]
+    """Return what a Python module or script prints, also if it fails."""
+    command = [sys.executable, *(() if words[0] == "-c" else ("-m",)), *words]
     environment = {**os.environ, "PYTHONPATH": str(path), "MYPYPATH": str(path), "NO_COLOR": "1"}
     done = subprocess.run(
         command, cwd=cwd, env=environment, stdout=-1, stderr=subprocess.STDOUT, text=True, check=False
@@ -100,12 +111,11 @@ def test_its_tests_pass(copy: Path) -> None:
 
 
 def test_its_domain_has_a_section_a_component_a_check_and_a_command(copy: Path) -> None:
-    site = written(copy / "site", {"robot.yaml": SITE})
-    assert "List the sirens of a robot" in run("rbxcompose", "--help", cwd=site, path=copy)
-    assert run("rbxcompose", "siren", cwd=site, path=copy).splitlines()[-2:] == ["front  base", "back   base"]
-    assert "'front' needs '/alarm', which nothing in the robot provides" in run(
-        "rbxcompose", "check", cwd=site, path=copy
-    )
-    assert "site is up" in (said := run("rbxcompose", "up", "--rate", "max", "--for", "1s", cwd=site, path=copy)), said
-    written(site, {"robot.yaml": SITE.replace("[front]", "[back]")})
-    assert "siren 'back' waits for itself" in run("rbxcompose", "check", cwd=site, path=copy)
+    site = written(copy, {"site/robot.yaml": SITE, "circle/robot.yaml": SITE.replace("[front]", "[back]")}) / "site"
+    commands = [["--help"], ["siren"], ["check"], ["check", "../circle"], ["up", "--rate", "max", "--for", "1s"]]
+    helped, listed, checked, circle, up, _ = run("-c", COMMANDS, json.dumps(commands), cwd=site, path=copy).split("\f")
+    assert "List the sirens of a robot" in helped
+    assert listed.splitlines()[-2:] == ["front  base", "back   base"]
+    assert "'front' needs '/alarm', which nothing in the robot provides" in checked
+    assert "siren 'back' waits for itself" in circle
+    assert "site is up" in up, up

@@ -6,7 +6,6 @@ import os
 import re
 import shlex
 import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import pytest
 from rbxcompose.commands import main as command
 from rbxcompose.testing import check_file, run_robot
 from tests.docs.examples import ROOT, Block, blocks_of
+from tests.forked import run_command
 
 TEXT = (ROOT / "docs/missions.md").read_text(encoding="utf-8")
 BLOCKS = list(blocks_of(TEXT, "missions.md"))
@@ -61,10 +61,12 @@ class Reader:
         if program == "rbxcompose" and words[0] != "up":
             command.main(words)
             return self.capsys.readouterr().out
-        ours = [sys.executable, "-m"] if program == "rbxcompose" else []
-        call = " ".join([*map(shlex.quote, ours), line.replace("PATH_TO_THIS_REPOSITORY", shlex.quote(str(ROOT)))])
-        environment = {**os.environ, "XDG_RUNTIME_DIR": str(Path.cwd())}
-        done = subprocess.run(["bash", "-c", call], env=environment, capture_output=True, text=True, check=False)
+        if program == "rbxcompose":
+            environment = {**os.environ, "XDG_RUNTIME_DIR": str(Path.cwd())}
+            done = run_command(tuple(words), environment, 60.0, Path.cwd())
+        else:
+            call = line.replace("PATH_TO_THIS_REPOSITORY", shlex.quote(str(ROOT)))
+            done = subprocess.run(["bash", "-c", call], capture_output=True, text=True, check=False)
         is_told = "error: mission play: failure" in done.stdout
         assert done.returncode == 0 or is_told, f"{line}: {done.stdout}{done.stderr}"
         return done.stdout

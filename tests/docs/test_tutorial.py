@@ -15,11 +15,13 @@ import pytest
 from rbxcompose.testing import check_file
 from tests.commands import command
 from tests.docs.examples import ROOT, Block, blocks_of
+from tests.forked import run_command
 
 PAGE = ROOT / "docs/tutorial.md"
 BLOCKS = list(blocks_of(PAGE.read_text(encoding="utf-8"), PAGE.name))
 ROBOT = "robots/cart/robot.yaml"
 SKIPS = "..."
+LONGEST = 60.0  # [s] of a command
 
 
 def with_section(text: str, section: str) -> str:
@@ -54,11 +56,13 @@ class Reader:
             assert done.returncode == (1 if is_refused else 0), f"{block}: {done.stdout}{done.stderr}"
 
     def done(self, line: str) -> subprocess.CompletedProcess[str]:
-        """Run a line of the shell; what starts processes, and what is not ours, has a process."""
+        """Run a line of the shell; what starts a robot, and what is not ours, has a process."""
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         environment = {**os.environ, "PATH": path, "XDG_RUNTIME_DIR": str(self.folder)}
         program, *words = shlex.split(line, comments=True)
-        if program == "rbxcompose" and words[0] != "up":
+        if program == "rbxcompose" and words[0] == "up":
+            return run_command(tuple(words), environment, LONGEST, self.folder)
+        if program == "rbxcompose":
             return command(*words, environment=environment, folder=self.folder)
         return subprocess.run(["bash", "-c", line], cwd=self.folder, env=environment, capture_output=True, text=True)
 

@@ -18,6 +18,7 @@ import pytest
 
 import rbxcompose
 from tests.conftest import ROOT
+from tests.editors.quick_server import SAID
 
 pytestmark = pytest.mark.timeout(150)
 HERE = Path(__file__).parent
@@ -90,6 +91,13 @@ def program(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
+def quick(tmp_path: Path) -> Path:
+    """The program, with a server that starts at once."""
+    server = f'[ "$1" = lsp ] && exec "{sys.executable}" "{HERE / "quick_server.py"}"'
+    return written(tmp_path / "quick", server, f'exec "{sys.executable}" -m rbxcompose "$@"')
+
+
+@pytest.fixture
 def session(package: Path, project: Path) -> Session:
     """Return a function that plays a scenario of `vscode_session.cjs` and returns what was seen."""
     node = shutil.which("node")
@@ -148,21 +156,26 @@ def test_manifest_and_lock_file_agree_with_the_project() -> None:
     assert all(f"`{name}`" in readme for name in manifest["contributes"]["configuration"]["properties"])
 
 
-def test_findings_arrive_also_after_a_restart(session: Session, program: Path) -> None:
-    seen = session("session", program)
+def test_findings_of_the_server_arrive(session: Session, program: Path) -> None:
+    found = session("found", program)
+    assert [(entry["code"], entry["message"], entry["severity"]) for entry in found] == [("RBX1001", WRONG, 0)]
+
+
+def test_findings_arrive_also_after_a_restart(session: Session, quick: Path) -> None:
+    seen = session("session", quick)
     for found in (seen["first"], seen["again"]):
-        assert [(entry["code"], entry["message"], entry["severity"]) for entry in found] == [("RBX1001", WRONG, 0)]
+        assert [entry["message"] for entry in found] == [SAID]
     assert seen["commands"] == ["rbxcompose.check", "rbxcompose.showMission", "rbxcompose.restart"]
 
 
-def test_a_file_is_checked(session: Session, program: Path, project: Path) -> None:
-    command, said = session("check", program)
+def test_a_file_is_checked(session: Session, quick: Path, project: Path) -> None:
+    command, said = session("check", quick)
     assert command == f"$ rbxcompose check {project / 'missions/patrol.yaml'}"
     assert said == "turtlebot is fine: 9 components in 3 processes\n"
 
 
-def test_a_mission_is_drawn_beside_its_text_and_again_when_it_is_saved(session: Session, program: Path) -> None:
-    seen = session("picture", program)
+def test_a_mission_is_drawn_beside_its_text_and_again_when_it_is_saved(session: Session, quick: Path) -> None:
+    seen = session("picture", quick)
     assert seen["title"] == "patrol.yaml"
     assert seen["options"] == {"enableScripts": False, "enableForms": False, "localResourceRoots": []}
     assert "corner_1" in seen["after"]
@@ -181,19 +194,19 @@ def test_a_mission_is_drawn_beside_its_text_and_again_when_it_is_saved(session: 
 
 
 def test_where_the_program_is_not_found_a_message_leads_to_the_settings(
-    session: Session, program: Path, tmp_path: Path
+    session: Session, quick: Path, tmp_path: Path
 ) -> None:
-    seen = session("missing", tmp_path / "none", program)
+    seen = session("missing", tmp_path / "none", quick)
     assert seen["text"].startswith(f"'{tmp_path / 'none'}' cannot be started. Install it with: pip install")
     assert seen["buttons"] == ["Open Settings", "Try Again"]
     assert seen["executed"] == [["workbench.action.openSettings", "rbxcompose.path"]]
-    assert seen["then"][0]["message"] == WRONG, "the server starts with the path that was set"
+    assert seen["then"][0]["message"] == SAID, "the server starts with the path that was set"
 
 
 def test_a_program_that_was_installed_meanwhile_is_found_by_the_button(
-    session: Session, program: Path, tmp_path: Path
+    session: Session, quick: Path, tmp_path: Path
 ) -> None:
-    assert session("again", tmp_path / "none", program)[0]["message"] == WRONG
+    assert session("again", tmp_path / "none", quick)[0]["message"] == SAID
 
 
 def test_a_server_that_cannot_start_says_why_once(session: Session, tmp_path: Path) -> None:
@@ -226,12 +239,12 @@ def test_the_server_is_started_by(path: str, text: str, session: Session, tmp_pa
     assert said.startswith(f"'{tmp_path / 'none'}' cannot be started.")
 
 
-def test_the_program_of_the_workspace_comes_first(session: Session, program: Path, project: Path) -> None:
+def test_the_program_of_the_workspace_comes_first(session: Session, quick: Path, project: Path) -> None:
     own = project / ".venv/bin/rbxcompose"
     own.parent.mkdir(parents=True)
-    program.rename(own)
-    assert session("found", "")[0]["message"] == WRONG
+    quick.rename(own)
+    assert session("found", "")[0]["message"] == SAID
 
 
-def test_a_mission_of_no_robot_has_a_page_that_says_so(session: Session, program: Path) -> None:
-    assert "error[RBX9040]" in session("no_robot", program)
+def test_a_mission_of_no_robot_has_a_page_that_says_so(session: Session, quick: Path) -> None:
+    assert "error[RBX9040]" in session("no_robot", quick)

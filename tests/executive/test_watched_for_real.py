@@ -6,8 +6,6 @@ import json
 import os
 import shutil
 import signal
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -56,11 +54,7 @@ class Robot:
         (base / "count.yaml").write_text(MISSION, encoding="utf-8")
 
     def do(self, *words: str) -> str:
-        command = [sys.executable, "-m", "rbxcompose", *words]
-        if words[0] == "up":
-            done = subprocess.run(command, env=self.environment, capture_output=True, text=True, cwd=ROOT)
-        else:
-            done = run_command(words, self.environment, PATIENCE)
+        done = run_command(words, self.environment, PATIENCE)
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +15,7 @@ from rbxcompose.runtime.processes import Process
 from rbxcompose.testing import FakeLine, FakePort, FakeServo
 from tests.commands import command
 from tests.conftest import ROOT
+from tests.forked import run_command
 
 NAME = f"arm_with_faults_{os.getpid()}"
 PATIENCE = 60.0  # [s]
@@ -67,8 +66,7 @@ class Arm:
         self.state = RobotFolder(folder / "rbxcompose" / NAME)
         self.line = FakeLine([FakeServo("XL430-W250", id_) for id_ in (1, 2)], time.monotonic)
         self.port = FakePort(self.line, path)
-        words = [sys.executable, "-m", "rbxcompose", "up", "robot.yaml", "--real", "-d"]
-        ran = subprocess.run(words, cwd=folder, env=self.environment, capture_output=True, text=True, timeout=60)
+        ran = run_command(("up", "robot.yaml", "--real", "-d"), self.environment, 60.0, folder)
         assert ran.returncode == 0, ran.stdout + ran.stderr
 
     def __enter__(self) -> Self:

@@ -7,7 +7,6 @@ import re
 import signal
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -23,6 +22,7 @@ from rbxcompose.testing.safety import Base, Laws, violations
 from tests.commands import command
 from tests.conftest import ROOT
 from tests.faults.observer import COMMAND, LOOK, MOTION, PATIENCE, Observer
+from tests.forked import RBXCOMPOSE, Forked
 
 NAME = f"turtlebot_with_faults_{os.getpid()}"
 TIMEOUT, CYCLE, SPEED = 0.5, 0.02, 0.5  # [s], [s], [m/s]
@@ -87,8 +87,8 @@ class Patrol:
 
     def start(self, *words: str) -> subprocess.Popen[str]:
         """Start a command on it."""
-        return subprocess.Popen(
-            [sys.executable, "-m", "rbxcompose", *words],
+        return Forked(
+            [*RBXCOMPOSE, *words],
             env=self.environment,
             cwd=self._folder,
             stdout=subprocess.PIPE,

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import random
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from itertools import pairwise
@@ -29,6 +27,7 @@ from rbxcompose.runtime.log import NAME as LOG
 from rbxcompose.sdk.ports import In, Qos
 from rbxcompose.sdk.registry import component_type
 from tests.conftest import ROOT
+from tests.forked import run_command
 from tests.soak import rare
 
 ENTRIES = 50_000
@@ -70,9 +69,7 @@ def test_no_process_is_held_up_by_a_message(robot: str, tmp_path: Path) -> None:
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "PYTHONPATH": str(ROOT), "NO_COLOR": "1"}
 
     def do(*words: str) -> str:
-        ran = subprocess.run(
-            [sys.executable, "-m", "rbxcompose", *words], cwd=ROOT, env=environment, capture_output=True, text=True
-        )
+        ran = run_command(words, environment, 60.0)
         return ran.stdout + ran.stderr
 
     plan = compile_robot(f"robots/{robot}", profiles=profiles, environment={}).plan

@@ -6,6 +6,7 @@ of processor time and the exit code.
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import resource
@@ -15,6 +16,7 @@ import time
 from pathlib import Path
 
 from rbxcompose.base.formats import renderer
+from rbxcompose.commands.finding_pages import all_kinds
 from rbxcompose.compiler.compile import compile_robot
 
 MEMORY = 200_000_000  # bytes of address space beyond what the process has at its start
@@ -24,7 +26,11 @@ FORMATS = ("text", "json")
 
 def main() -> None:
     """Answer each line."""
-    compile_robot("rbx:robots/turtlebot/robot.yaml", environment={})  # all imports
+    all_kinds()  # imports what declares them, which is most of the compiler
+    for name in FORMATS:
+        renderer(name)
+    compile_robot("rbx:robots/turtlebot/robot.yaml", environment={})
+    gc.freeze()
     for line in sys.stdin:
         order = json.loads(line)
         reading, writing = os.pipe()

@@ -326,14 +326,14 @@ PROJECTS: dict[str, Project] = {
             "robots/bad/p.yaml": PART + "components:\n" + "".join(f"  b{n}: {{type: go_to}}\n" for n in range(950)),
         },
     ),
-    "a start order of 150 components with 2^149 paths": Project(
+    "a start order of 60 components with 2^59 paths": Project(
         "RBX3011",
         robot(
             "components:\n"
             + "".join(
                 f"  g{n}: {{type: chore_sim, connect: {{cmd_vel: u{n}, chore: s{n}}}, "
                 f"starts_after: [{', '.join(f'g{m}' for m in range(n))}]}}\n"
-                for n in range(150)
+                for n in range(60)
             )
         ),
     ),

@@ -19,6 +19,7 @@ from rbxcompose.tools.inspection.diagram import BoxShape, Diagram, WireContent, 
 from rbxcompose.tools.inspection.graph_html import html
 from tests.conftest import ROOT
 from tests.shipped import robot_and_plan
+from tests.soak import Soak
 
 ROBOTS = ("turtlebot", "twins")
 NAMESPACE = {"svg": "http://www.w3.org/2000/svg"}
@@ -162,11 +163,11 @@ def test_what_a_person_wrote_stays_text(tmp_path: Path) -> None:
 CORPUS = sorted((ROOT / "tests/misconfig/wrong").rglob("*.yaml"))
 
 
-def test_robots_with_mistakes_are_drawn_as_far_as_they_could_be_read() -> None:
+def test_robots_with_mistakes_are_drawn_as_far_as_they_could_be_read(soak: Soak) -> None:
     drawn = 0
-    for file in CORPUS[::4]:
-        robot = compile_robot(str(file), environment={}).robot
+    for file in CORPUS[:: soak.examples(12, 1)]:
+        robot = compile_robot(str(file), environment={}, tries_profiles=False).robot
         if robot is not None:
             found = diagram_of(robot)
             drawn += all(found.robot in write(found) for write in (dot, html)) and bool(mermaid(found))
-    assert drawn > 10
+    assert drawn > 5

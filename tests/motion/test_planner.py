@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.domains.arms.motion.collisions import TOUCH
@@ -38,6 +38,7 @@ def sampled(trajectory: Trajectory, step: float) -> list[Array]:
     return [np.array([curve.sample(time).position for curve in curves]) for time in times]
 
 
+@settings(max_examples=settings().max_examples // 2)
 @given(st.integers(0, 2**31))
 def test_a_plan_is_free_and_within_all_limits_by_other_code(seed: int) -> None:
     samples = PLANNER.space.samples(60, seed)

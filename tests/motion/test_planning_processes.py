@@ -27,7 +27,7 @@ from tests.soak import rare
 
 pytestmark = pytest.mark.timeout(100)  # each takes seconds to start
 TIMELESS = float  # a clock that stands still: so many positions are the limit, on any machine
-TIME = 0.3  # [s], in which helpers are asked, and answer first
+TIME = 0.2  # [s], in which helpers are asked, and answer first
 SCENES = (CONFINED, 175, 727)  # in which motions are hard to find, or are not found
 ORPHAN = """
 import os, signal
@@ -54,8 +54,8 @@ def alone() -> object:
 
 def wait_for(process: PlanningProcess) -> None:
     """Wait until it can begin a job."""
-    while not process.is_idle:
-        os.sched_yield()
+    process.wait()
+    assert process.is_idle
 
 
 @pytest.fixture(autouse=True)
@@ -68,20 +68,26 @@ def warned() -> list[str]:
     return []
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def pair_warned() -> list[str]:
     return []
 
 
-@pytest.fixture
-def pair(pair_warned: list[str]) -> Iterator[list[PlanningProcess]]:
+@pytest.fixture(scope="module")
+def both(pair_warned: list[str]) -> Iterator[list[PlanningProcess]]:
     """Return two processes that nothing happens to."""
     both = [started(pair_warned) for _ in range(2)]
-    for process in both:
-        wait_for(process)
     yield both
     for process in both:
         process.close()
+
+
+@pytest.fixture
+def pair(both: list[PlanningProcess]) -> list[PlanningProcess]:
+    """Return them when they can begin a job: one that still answers what was abandoned is not asked."""
+    for process in both:
+        wait_for(process)
+    return both
 
 
 @pytest.mark.parametrize("seed_and_helpers", [(CONFINED, 2), *rare((CONFINED, 1), *product(SCENES[1:], (1, 2)))])
@@ -121,24 +127,27 @@ def content(planned: Planned) -> object:
 
 def answer(process: PlanningProcess, job: PlanJob) -> Planned:
     """Return what was planned, once it is."""
-    while (found := process.answer(job)) is None:
-        os.sched_yield()
+    process.wait()
+    found = process.answer(job)
+    assert found is not None
     return found
 
 
-@pytest.mark.parametrize(("number", "told"), [(signal.SIGKILL, "is gone"), (signal.SIGSTOP, "does not answer")])
-def test_a_goal_goes_on_without_one_that_is_killed_or_hangs(
-    pair: list[PlanningProcess], warned: list[str], number: signal.Signals, told: str
-) -> None:
-    lost = started(warned)
-    wait_for(lost)
-    os.kill(lost.pid, number)
-    assert outcome(CONFINED, [lost, pair[1]], TIME) == alone()
-    lost.patience = 0.0
-    assert outcome(CONFINED, [lost], TIME) == alone()
-    assert not lost.is_idle
-    lost.close()
-    assert warned == [f"a process that plans for 'right_arm' {told}: there is one less until the arm starts again"]
+def test_a_goal_goes_on_without_those_that_are_killed_or_hang(pair: list[PlanningProcess], warned: list[str]) -> None:
+    lost = [started(warned) for _ in range(2)]
+    for process, number in zip(lost, (signal.SIGKILL, signal.SIGSTOP), strict=True):
+        wait_for(process)
+        os.kill(process.pid, number)
+    assert outcome(CONFINED, [*lost, pair[1]], TIME) == alone()
+    lost[1].patience = 0.0
+    assert outcome(CONFINED, lost, TIME) == alone()
+    for process in lost:
+        assert not process.is_idle
+        process.close()
+    assert warned == [
+        f"a process that plans for 'right_arm' {told}: there is one less until the arm starts again"
+        for told in ("is gone", "does not answer")
+    ]
 
 
 def test_what_is_abandoned_is_not_planned_to_the_end(warned: list[str]) -> None:

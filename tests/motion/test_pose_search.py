@@ -90,7 +90,7 @@ def test_what_will_do_approximately_is_met_exactly_where_it_can_be(
     assert [array.tolist() for array in found.free] == [array.tolist() for array in exact.free]
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(SEEDS, st.booleans())
 def test_no_small_step_gets_nearer_than_what_is_approximate_and_the_start_is_not(seed: int, any_way: bool) -> None:
     target = PoseTarget(elsewhere(seed), any_way, is_approximate=True)
@@ -106,7 +106,7 @@ def test_no_small_step_gets_nearer_than_what_is_approximate_and_the_start_is_not
     assert order == sorted(order)
 
 
-@settings(max_examples=8)
+@settings(max_examples=3)
 @given(SEEDS)
 def test_plain_and_compiled_code_get_as_near(seed: int) -> None:
     target = PoseTarget(elsewhere(seed), is_approximate=True)
@@ -114,7 +114,7 @@ def test_plain_and_compiled_code_get_as_near(seed: int) -> None:
     assert np.allclose(one, other, atol=1e-5)
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(SEEDS)
 def test_what_is_approximate_is_free_and_never_farther_away_than_the_start(arm: ArmKinematics, seed: int) -> None:
     goal = SPACE.samples(1, seed)[0]

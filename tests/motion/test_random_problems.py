@@ -24,7 +24,7 @@ from tests.motion.toy_arm import Array
 from tests.shipped import robot_and_plan
 from tests.soak import Soak
 
-QUICK, MANY = 5, 250  # problems for each robot and way of searching
+QUICK, MANY = 3, 250  # problems for each robot and way of searching
 TIME = 0.5  # [s] of a search, counted by the positions that it examines: no clock runs
 FINE = 0.005  # [rad]
 HAND, SHOULDER = "right_gripper_link", "right_arm_base_link"

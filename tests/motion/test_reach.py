@@ -36,7 +36,7 @@ def found(seed: int, samples: int = 3_000, cut: Cut | None = None) -> ReachMap:
     return list(made)[-1]
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(st.integers(0, 2**31))
 def test_inverse_kinematics_reaches_each_cell_that_is_told_as_reached(seed: int) -> None:
     there = found(seed)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3
@@ -66,6 +66,7 @@ def test_the_answers_follow_what_moves_beside_the_arm() -> None:
     assert len(verdicts) > 1
 
 
+@settings(max_examples=settings().max_examples // 2)
 @given(SEEDS)
 def test_a_fast_plan_is_free_and_within_all_limits_by_other_code(seed: int) -> None:
     used = fast_planner()

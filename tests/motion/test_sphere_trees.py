@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -69,6 +69,7 @@ def test_spheres_cover_a_cylinder_within_and_on_its_surface(radius: float, lengt
     assert len(tree.leaves[0]) <= LEAVES
 
 
+@settings(max_examples=settings().max_examples // 2)
 @given(st.integers(1, 40), SEEDS)
 def test_spheres_cover_every_triangle_of_a_mesh(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -76,6 +77,7 @@ def test_spheres_cover_every_triangle_of_a_mesh(count: int, seed: int) -> None:
     assert not len(uncovered(mesh_tree(triangles), on_surface(triangles, 500, rng)))
 
 
+@settings(max_examples=settings().max_examples // 2)
 @given(st.integers(1, 40), SEEDS)
 def test_the_hulls_of_a_mesh_cover_it_as_its_spheres_do(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -49,13 +49,12 @@ class Project:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
         shutil.copytree(ROOT / "parts/body", folder / "parts/body")  # as they are
-        self.robots = [name for name in self.files if name.endswith("robot.yaml")]
-        self.read: dict[str, set[str]] = {name: self.read_by(name) for name in self.robots}
+        self.unchanged = {name: self.compile(name) for name in self.files if name.endswith("robot.yaml")}
+        self.read = {name: self.read_by(out) for name, out in self.unchanged.items()}
 
-    def read_by(self, robot: str) -> set[str]:
+    def read_by(self, out: Compilation) -> set[str]:
         """Return the files that a robot is made of, itself included."""
-        sources = compile_robot(str(self.folder / robot), environment={}).sources
-        found = (Path(source) for source in sources)
+        found = (Path(source) for source in out.sources)
         return {str(path.relative_to(self.folder)) for path in found if path.is_relative_to(self.folder)}
 
     def judge(self, changed: dict[str, bytes]) -> list[Compilation]:

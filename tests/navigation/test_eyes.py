@@ -56,7 +56,7 @@ def bench_in(folder: Path, simulator: str, frame: str = "camera_link", cloud: bo
 def test_a_wall_is_as_far_away_as_it_is_to_a_centimetre(tmp_path: Path, simulator: str) -> None:
     bench = bench_in(tmp_path, simulator)
     taken = bench.collect("/camera/depth/image_raw", Image)
-    bench.advance(1.0)
+    bench.advance(0.5)
     if not taken and simulator == "physics":
         pytest.skip(bench.statuses("physics: pictures")[-1].message)
     depths = np.frombuffer(taken[-1].data, np.float32).reshape(120, 160)
@@ -98,7 +98,7 @@ def test_the_engine_draws_only_what_somebody_wants(tmp_path: Path, monkeypatch: 
 
     monkeypatch.setattr(PhysicsWorld, "picture", picture)
     bench = bench_in(tmp_path, "physics")
-    bench.advance(10.0)
+    bench.advance(5.0)
     assert len(drawn) == 1  # the first one, which takes long, before the robot drives
     statuses = bench.statuses("camera")
     pictures = bench.collect("/camera/image_raw", Image)
@@ -129,7 +129,7 @@ def test_an_inertial_sensor_is_as_wrong_as_it_says_and_the_same_again(tmp_path: 
         bench = bench_in(folder, simulator)
         bench.advance(1.0)  # until the robot stands on its wheels
         found = bench.collect("/imu", Imu)
-        bench.advance(4.0)
+        bench.advance(2.0)
         vectors = [(one.linear_acceleration, one.angular_velocity) for one in found]
         return np.array([(a.x, a.y, a.z, w.x, w.y, w.z) for a, w in vectors])
 

@@ -81,6 +81,7 @@ class Errand:
         return next((str(event.outcome) for event in self.bench.events if isinstance(event, MissionOver)), "")
 
 
+@pytest.mark.soak
 def test_a_block_is_fetched_from_the_living_room_to_the_kitchen() -> None:
     errand = Errand()
     assert errand.outcome == "success", errand.bench.texts()[-3:]

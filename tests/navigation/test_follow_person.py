@@ -28,8 +28,8 @@ DOOR = room((-0.1, -3.0, 0.1, -0.6), (-0.1, 0.6, 0.1, 3.0))
 ROBOT = """body: {urdf: rbx:robots/turtlebot/turtlebot.urdf}
 world: ../../room.yaml
 components:
-  base: {type: diff_drive_sim}
-  laser: {type: laser_sim, frame: base_link, noise: 1 cm}
+  base: {type: diff_drive_sim, rate: 25 Hz}
+  laser: {type: laser_sim, frame: base_link, noise: 1 cm, rays: 240}
 """
 NAVIGATION = """navigation: {people: {patience: 3 s}}
 muxes:
@@ -100,7 +100,8 @@ class Companions:
 
 THROUGH: Way = ((0, -1.0, 0), (4, -1.0, 0), (17, 2.0, 0.3), (24, 2.0, 2.2), (28, 0.9, 2.2))
 PHYSICS = pytest.param(
-    ALONE + "simulator: physics\n", marks=pytest.mark.skipif(not find_spec("mujoco"), reason="no MuJoCo")
+    ALONE + "simulator: physics\n",
+    marks=[pytest.mark.soak, pytest.mark.skipif(not find_spec("mujoco"), reason="no MuJoCo")],
 )
 
 

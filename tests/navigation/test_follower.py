@@ -57,7 +57,6 @@ class Drive:
 
 
 @given(PLACES, PLACES)
-@settings(max_examples=40, deadline=None)
 def test_every_goal_is_reached_without_a_contact_and_hardly_farther_than_necessary(start: Pose2, goal: Pose2) -> None:
     assume(not COSTS.is_blocked(start.x, start.y) and not COSTS.is_blocked(goal.x, goal.y))
     drive = Drive(COSTS, start, goal)
@@ -103,7 +102,7 @@ def test_without_a_way_there_is_nothing_to_follow() -> None:
 
 
 @given(st.floats(0.3, 0.9), st.floats(-math.pi / 2, math.pi / 2), st.floats(0.0, 2.0))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_a_robot_stands_when_somebody_who_walks_in_front_of_it_is_there(speed: float, side: float, late: float) -> None:
     grid = room()
     costs, rays = LayeredCosts(grid, CostSettings(radius=RADIUS)), Rays(grid)

@@ -47,7 +47,7 @@ def agreement(made: GridMap, true: GridMap) -> tuple[float, int]:
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(0.0, 0.01), st.floats(-SIDE / 2, SIDE / 2))
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=2, deadline=None)
 def test_a_map_from_known_poses_agrees_with_the_world(heading: float, noise: float, shift: float) -> None:
     mapper, rays, random = OccupancyMapper(MappingSettings()), Rays(HOUSE), np.random.default_rng(1)
     for step in range(40):

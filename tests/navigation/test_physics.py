@@ -65,7 +65,7 @@ def test_a_kobuki_bumps_backs_off_and_goes_on(repository: Path) -> None:
     bench = Bench(plan=plan)
     bumps, drops = bench.collect("/bumper", Switches), bench.collect("/wheel_drop", Switches)
     driven = bench.collect("/ground_truth", Odometry)
-    bench.advance(60.0)
+    bench.advance(25.0)
     pressed = [any(message.is_on) for message in bumps]
     began = sum(now and not before for before, now in pairwise(pressed))
     assert began >= 3

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.sensor_msgs import JointState
@@ -17,6 +16,8 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from rbxcompose.testing.bench import run_robot
 from tests.parts.project import Project
+from tests.shipped import compiled
+from tests.soak import rare
 
 pytestmark = pytest.mark.timeout(120)
 mujoco = pytest.importorskip("mujoco", reason="mujoco is not installed")
@@ -101,7 +102,7 @@ def test_only_physics_has_ports_between_servos_and_the_engine(tmp_path: Path) ->
 
 def test_servos_that_turn_wheels_drive_the_base(repository: Path) -> None:
     sets = ("world=rbx:worlds/blank.yaml", "simulator=physics", "start=")
-    plan = compile_robot(str(repository / "robots/rover"), sets=sets, environment={}).plan
+    plan = compiled(str(repository / "robots/rover"), sets=sets, environment={}, tries_profiles=False).plan
     assert plan is not None
     bench = Bench(plan=plan)
     told, truth = bench.collect("/odom", Odometry), bench.collect("/ground_truth", Odometry)
@@ -112,17 +113,17 @@ def test_servos_that_turn_wheels_drive_the_base(repository: Path) -> None:
     assert told[-1].pose.pose.position.x == pytest.approx(truth[-1].pose.pose.position.x, abs=0.02)
 
 
-@pytest.mark.parametrize("robot", ["pi_robot", "porter"])
+@pytest.mark.parametrize("robot", ["pi_robot", *rare("porter")])
 def test_missions_that_move_arms_and_grippers_succeed(repository: Path, robot: str) -> None:
     sets = ("world=rbx:worlds/blank.yaml", "simulator=physics", "start=open_and_close")
-    plan = compile_robot(str(repository / "robots" / robot), sets=sets, environment={}).plan
+    plan = compiled(str(repository / "robots" / robot), sets=sets, environment={}, tries_profiles=False).plan
     assert plan is not None
     assert run_robot(plan).outcome == "success"
 
 
 def test_a_block_is_grasped_and_lifted_and_its_gripper_feels_it(repository: Path) -> None:
     porter, chosen = str(repository / "robots/porter"), ["table", "heavy"]
-    plan = compile_robot(porter, profiles=chosen, sets=("start=pick_and_place",), environment={}).plan
+    plan = compiled(porter, profiles=chosen, sets=("start=pick_and_place",), environment={}).plan
     assert plan is not None
     bench = Bench(plan=plan)
     moved, states = bench.collect("/world/moved", TFMessage), bench.collect("/joint_states", JointState)

@@ -42,13 +42,13 @@ from rbxcompose.testing.bench import run_robot
 from tests.navigation.houses import ONE_WALL
 from tests.parts.project import Project
 
-ROBOT = """body: {urdf: rbx:robots/turtlebot/turtlebot.urdf}
+LASER = "  laser: {type: laser_sim, frame: base_link, noise: 5 mm, rays: 180, rate: 5 Hz}\n"
+ROBOT = f"""body: {{urdf: rbx:robots/turtlebot/turtlebot.urdf}}
 world: ../../room.yaml
 components:
-  base: {type: diff_drive_sim}
-  laser: {type: laser_sim, frame: base_link, noise: 5 mm}
-navigation:
-  follower: {speed: 0.4 m/s}
+  base: {{rate: 25 Hz, type: diff_drive_sim}}
+{LASER}navigation:
+  follower: {{speed: 0.4 m/s}}
 """
 WORLD = """rbx: 1
 kind: World
@@ -174,7 +174,7 @@ do:
 """
 
 
-SCANNED = ROBOT.replace("  laser: {type: laser_sim, frame: base_link, noise: 5 mm}\n", "").replace(
+SCANNED = ROBOT.replace(LASER, "").replace(
     "  follower:", "  costs: {obstacles: {from: scan, frame: base_link}}\n  follower:"
 )
 SCAN = LaserScan(Header(frame_id="base_link"), 0.0, 0.0, 0.1, 0.0, 0.1, 0.1, 9.0, np.full(9, math.inf, np.float32))
@@ -212,7 +212,7 @@ def test_a_robot_whose_laser_tells_nothing_does_not_drive_blindly(tmp_path: Path
 
 
 def test_a_scan_that_comes_before_the_transform_of_its_time_is_taken_with_it(tmp_path: Path) -> None:
-    room = Room(tmp_path, SCANNED)
+    room = Room(tmp_path, SCANNED.replace("rate: 25 Hz, ", ""))
     soon = to_time(room.bench.clock.stamp() + 30_000_000)
     room.bench.publish("/scan", replace(SCAN, header=Header(soon, "base_link"), ranges=np.ones(9, np.float32)))
     navigator: Any = room.bench.component("go_to")
@@ -526,13 +526,13 @@ def test_a_manifest_says_how_many_particles_there_are(tmp_path: Path) -> None:
 
 
 def test_a_laser_finds_the_robot_where_its_odometry_errs(tmp_path: Path) -> None:
-    robot = ROBOT.replace("diff_drive_sim}", "diff_drive_sim, drift: 8 %}")
+    robot = ROBOT.replace("diff_drive_sim}", "diff_drive_sim, drift: 16 %}")
     lost, found = (Room(tmp_path, f"{robot}{more}") for more in ("", "  localisation: {type: particles}\n"))
     errors, told = {}, found.bench.collect("/amcl_pose", PoseWithCovarianceStamped)
     for room in (lost, found):
-        for x, y in ((2.0, 0.3), (-2.0, 1.0), (2.0, -1.0)):
+        for x, y in ((2.0, 0.3), (-2.0, 1.0)):
             room.go(x, y)
-        errors[room] = room.base.core.pose.distance(Pose2(2.0, -1.0))
+        errors[room] = room.base.core.pose.distance(Pose2(-2.0, 1.0))
     assert errors[lost] > 0.4
     assert errors[found] < 0.2
     assert found.contacts == []

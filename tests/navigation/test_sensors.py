@@ -58,7 +58,7 @@ def seen(folder: Path, simulator: str, lens: str) -> tuple[Image, np.ndarray[tup
     bench = bench_in(folder, simulator, lens)
     colours = bench.collect("/camera/image_raw", Image)
     depths = bench.collect("/camera/depth/image_raw", Image)
-    bench.advance(1.0)
+    bench.advance(0.5)
     if not depths and simulator == "physics":
         pytest.skip(bench.statuses("physics: pictures")[-1].message)
     return colours[-1], np.frombuffer(depths[-1].data, np.float32).reshape(120, 160)

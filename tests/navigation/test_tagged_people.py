@@ -28,7 +28,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.sdk.robot_events import MissionOver
 from rbxcompose.testing import Bench
 from tests.conftest import ROOT
-from tests.navigation.test_sensors import SELDOM_PHYSICS
+from tests.navigation.test_sensors import SIMULATORS
 from tests.parts.project import Project
 
 pytestmark = pytest.mark.timeout(120)
@@ -41,7 +41,8 @@ components:
 TOWARDS = Quaternion(-0.5, -0.5, 0.5, 0.5)  # of a tag in `base_link`: it faces the robot
 
 
-@SELDOM_PHYSICS
+@SIMULATORS
+@pytest.mark.soak
 def test_the_robot_keeps_its_distance_to_a_guide_through_the_house(simulator: str) -> None:
     if simulator == "physics":
         pytest.importorskip("mujoco", reason="mujoco is not installed")

@@ -7,13 +7,14 @@ from pathlib import Path
 import pytest
 
 from release.build import build
+from tests.packaging.builds import NODE_MODULES
 
 
 @pytest.fixture(scope="package")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder with the wheel and the source distribution."""
     folder = tmp_path_factory.mktemp("built")
-    build(folder)
+    build(folder, node_modules=NODE_MODULES if NODE_MODULES.exists() else None)
     return folder
 
 

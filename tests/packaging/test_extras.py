@@ -7,6 +7,7 @@ import re
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
+import pytest
 from packaging.utils import canonicalize_name
 
 from docs.generating.extras import KEPT, PURPOSES, closure, declared, measured
@@ -22,6 +23,7 @@ def test_every_extra_was_measured_as_it_is_declared() -> None:
     assert PURPOSES.keys() == kept.keys()
 
 
+@pytest.mark.soak
 def test_the_sizes_are_those_of_this_machine_within_a_fifth() -> None:
     kept, here = json.loads(KEPT.read_text(encoding="utf-8")), measured()
     assert {name: row["packages"] for name, row in kept.items()} == {

@@ -17,6 +17,7 @@ import yaml
 
 from tests.packaging.builds import ROOT
 from tests.patrol_project import ROBOT, write_project
+from tests.soak import rare
 
 ACTION: dict[str, Any] = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
 TEMPLATE: dict[str, Any] = yaml.safe_load((ROOT / "templates/robots.gitlab-ci.yml").read_text(encoding="utf-8"))
@@ -105,15 +106,15 @@ def test_the_action_installs_its_own_version_with_extras(project: Path) -> None:
         assert asked.read_text().split() == ["-m", "pip", "install", "--quiet", wanted, "rbx-lamp", "rbx-siren"]
 
 
-def test_the_action_writes_sarif_and_fails_with_the_findings(project: Path) -> None:
-    for is_wrong in (False, True):
-        if is_wrong:
-            spoil(project)
-        done = run(project, *step("Check robots"))
-        assert done.returncode == int(is_wrong), done.stderr
-        [found] = json.loads((project / DEFAULTS["sarif"]).read_text())["runs"]
-        assert bool(found["results"]) == is_wrong
-        assert ("::error" in done.stdout + done.stderr) == is_wrong
+@pytest.mark.parametrize("is_wrong", [True, *rare(False)])
+def test_the_action_writes_sarif_and_fails_with_the_findings(project: Path, is_wrong: bool) -> None:
+    if is_wrong:
+        spoil(project)
+    done = run(project, *step("Check robots"))
+    assert done.returncode == int(is_wrong), done.stderr
+    [found] = json.loads((project / DEFAULTS["sarif"]).read_text())["runs"]
+    assert bool(found["results"]) == is_wrong
+    assert ("::error" in done.stdout + done.stderr) == is_wrong
 
 
 def test_the_action_runs_the_tests_of_missions_also_after_findings(project: Path) -> None:
@@ -146,6 +147,7 @@ def test_the_lines_of_a_job_run_and_leave_what_it_keeps(project: Path, name: str
     assert all((project / path).stat().st_size > 0 for path in kept)
 
 
+@pytest.mark.soak  # the action fails in the same way
 def test_a_job_fails_with_findings_and_keeps_them(project: Path) -> None:
     spoil(project)
     one = job("check robots")

@@ -18,7 +18,7 @@ from rbxcompose.base.units import parse_quantity
 from rbxcompose.domains.body.lint import lint
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.urdf import read_body
-from rbxcompose.domains.body.xacro import Expanded, expand
+from rbxcompose.domains.body.xacro import Expanded, XacroFile, expand_all
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 
 PARTS = Path(__file__).parents[2] / "parts"
@@ -65,11 +65,20 @@ def scaled(name: str) -> dict[str, str]:
     )
 
 
+def xacro(name: str, arguments: dict[str, str]) -> XacroFile:
+    return XacroFile(PARTS / f"body/{name}.urdf.xacro", arguments, {"rbxcompose": PARTS.parent}, [PARTS], HERE)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _expanded_at_once() -> None:
+    """Expand all pieces in one process; its answers are kept."""
+    expand_all([xacro(name, arguments) for name in WHOLE for arguments in ({}, scaled(name))])
+
+
 @cache
 def piece(name: str, **arguments: str) -> Body:
     """Return the body of a piece, in which nothing is wrong."""
-    packages = {"rbxcompose": PARTS.parent}
-    expanded, _ = expand(PARTS / f"body/{name}.urdf.xacro", arguments, packages, [PARTS], HERE)
+    [(expanded, _)] = expand_all([xacro(name, arguments)])
     assert isinstance(expanded, Expanded), expanded
     root = read_urdf(expanded.located, name)
     assert isinstance(root, XmlElement), root

@@ -1,4 +1,4 @@
-"""From picks to a policy: ten are recorded and become a data set, of which a network learns to move the arm itself."""
+"""From picks to a policy: some are recorded and become a data set, of which a network learns to move the arm itself."""
 
 from __future__ import annotations
 
@@ -22,12 +22,13 @@ from tests.commands import command
 from tests.conftest import ROOT
 from tests.policies.learning import Array, train
 from tests.policies.recordings import Timed, write_recording
+from tests.soak import Soak
 
 pytest.importorskip("av", reason="av is not installed")
 parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
 pytestmark = pytest.mark.timeout(120)
 
-PICKS, RATE = 10, 10
+QUICK, MANY, RATE = 3, 10, 10
 LEAST_MOTION = 5e-3  # [rad] in a frame; the others teach nothing but to wait
 MISSION = "{rbx: 1, kind: Mission, name: pick, about: Pick the target up., do: [{pick_right_arm: target}]}"
 PICKING = "{rbx: 1, kind: Overlay, name: picking, missions: {pick: pick.yaml}}"
@@ -86,14 +87,15 @@ def recorded_pick(folder: Path, number: int) -> Path:
     return write_recording(folder / f"pick_{number}.mcap", messages)
 
 
-def test_a_network_learns_from_ten_recorded_picks_and_moves_the_arm_through_the_mux(tmp_path: Path) -> None:
+def test_a_network_learns_from_recorded_picks_and_moves_the_arm_through_the_mux(tmp_path: Path, soak: Soak) -> None:
+    picks = soak.examples(QUICK, MANY)
     (tmp_path / "pick.yaml").write_text(MISSION)
-    paths = [str(recorded_pick(tmp_path, number)) for number in range(PICKS)]
+    paths = [str(recorded_pick(tmp_path, number)) for number in range(picks)]
     words = ("--fps", str(RATE), "-o", "picks", "--task", "pick the block", "--topics", "joint_*", "--from", *paths)
     done = command("record", "--format", "lerobot", *words, environment={}, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     joints, episodes = read(tmp_path / "picks")
-    assert (len(joints), len(episodes)) == (6, PICKS)
+    assert (len(joints), len(episodes)) == (6, picks)
     states, actions = (np.concatenate(each) for each in zip(*(episode.moving for episode in episodes), strict=True))
     train(states, actions, 0.05, tmp_path / "pick.onnx")
 

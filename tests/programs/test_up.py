@@ -17,9 +17,10 @@ import pytest
 
 from rbxcompose.runtime.log import NAME, Record, read_log
 from rbxcompose.runtime.processes import Process
+from tests.forked import RBXCOMPOSE, Forked
 from tests.programs.foreign import PATROL, patrol
 from tests.programs.foreign import robot as manifest
-from tests.runtime.real_robot import COMMAND, PATIENCE, ROOT, Robot, eventually
+from tests.runtime.real_robot import PATIENCE, ROOT, Robot, eventually
 
 SECRET = "a_secret_of_the_test"
 TALKER = [sys.executable, str(Path(__file__).with_name("bare_talker.py"))]
@@ -40,10 +41,10 @@ class Foreign(Robot):
 
     def up(self, *options: str, **config: object) -> subprocess.Popen[str]:
         """Start it; the process is that of the foreground."""
-        words = [*COMMAND, "up", str(self.files / "robot.yaml"), *options]
+        words = [*RBXCOMPOSE, "up", str(self.files / "robot.yaml"), *options]
         environment = {**self.environment, "RBX_SECRET_TOKEN": SECRET}
         pipe = subprocess.PIPE
-        process = subprocess.Popen(words, env=environment, stdout=pipe, stderr=subprocess.STDOUT, text=True, cwd=ROOT)
+        process = Forked(words, env=environment, stdout=pipe, stderr=subprocess.STDOUT, text=True, cwd=ROOT)
         self.started.append(process)
         return process
 

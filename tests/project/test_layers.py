@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import ast
 import re
 from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-from tests.project.package import statements, tree_of
-
-PACKAGE = Path(__file__).parents[2] / "rbxcompose"
+from tests.project import package
+from tests.project.package import PACKAGE, imported_by
 
 ROOMS = (
     "base",
@@ -45,19 +43,16 @@ PLUG_IN = re.compile(r"bridge|components|sections|commands|command_\w+|controlle
 
 def imports(path: Path) -> set[str]:
     """Return the modules of the package that a file imports, wherever in it."""
-    found: set[str] = set()
-    for node in statements(tree_of(path)):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names = {f"{node.module}.{alias.name}" for alias in node.names}
-            found |= names if node.module in ("rbxcompose", "rbxcompose.domains") else {node.module}
+    found = {
+        f"{module}.{taken}" if taken and module in ("rbxcompose", "rbxcompose.domains") else module
+        for module, taken in imported_by(path)
+    }
     return {name for name in found if name.startswith("rbxcompose.") and name != "rbxcompose.__version__"}
 
 
 @cache
 def files() -> dict[Path, set[str]]:
-    return {path: imports(path) for path in sorted(PACKAGE.rglob("*.py"))}
+    return {path: imports(path) for path in package.files()}
 
 
 def room_of(module: str) -> str:

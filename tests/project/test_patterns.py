@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import ast
-import importlib
 import itertools
-import pkgutil
 import re
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -16,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from tests.project.package import PACKAGE, files, text_of, tree_of
+from tests.project.package import PACKAGE, files, module_of, modules, text_of
 
 N = 4_000  # characters of a near-miss
 SHORT = 0.004  # [s] in which a linear expression is through with any of them
@@ -25,23 +23,22 @@ CALL = re.compile(rf"\.({'|'.join(METHODS)})\b")
 SAMPLES = "\n\t -_.,:/#$'\"[]{}()!|>aAeisx01°"
 
 
-def modules() -> Iterator[str]:
-    for module in pkgutil.walk_packages([str(PACKAGE)], "rbxcompose."):
-        if not module.name.endswith("__main__"):
-            yield module.name
+def known(module: str, name: str) -> str:
+    """Return the name of a pattern: one that is private is used in its module only, and is named after it."""
+    return f"{module.removeprefix('rbxcompose.').removesuffix('.__init__')}.{name}" if name.startswith("_") else name
 
 
 @cache
 def calls() -> tuple[dict[str, set[str]], tuple[tuple[str, str, ast.expr], ...]]:
-    """Return the methods by which names of patterns are used, by name, and patterns that stand where they are used."""
+    """Return the methods by which patterns are used, by their names, and patterns that stand where they are used."""
     used: dict[str, set[str]] = {}
     in_place = []
     for path in files():
-        for node in ast.walk(tree_of(path)) if CALL.search(text_of(path)) else ():
+        for node in ast.walk(ast.parse(text_of(path))) if CALL.search(text_of(path)) else ():
             match node:
                 case ast.Attribute(value=ast.Name(id=name) | ast.Attribute(attr=name), attr=method):
                     if method in METHODS:
-                        used.setdefault(name, set()).add(method)
+                        used.setdefault(known(module_of(path), name), set()).add(method)
                 case ast.Call(func=ast.Attribute(value=ast.Name("re"), attr=method), args=[written, *_]):
                     if method in METHODS:
                         in_place.append((f"{path.relative_to(PACKAGE)}:{node.lineno}", method, written))
@@ -52,10 +49,11 @@ def patterns() -> dict[tuple[str, Any], set[str]]:
     """All patterns that are compiled in modules, with the methods by which anybody uses them."""
     used, in_place = calls()
     found: dict[tuple[str, Any], set[str]] = {}
-    for name in modules():
-        for word, value in vars(importlib.import_module(name)).items():
+    for module in modules():
+        for word, value in vars(module).items():
             if isinstance(value, re.Pattern):
-                found.setdefault((word, value), set()).update(used.get(word, ()))
+                name = known(module.__name__, word)
+                found.setdefault((name, value), set()).update(used.get(name, ()))
     for where, method, written in in_place:
         if isinstance(written, ast.Constant):
             found.setdefault((where, re.compile(written.value)), set()).add(method)
@@ -172,7 +170,7 @@ def slow_texts(pattern: re.Pattern[Any], methods: set[str]) -> Iterator[str]:
 def test_every_pattern_is_linear() -> None:
     found = patterns()
     assert {where for (where, _), methods in found.items() if not methods} == set(), "used by no method known here"
-    slow = {where: next(slow_texts(pattern, methods), None) for (where, pattern), methods in found.items()}
+    slow = {where: next(slow_texts(where[1], methods), None) for where, methods in found.items()}
     assert {where: text for where, text in slow.items() if text} == {}
 
 

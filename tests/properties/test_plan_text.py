@@ -13,11 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.config import Place, Secret
-from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.plan.dump import PlanTextError, dump, load
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.domains.power.components.charger import ChargerConfig
 from rbxcompose.testing import check_text, instance, run_robot
+from tests.shipped import compiled
+from tests.soak import Soak
 
 ROOT = Path(__file__).parents[2]
 ROBOTS = sorted((ROOT / "robots").glob("*/robot.yaml"))
@@ -94,7 +95,7 @@ WORDS = st.text(alphabet=st.characters(codec="utf-8", categories=["L", "N", "P",
 
 
 def shipped(path: Path) -> Plan:
-    out = compile_robot(str(path), environment={})
+    out = compiled(str(path), environment={}, tries_profiles=False)
     assert out.plan
     return out.plan
 
@@ -102,8 +103,10 @@ def shipped(path: Path) -> Plan:
 @pytest.mark.parametrize("path", ROBOTS, ids=lambda path: path.parent.name)
 def test_a_shipped_robot_comes_back_as_it_was(path: Path) -> None:
     plan = shipped(path)
-    assert load(dump(plan)) == plan
-    assert dump(load(dump(plan))) == dump(plan)
+    text = dump(plan)
+    again = load(text)
+    assert again == plan
+    assert dump(again) == text
 
 
 @given(number=NUMBERS, share=st.integers(1, 99), rounds=st.integers(1, 9), word=WORDS)
@@ -179,9 +182,9 @@ def places(data: Any) -> list[tuple[Any, Any]]:
     return [place for key in keys for place in [(data, key), *places(data[key])]]
 
 
-def test_a_plan_that_was_meddled_with_is_a_plan_or_is_refused() -> None:
+def test_a_plan_that_was_meddled_with_is_a_plan_or_is_refused(soak: Soak) -> None:
     text = dump(shipped(ROOT / "robots/turtlebot/robot.yaml"))
-    for seed in range(150):
+    for seed in range(soak.examples(50, 1_000)):
         source = random.Random(seed)
         data = json.loads(text)
         around, key = source.choice(places(data))

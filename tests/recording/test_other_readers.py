@@ -13,6 +13,7 @@ import pytest
 
 from rbxcompose.runtime.recording.files import RecordingWriter
 from rbxcompose.runtime.recording.reader import RecordingReader
+from tests.forked import run_command
 from tests.shipped import ROOT
 
 pytestmark = pytest.mark.timeout(100)
@@ -24,9 +25,9 @@ def tape(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("tape")
     path = folder / "patrol.mcap"
     # In a process of its own: a robot forks, and this one may have had sessions of Zenoh, whose threads forbid that.
-    up = ["up", str(ROOT / "robots/turtlebot"), "--rate", "max", "--record", str(path)]
+    up = ("up", str(ROOT / "robots/turtlebot"), "--rate", "max", "--record", str(path))
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder)}
-    subprocess.run([sys.executable, "-m", "rbxcompose", *up], env=environment, timeout=60, check=True)
+    run_command(up, environment, 60.0).check_returncode()
     return path
 
 

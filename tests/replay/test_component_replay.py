@@ -5,8 +5,6 @@ from __future__ import annotations
 import io
 import json
 import os
-import subprocess
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,6 +24,7 @@ from rbxcompose.runtime.recording.reader import RecordingReader
 from rbxcompose.runtime.recording.tape import ORDERS, PLAN
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
 from rbxcompose.runtime.replay import ReplayResult, missing_topics, replayed
+from tests.forked import run_command
 
 ROOT = Path(__file__).parents[2]
 COMPONENTS = ["battery", "base", "go_to", "charger", "cmd_vel", "transforms", "diagnostics", "mission"]
@@ -73,9 +72,9 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     folder = tmp_path_factory.mktemp("run")
     path = folder / "run.mcap"
     # In a process of its own: a robot forks, and this one may have had sessions of Zenoh, whose threads forbid that.
-    up = ["up", str(ROOT / "robots/turtlebot"), "--rate", "max", "--record", str(path)]
+    up = ("up", str(ROOT / "robots/turtlebot"), "--rate", "max", "--record", str(path))
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder)}
-    subprocess.run([sys.executable, "-m", "rbxcompose", *up], env=environment, timeout=60, check=True)
+    run_command(up, environment, 60.0).check_returncode()
     reader = RecordingReader(io.BytesIO(path.read_bytes()))
     records = list(reader.messages())
     assert reader.damage == ""

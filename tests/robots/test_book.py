@@ -16,7 +16,7 @@ from rbxcompose.testing.bench import Ran, run_robot
 FOLDER = Path(__file__).parents[2] / "robots"
 ROBOTS = ("rooms", "patroller")
 ENDLESS = {"patrol_greeting", "random_patrol", "random_patrol_battery", "battery_monitor"}
-LONG = 30.0  # [s] for which those that never end are watched
+LONG = 20.0  # [s] for which those that never end are watched
 
 
 @cache

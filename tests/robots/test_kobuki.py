@@ -28,6 +28,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from tests.parts.project import Project
 from tests.shipped import robot_and_plan
+from tests.soak import Soak
 
 WALL = """rbx: 1
 kind: World
@@ -132,9 +133,10 @@ def test_it_turns_away_from_the_side_on_which_it_bumps(folder: Path, y: float, s
     assert wrap_angle(robot.pose.heading) * side > 0.5
 
 
-def test_it_never_crosses_the_edge_of_the_floor(folder: Path) -> None:
+def test_it_never_crosses_the_edge_of_the_floor(folder: Path, soak: Soak) -> None:
     robot, edges = Kobuki(plan_in(ISLAND, folder)), 0
-    for heading in np.arange(0.1, math.tau, 1.6):
+    headings = np.arange(0.1, math.tau, 1.6 if soak.is_on else 3.2)
+    for heading in headings:
         robot.base.core.pose = Pose2(0.0, 0.0, heading)
         for _ in range(3):
             robot.drive_until("safety", wander=0.4)
@@ -142,7 +144,7 @@ def test_it_never_crosses_the_edge_of_the_floor(folder: Path) -> None:
             edges += 1
             assert not robot.base.hangs
             assert max(abs(robot.pose.x), abs(robot.pose.y)) < 0.8
-    assert edges == 12
+    assert edges == 3 * len(headings) >= 6
 
 
 SENSOR = st.tuples(st.floats(0.05, 0.3), st.floats(0.05, 0.3))
@@ -254,7 +256,7 @@ def test_after_a_stop_it_begins_anew_and_still_gets_away(folder: Path) -> None:
 def test_the_robot_that_ships_meets_everything_and_does_not_fall() -> None:
     _, plan = robot_and_plan("kobuki")
     robot = Kobuki(plan)
-    robot.bench.advance(60.0)
+    robot.bench.advance(42.0)
     assert {one.data for one in robot.contacts} > {"map", "crate"}
     assert not robot.base.hangs
-    assert robot.base.core.distance > 10
+    assert robot.base.core.distance > 7

@@ -60,6 +60,7 @@ def test_it_picks_and_places_with_every_seed(soak: Soak) -> None:
 
 
 @pytest.mark.timeout(300)
+@pytest.mark.soak
 def test_it_picks_and_places_with_ideal_servos_too() -> None:
     plan = compiled("table").plan
     assert plan

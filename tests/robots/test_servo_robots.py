@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.compile import Compilation
 from rbxcompose.domains.servos.controllers.gripper import model_of
 from rbxcompose.msgs.rbxcompose_msgs import Grip
 from rbxcompose.msgs.sensor_msgs import JointState
@@ -16,6 +16,8 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from tests.body.described import described
 from tests.conftest import ROOT
+from tests.shipped import compiled
+from tests.soak import rare
 
 ARM = ("shoulder_pan", "shoulder_lift", "shoulder_roll", "elbow_flex", "forearm_flex", "wrist_flex")
 ROLLING = ("shoulder_pan", "shoulder_lift", "upperarm_roll", "elbow_flex", "forearm_roll", "wrist_flex", "wrist_roll")
@@ -31,9 +33,13 @@ FLAT = 0.006  # thickness of a finger [m]
 TICK = 0.00512  # [rad] of an AX-12
 
 
+def made(name: str, *profiles: str) -> Compilation:
+    return compiled(str(ROOT / f"robots/{name}"), profiles=profiles, environment={}, tries_profiles=False)
+
+
 def driver(name: str, profile: str = "") -> Any:
     profiles = [profile] if profile else []
-    plan = compile_robot(str(ROOT / f"robots/{name}"), profiles=profiles, environment={}).plan
+    plan = made(name, *profiles).plan
     assert plan
     [found] = [instance for instance in plan.instances if instance.type == "servo_bus"]
     return found
@@ -78,9 +84,9 @@ def test_the_arm_goes_where_it_is_commanded() -> None:
     assert all(abs(at[name]) < TICK for name in PI.keys() - wanted.keys())
 
 
-@pytest.mark.parametrize("name", ["pi_robot", "pedestal_pi"])
+@pytest.mark.parametrize("name", ["pi_robot", *rare("pedestal_pi")])
 def test_the_gripper_opens_its_tips_as_far_as_it_is_told(name: str) -> None:
-    robot = compile_robot(str(ROOT / f"robots/{name}"), environment={}).robot
+    robot = made(name).robot
     assert robot
     body = described(robot.manifest).body
     model = model_of(driver(name).config.controllers["right_gripper_controller"].config)
@@ -92,7 +98,7 @@ def test_the_gripper_opens_its_tips_as_far_as_it_is_told(name: str) -> None:
         assert abs(tip[1] - still[1]) - FLAT == pytest.approx(opening, abs=0.001)
 
 
-@pytest.mark.parametrize("name", ["pi_robot", "pedestal_pi"])
+@pytest.mark.parametrize("name", ["pi_robot", *rare("pedestal_pi")])
 def test_the_gripper_holds_what_is_between_its_fingers(name: str) -> None:
     robot = Bench(driver(name))
     ends: list[Any] = []

@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import socket
-import subprocess
-import sys
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
@@ -24,6 +22,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from tests.commands import command
 from tests.conftest import ROOT
+from tests.forked import run_command
 
 PAN, LIFT = "head_pan_joint", "right_arm_shoulder_lift_joint"
 LIFT_ID = 4
@@ -117,10 +116,8 @@ class Spoken(Stage):
         (folder / "temporary").mkdir()
         own = {"XDG_RUNTIME_DIR": str(folder), "TMPDIR": str(folder / "temporary"), "PYTHONPATH": str(ROOT)}
         self.environment = {**os.environ, **own, "NO_COLOR": "1"}
-        up = [sys.executable, "-m", "rbxcompose", "up", "-d", "robots/pi_robot"]
-        up += ["--set", "buses.servos.sim=pty", "--set", f"bus.port={port}"]
-        ran = subprocess.run(up, cwd=ROOT, env=self.environment, capture_output=True, text=True, timeout=60)
-        self.told = ran.stdout
+        up = ("up", "-d", "robots/pi_robot", "--set", "buses.servos.sim=pty", "--set", f"bus.port={port}")
+        self.told = run_command(up, self.environment, 60.0).stdout
 
     def do(self, *words: str) -> str:
         """Run a command to its end and return what it said."""
@@ -155,7 +152,7 @@ def spoken(tmp_path: Path) -> Iterator[Spoken]:
 
 
 def planned(name: str, *sets: str, **options: Any) -> Plan:
-    out = compile_robot(str(ROOT / "robots" / name), sets=sets, environment={}, **options)
+    out = compile_robot(str(ROOT / "robots" / name), sets=sets, environment={}, tries_profiles=False, **options)
     assert out.plan, list(out.report)
     return out.plan
 

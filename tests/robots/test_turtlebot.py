@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -27,10 +28,13 @@ def compiled(*sets: str, profiles: tuple[str, ...] = ()) -> Compilation:
     return compile_robot(ROBOT, sets=sets, profiles=profiles, environment={})
 
 
-def ran(*sets: str, profiles: tuple[str, ...] = ()) -> Ran:
+def run_again(*sets: str, profiles: tuple[str, ...] = ()) -> Ran:
     out = compiled(*sets, profiles=profiles)
     assert out.plan, render_text(out.report, out.sources)
     return run_robot(out.plan)
+
+
+ran = cache(run_again)
 
 
 def story(run: Ran, source: str = "mission") -> list[str]:
@@ -85,7 +89,7 @@ def test_it_docks_when_the_battery_is_low_and_resumes_at_the_corner_that_was_cut
 
 
 def test_two_runs_write_the_same_log_to_the_byte() -> None:
-    assert ran().log == ran().log
+    assert ran().log == run_again().log
 
 
 def test_a_corner_that_was_moved_is_visited_where_it_is_now() -> None:

@@ -15,10 +15,10 @@ from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.log import NAME, PREVIOUS, read_log
 from rbxcompose.runtime.processes import Process, titled
 from tests.commands import command
+from tests.forked import Forked
 
 ROOT = Path(__file__).parents[2]
 TOY = [sys.executable, str(Path(__file__).with_name("toy_robot.py"))]
-COMMAND = [sys.executable, "-m", "rbxcompose"]
 LOG_FILES = {NAME, PREVIOUS}
 PATIENCE = 60.0  # [s]; how long things may take is for their tests to say
 
@@ -43,7 +43,7 @@ class Robot:
     def up(self, *options: str, **config: object) -> subprocess.Popen[str]:
         """Start it; the process is that of the foreground."""
         words = [*TOY, "--name", self.name, "--config", json.dumps(config), *options]
-        process = subprocess.Popen(
+        process = Forked(
             words, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT
         )
         self.started.append(process)

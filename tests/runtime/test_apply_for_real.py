@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,6 +16,7 @@ import pytest
 from rbxcompose.runtime.processes import titled
 from tests.commands import command
 from tests.conftest import ROOT
+from tests.forked import RBXCOMPOSE, Forked, run_command
 
 PATIENCE = 60.0  # [s]
 NAME = "turtlebot_that_changes"
@@ -48,8 +48,7 @@ class Changing:
         return command(*words, environment=self.environment, folder=self.folder)
 
     def up(self) -> None:
-        words = [sys.executable, "-m", "rbxcompose", "up", "-d", "robots/turtlebot"]
-        subprocess.run(words, env=self.environment, cwd=self.folder, timeout=PATIENCE, check=True)
+        run_command(("up", "-d", "robots/turtlebot"), self.environment, PATIENCE, self.folder).check_returncode()
 
     def do(self, *words: str, code: int = 0) -> str:
         done = self.plain(*words)
@@ -165,8 +164,8 @@ def test_who_needs_what_has_failed_for_good_is_blocked_until_the_next_apply(robo
 
 
 def test_up_watch_takes_what_the_files_say(robot: Changing) -> None:
-    words = [sys.executable, "-m", "rbxcompose", "up", "--watch", "robots/turtlebot"]
-    with subprocess.Popen(
+    words = [*RBXCOMPOSE, "up", "--watch", "robots/turtlebot"]
+    with Forked(
         words, env=robot.environment, cwd=robot.folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     ) as process:
         assert process.stdout is not None

@@ -6,7 +6,8 @@ import signal
 import subprocess
 from pathlib import Path
 
-from tests.runtime.real_robot import COMMAND, PATIENCE, ROOT, Robot, eventually
+from tests.forked import RBXCOMPOSE, Forked
+from tests.runtime.real_robot import PATIENCE, ROOT, Robot, eventually
 
 BOTH = "{others: [{node: first, parameters: [%s]}, {node: second, parameters: [%s]}], by: somebody}"
 SIZE = "{name: size, value: {type: 2, integer_value: 5}}"
@@ -16,10 +17,8 @@ def half_way(robot: Robot, file: Path) -> subprocess.Popen[str]:
     """Return a client whose change of both toys is prepared by the first, and by the second when the file is gone."""
     file.touch()
     robot.up_detached(waits_for=str(file))
-    words = [*COMMAND, "service", "call", "first/change_parameters", BOTH % (SIZE, SIZE)]
-    client = subprocess.Popen(
-        words, env=robot.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT
-    )
+    words = [*RBXCOMPOSE, "service", "call", "first/change_parameters", BOTH % (SIZE, SIZE)]
+    client = Forked(words, env=robot.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT)
     robot.started.append(client)
     eventually(lambda: robot.has_logged("first asked to be 5") and robot.has_logged(f"{file} asked to be 5"))
     assert client.poll() is None

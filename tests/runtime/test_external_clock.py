@@ -6,7 +6,6 @@ import os
 import shutil
 import socket
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -31,6 +30,7 @@ from rbxcompose.runtime.process_group.connection import CallbackInbox, ExternalD
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 from tests.bus.conftest import Network, network
+from tests.forked import RBXCOMPOSE, Forked
 from tests.runtime.stage import ENDPOINT, Stage
 from tests.runtime.stage import robot as conducted
 from tests.runtime.test_driver import Driven
@@ -237,8 +237,8 @@ def follower(network: Network) -> Iterator[subprocess.Popen[str]]:
     file = folder / "robot.yaml"
     file.write_text(MANIFEST.format(port=network.port), encoding="utf-8")
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder), "NO_COLOR": "1"}
-    robot = subprocess.Popen(
-        [sys.executable, "-m", "rbxcompose", "up", str(file), "--for", "1.5s"],
+    robot = Forked(
+        [*RBXCOMPOSE, "up", str(file), "--for", "1.5s"],
         env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

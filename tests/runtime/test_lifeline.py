@@ -258,7 +258,8 @@ def lose_link(transport: ZenohTransport, other: ZenohTransport) -> None:
         with suppress(OSError):  # no socket, or one that listens
             end = socket.socket(fileno=descriptor)
             try:
-                if {"{}:{}".format(*address) for address in (end.getsockname(), end.getpeername())} == ends:
+                addresses = (end.getsockname(), end.getpeername()) if end.family == socket.AF_INET else ()
+                if {"{}:{}".format(*address) for address in addresses} == ends:
                     end.shutdown(socket.SHUT_RDWR)
             finally:
                 end.detach()  # it is Zenoh's

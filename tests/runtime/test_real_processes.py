@@ -95,7 +95,7 @@ def test_an_interrupt_during_the_start_ends_it_at_once(robot: Robot) -> None:
     assert time.monotonic() - began < 2.0
 
 
-@pytest.mark.parametrize("processes", [1, 4, *rare(2, 3, 5)])
+@pytest.mark.parametrize("processes", [4, *rare(1, 2, 3, 5)])
 def test_an_interrupt_at_any_moment_leaves_nothing(robot: Robot, processes: int) -> None:
     process = robot.up()
     eventually(lambda: len(robot.processes()) >= processes)

@@ -1,4 +1,4 @@
-"""The toy section, as long as one test runs."""
+"""The toy section, as long as the tests of one file run: the schemas with it are made once."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from rbxcompose.manifest.validate import ENTRY_WORDS
 from rbxcompose.sdk import registry as types
 
 
-@pytest.fixture
-def lamps(monkeypatch: pytest.MonkeyPatch) -> Iterator[Section[Any, Any]]:
-    """Declare the section `lamps`, and forget it when the test ends."""
+@pytest.fixture(scope="module")
+def lamps() -> Iterator[Section[Any, Any]]:
+    """Declare the section `lamps`, and forget it when the tests end."""
     types.usable_names()
-    monkeypatch.setattr(registry, "_SECTIONS", {section.name: section for section in registry.sections()})
-    monkeypatch.setattr(types, "_TYPES", dict(types._TYPES))
-    monkeypatch.setitem(ENTRY_WORDS, "lamps", "lamp")
-    monkeypatch.delitem(sys.modules, "tests.sections.toy", raising=False)
-    installed_schema.cache_clear()
-    yield cast(Section[Any, Any], importlib.import_module("tests.sections.toy").lamps)
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr(registry, "_SECTIONS", {section.name: section for section in registry.sections()})
+        monkeypatch.setattr(types, "_TYPES", dict(types._TYPES))
+        monkeypatch.setitem(ENTRY_WORDS, "lamps", "lamp")
+        monkeypatch.delitem(sys.modules, "tests.sections.toy", raising=False)
+        installed_schema.cache_clear()
+        yield cast(Section[Any, Any], importlib.import_module("tests.sections.toy").lamps)
     installed_schema.cache_clear()

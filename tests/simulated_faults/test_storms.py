@@ -22,8 +22,8 @@ from tests.simulated_faults.whole_robot import WholeRobot
 from tests.soak import Soak
 
 ROBOT = Path(__file__).parents[2] / "robots/turtlebot/robot.yaml"
-BATCHES = 10
-QUICK, MANY = 10, 1_000  # seeds
+BATCHES = 5
+QUICK, MANY = 5, 1_000  # seeds
 HARD = (33, 63, 71, 97, 129, 717)  # a stop or restart while something hangs
 
 

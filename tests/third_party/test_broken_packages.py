@@ -79,6 +79,11 @@ def test_who_uses_a_broken_type_is_told_the_package_and_why(
     assert checked(tmp_path, "odd").codes == ["RBX9301"]  # also when it is asked for once more
     assert checked(tmp_path, "battery_sim").text == ""
     assert "odd" not in registry.usable_names()
+
+
+def test_a_broken_type_is_not_in_the_schema(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    put(tmp_path / "site", "odd-package", {"component.odd": "odd_module"}, {"odd_module.py": "import no_such_module"})
+    see(tmp_path / "site", monkeypatch)
     assert "component_odd" not in makers()["Robot"](registry.usable_names())["$defs"]
 
 

@@ -17,19 +17,27 @@ from tests.third_party.places import LAMP, install
 from tests.third_party.rbx_lamp import make_messages
 
 LIGHTHOUSE = Path(__file__).parent / "lighthouse"
-ROBOT = (LIGHTHOUSE / "robot.yaml").read_text(encoding="utf-8")
+COMMANDS = """\
+import json, sys
+from rbxcompose.commands.main import main
+for words in json.loads(sys.argv[1]):
+    print(f"[{main(words)}]\\f", end="", flush=True)
+"""
 COMPLETE = """\
 from pathlib import Path
+from rbxcompose.commands.main import main
 from rbxcompose.tools.lsp.completion import complete
 from rbxcompose.tools.lsp.document import Document
 for text, line in ((Path("robot.yaml").read_text(), 5), (Path("robot.yaml").read_text().replace("period", "per"), 6)):
     print([item.label for item in complete(Document(Path("robot.yaml"), text), line, 10 if line == 5 else 7)])
+main(["schema", "robot"])
 """
 IS_IMPORTED = """\
 import sys
 from rbxcompose.commands.main import main
-main(["check", "."])
-print("imported" if "rbx_lamp.lamp" in sys.modules else "left alone")
+for robot in ("other", "."):
+    main(["check", robot])
+    print("imported" if "rbx_lamp.lamp" in sys.modules else "left alone")
 """
 
 
@@ -47,8 +55,17 @@ class Installed:
             "NO_COLOR": "1",
         }
 
-    def write(self, robot: str) -> None:
-        (self.folder / "robot.yaml").write_text(robot, encoding="utf-8")
+    def robot(self, folder: str, old: str, new: str) -> str:
+        """Write a robot, or its mission, in which some words are others; return its folder."""
+        for path in LIGHTHOUSE.glob("*.yaml"):
+            changed = self.folder / folder / path.name
+            changed.parent.mkdir(exist_ok=True)
+            changed.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+        return folder
+
+    def do(self, *commands: list[str]) -> list[str]:
+        """Run commands one after the other in the robot's folder, and return what each says in both streams."""
+        return self.run("-c", COMMANDS, json.dumps(commands)).split("\f")
 
     def run(self, *words: str) -> str:
         """Run Python in the robot's folder, and return what it says in both streams."""
@@ -70,16 +87,20 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Installed:
     return Installed(tmp_path_factory.mktemp("lamp"))
 
 
-def test_its_robot_is_checked_and_its_mission_runs_to_the_end(installed: Installed) -> None:
-    installed.write(ROBOT)
-    assert installed.run("-m", "rbxcompose", "check", "--strict", ".").startswith("lighthouse is fine")
-    out = installed.run("-m", "rbxcompose", "up", "--rate", "max", ".")
-    assert "mission night: success" in out
-    assert out.endswith("[0]"), out
+def test_its_robot_is_checked_and_its_mission_runs_to_the_end_and_its_component_again(installed: Installed) -> None:
+    up = installed.run("-m", "rbxcompose", "up", "--rate", "max", "--record", "again.mcap", ".")
+    assert "mission night: success" in up
+    assert up.endswith("[0]"), up
+    replay = ["replay", "again.mcap", "--into", "light"]
+    other = ["--robot", ".", "--set", "components.light.period=1s"]
+    check, again, differs, _ = installed.do(["check", "--strict", "."], replay, [*replay, *other])
+    assert check.startswith("lighthouse is fine")
+    assert "'light' sends the same as recorded" in again
+    assert "RBX9209" in differs, differs
+    assert "/lamp/light" in differs
 
 
 def test_its_orders_and_their_ends_go_from_one_process_to_another(installed: Installed) -> None:
-    installed.write(ROBOT)
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -89,59 +110,33 @@ def test_its_orders_and_their_ends_go_from_one_process_to_another(installed: Ins
     assert out.endswith("[0]"), out
 
 
-def test_its_component_is_run_again_from_the_recording_of_a_run(installed: Installed) -> None:
-    installed.write(ROBOT)
-    out = installed.run("-m", "rbxcompose", "up", "--rate", "max", "--record", "again.mcap", ".")
-    assert out.endswith("[0]"), out
-    again = installed.run("-m", "rbxcompose", "replay", "again.mcap", "--into", "light")
-    assert "'light' sends the same as recorded" in again
-    other = ["--robot", ".", "--set", "components.light.period=1s"]
-    again = installed.run("-m", "rbxcompose", "replay", "again.mcap", "--into", "light", *other)
-    assert "RBX9209" in again, again
-    assert "/lamp/light" in again
-
-
 def test_its_own_tests_pass(installed: Installed) -> None:
     words = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "--import-mode=importlib", str(LAMP / "test_lamp.py")]
     assert "6 passed" in installed.run(*words)
 
 
-def test_its_skills_are_listed_and_their_arguments_checked(installed: Installed) -> None:
-    installed.write(ROBOT)
-    listed = installed.run("-m", "rbxcompose", "mission", "skills", ".")
-    assert {"blink", "cool_down", "dim", "read_character"} <= {
-        line.split()[0] for line in listed.splitlines() if line.strip()
-    }
+def test_its_skills_settings_and_check_are_told_like_ours(installed: Installed) -> None:
+    misspelt = installed.robot("misspelt", "cool_down: $light.flashes", "cool_down: {flahes: 3}")
+    unknown = installed.robot("unknown", "period: 500 ms", "perod: 500 ms")
+    fast = installed.robot("fast", "500 ms", "50 ms")
+    checks = (["check", folder] for folder in (misspelt, unknown, fast))
+    listed, skill, setting, check, page, _ = installed.do(["mission", "skills", "."], *checks, ["explain", "lamp01"])
+    names = {line.split()[0] for line in listed.splitlines() if line.strip()}
+    assert {"blink", "cool_down", "dim", "read_character"} <= names
     assert "topic /dim" in listed
     assert "- dim: " in listed
-    mission = (LIGHTHOUSE / "night.yaml").read_text(encoding="utf-8")
-    night = installed.folder / "night.yaml"
-    night.write_text(mission.replace("cool_down: $light.flashes", "cool_down: {flahes: 3}"), encoding="utf-8")
-    assert "did you mean 'flashes'?" in installed.run("-m", "rbxcompose", "check", ".")
-    night.write_text(mission, encoding="utf-8")
-
-
-def test_its_check_is_told_with_its_place_and_has_a_page(installed: Installed) -> None:
-    installed.write(ROBOT.replace("500 ms", "50 ms"))
-    out = installed.run("-m", "rbxcompose", "check", ".")
-    assert "warning[LAMP01]: 'light' blinks every 0.05 s, which nobody sees" in out
-    assert "robot.yaml:7:13" in out
-    page = installed.run("-m", "rbxcompose", "explain", "lamp01")
+    assert "did you mean 'flashes'?" in skill
+    assert "did you mean 'period'?" in setting
+    assert "warning[LAMP01]: 'light' blinks every 0.05 s, which nobody sees" in check
+    assert "robot.yaml:7:13" in check
     assert page.startswith("LAMP01: A lamp that blinks too fast")
 
 
-def test_its_settings_are_checked_like_ours(installed: Installed) -> None:
-    installed.write(ROBOT.replace("period: 500 ms", "perod: 500 ms"))
-    assert "did you mean 'period'?" in installed.run("-m", "rbxcompose", "check", ".")
-
-
 def test_schema_and_editor_know_it(installed: Installed) -> None:
-    installed.write(ROBOT)
-    schema = json.loads(installed.run("-m", "rbxcompose", "schema", "robot").rpartition("[")[0])
-    assert "brightness" in schema["$defs"]["component_lamp"]["properties"]
-    types, settings, *_ = installed.run("-c", COMPLETE).splitlines()
+    types, settings, schema = installed.run("-c", COMPLETE).split("\n", 2)
     assert "'lamp'" in types
     assert "'period', 'brightness'" in settings
+    assert "brightness" in json.loads(schema.rpartition("[")[0])["$defs"]["component_lamp"]["properties"]
 
 
 def test_its_messages_are_those_of_its_texts() -> None:
@@ -149,7 +144,6 @@ def test_its_messages_are_those_of_its_texts() -> None:
 
 
 def test_a_robot_that_does_not_use_it_does_not_import_it(installed: Installed) -> None:
-    installed.write(ROBOT.replace("type: lamp\n    period: 500 ms", "type: battery_sim\n    runtime: 45 s"))
-    assert "left alone" in installed.run("-c", IS_IMPORTED)
-    installed.write(ROBOT)
-    assert "imported" in installed.run("-c", IS_IMPORTED)
+    installed.robot("other", "type: lamp\n    period: 500 ms", "type: battery_sim\n    runtime: 45 s")
+    out = installed.run("-c", IS_IMPORTED)
+    assert 0 < out.index("left alone") < out.index("imported")

@@ -17,6 +17,7 @@ pytest.importorskip("cv2", reason="OpenCV is not installed")
 STOOD = {"tea": (0.64, 0.16, 0.65), "can": (0.62, -0.15, 0.635), "block": (0.64, 0.0, 0.64)}
 
 
+@pytest.mark.soak
 def test_what_carries_a_tag_is_put_to_the_left_and_all_else_to_the_right() -> None:
     path, sets = str(ROOT / "robots/porter"), ("start=sort_table",)
     bench = Bench(plan=compiled(path, profiles=["sorting"], sets=sets, environment={}).plan)

@@ -138,8 +138,8 @@ def test_things_have_names_shapes_and_places_and_a_tag_names_its_thing(tmp_path:
 @pytest.mark.parametrize(
     ("world", "depth", "goal", "outcome", "why"),
     [
-        (TABLE, True, {"duration": 1.0}, "none_found", "nothing stands on the table"),
-        (TABLE + THINGS, True, {"least": 3, "duration": 1.0}, "too_few", "2 of 3 things stand on the table"),
+        (TABLE, True, {"duration": 0.7}, "none_found", "nothing stands on the table"),
+        (TABLE + THINGS, True, {"least": 3, "duration": 0.7}, "too_few", "2 of 3 things stand on the table"),
         (TABLE.replace("z: 70 cm", "z: 5 cm"), True, {"duration": 1.0}, "no_table", "nothing as large as a table"),
         (TABLE + THINGS, False, {"duration": 3.0}, "not_seen", "no cloud on 'eye/points' for"),
     ],
@@ -161,7 +161,7 @@ def test_what_never_stands_still_is_not_steady(tmp_path: Path) -> None:
     path = "path: [[0 s, 80 cm, -20 cm], [4 s, 80 cm, 20 cm]]"
     can = f"  can: {{cylinder: {{radius: 35 mm, length: 10 cm}}, z: 74 cm, {path}}}\n"
     looker = Looker(tmp_path, TABLE + can, extra="rate: 5 Hz, pictures: 5")
-    assert looker.found(duration=2.0).outcome == "not_steady"
+    assert looker.found(duration=1.5).outcome == "not_steady"
 
 
 def test_a_cloud_of_another_camera_or_without_points_is_told_and_not_used(tmp_path: Path) -> None:

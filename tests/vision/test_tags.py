@@ -24,7 +24,7 @@ def angle_between(one: Transform3, other: Transform3) -> float:
     return 2 * math.acos(min(1.0, abs(multiply(one.rotation, conjugate(other.rotation))[3])))
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(
     st.integers(0, 586), st.floats(0.6, 2.5), st.floats(0, 60), st.floats(0, 360), st.floats(0, 360), st.floats(-1, 1)
 )
@@ -103,7 +103,7 @@ def test_half_a_tag_is_none() -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=15)
+@settings(max_examples=5)
 def test_noise_has_no_tags(seed: int) -> None:
     noise = np.random.default_rng(seed)
     coarse = np.kron(noise.integers(0, 2, (60, 80)) * 255, np.ones((8, 8))).astype(np.uint8)

@@ -107,7 +107,7 @@ def test_a_camera_sees_tags_of_what_stands_what_is_loose_and_who_walks(tmp_path:
     (tmp_path / "robots/one/eye.urdf").write_text(LEVEL)
     bench = Room(tmp_path, ROBOT.replace("SIMULATOR", simulator), WORLD).bench
     taken = bench.collect("/tags", Detection3DArray)
-    bench.advance(3.0)
+    bench.advance(2.0)
     if not taken and simulator == "physics":
         pytest.skip(bench.statuses("physics: pictures")[-1].message)
     first, last = (

@@ -15,6 +15,7 @@ from rbxcompose.domains.worlds.physics.conversion import WALL
 from rbxcompose.domains.worlds.physics.engine import PhysicsWorld, Touch
 from rbxcompose.domains.worlds.shapes import ShapePath, WorldBox, WorldCylinder, WorldShape
 from rbxcompose.domains.worlds.world import SimulatedWorld
+from tests.soak import rare
 from tests.worlds.physical import STEP, empty, shipped, shipped_world
 from tests.worlds.scenes import ANGLES, grids, shapes
 
@@ -50,7 +51,7 @@ def test_it_drives_straight_as_far_as_its_wheels_say() -> None:
     assert abs(pose.heading) < 1e-3
 
 
-@pytest.mark.parametrize("name", ["turtlebot", "porter", "pi_robot", "rover", "box_robot", "house"])
+@pytest.mark.parametrize("name", ["turtlebot", "porter", "rover", *rare("pi_robot", "box_robot", "house")])
 def test_it_turns_a_quarter_in_place(name: str) -> None:
     robot = shipped(name)
     physics = PhysicsWorld(robot, empty(robot))

@@ -13,8 +13,8 @@ from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_manifest import ROBOT_LAYER, HistoryStep, RobotManifest
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, resolve
 from rbxcompose.compiler.plan.model import BusPlan
-from rbxcompose.compiler.schema.documents import installed_schema
 from rbxcompose.compiler.schema.guide import Guide
+from rbxcompose.compiler.schema.robot import robot_schema
 from rbxcompose.domains.muxes.sections.muxes import muxes
 from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode, at, key_span
 from rbxcompose.missions.engine.value_text import show as show_value
@@ -231,7 +231,7 @@ def why(robot: Robot, text: str) -> PathAnswer | Finding:
 
 def _guide(manifest: RobotManifest, path: KeyPath) -> Guide:
     types = {name: entry.type for name, entry in manifest.components.items()}
-    return Guide(installed_schema("Robot"), tree_of(manifest, path), types)
+    return Guide(robot_schema(set(types.values())), tree_of(manifest, path), types)
 
 
 def _written(robot: Robot, guide: Guide, path: KeyPath, node: TreeNode) -> PathAnswer:
