@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.runtime.log import NAME, read_log
 from rbxcompose.runtime.processes import titled
 from tests.cli.live_robot import Robot
 from tests.runtime.real_robot import eventually
@@ -57,7 +59,8 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Robot]:
 
 
 def log(robot: Robot) -> list[str]:
-    return [str(line) for line in robot.do("logs", "goes_on", "-n", "200").stdout.splitlines()]
+    folder = RobotFolder(Path(robot.environment["XDG_RUNTIME_DIR"]) / "rbxcompose/goes_on")
+    return [record.text for record in read_log(folder.path / NAME)]
 
 
 def test_a_killed_mission_goes_on_at_its_leaf_and_stops_at_its_breakpoint(robot: Robot) -> None:

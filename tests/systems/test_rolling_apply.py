@@ -9,6 +9,7 @@ from tests.systems.patrol import ADDRESSES, PatrolOnHosts
 from tests.systems.sshd import serve, wrapper
 
 
+@pytest.mark.soak
 @pytest.mark.timeout(200)
 def test_all_hosts_change_or_none_unless_in_part(patrol: PatrolOnHosts) -> None:
     try:

@@ -46,6 +46,10 @@ def test_one_command_starts_shows_stops_and_ends_the_robot_on_all_hosts_over_ssh
     assert patrol.stranger("d") == "refused"
     assert "running" in run("mission", "ls", "--robot", f"system.yaml:{patrol.name}")
     assert "battery_level" in run("diag", "tree", "--robot", "system.yaml")
+    robot = patrol.hosts.folder / "robots/robot.yaml"
+    robot.write_text(robot.read_text(encoding="utf-8").replace("warn: 50 %", "warn: 40 %"), encoding="utf-8")
+    run("apply", "system.yaml", "--yes")
+    assert "40 %" in run("param", "get", "battery", "warn", "--robot", "system.yaml")
     run("param", "set", "battery", "runtime", "500 s", "--robot", "system.yaml")
     assert "500 s" in run("param", "get", "battery", "runtime", "--robot", "system.yaml"), "it is on the other host"
     assert "diff_drive_sim" in run("top", "system.yaml")
