@@ -12,6 +12,18 @@ from unittest import mock
 
 from rbxcompose.commands.main import main
 
+SEVERAL = """\
+import json, sys
+from rbxcompose.commands.main import main
+for words in json.loads(sys.argv[1]):
+    try:
+        main(words)
+    except SystemExit:
+        pass  # after help
+    print(end="\\f", flush=True)
+"""
+"""Runs commands one after the other in one process, for packages that ours has not; what each says ends with `\\f`."""
+
 
 def command(*words: str, environment: Mapping[str, str], folder: Path) -> CompletedProcess[str]:
     """Run a command in a folder; return its exit code and what it prints."""

@@ -44,7 +44,8 @@ class Forked(subprocess.Popen[str]):
 
     def _execute_child(self, *given: Any) -> None:
         """Have it forked: `Popen` leaves to this method what differs between systems."""
-        words, _, _, _, _, folder, environment, _, _, _, *pipes = given
+        words, _, prepare, _, passed, folder, environment, _, _, _, *pipes = given
+        assert (prepare, tuple(passed)) == (None, ()), "nothing but pipes is handed on"
         order = {"words": words[1:], "folder": str(folder), "environment": dict(environment), "leads": given[-2]}
         ends = [pipes[end] if pipes[end] >= 0 else number for number, end in enumerate((0, 3, 5))]
         with _STARTING:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.commands import SEVERAL
 from tests.docs.examples import ROOT, blocks_of
 
 pytestmark = pytest.mark.timeout(300)  # mypy without its cache
@@ -17,16 +18,6 @@ PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 BLOCKS = [block for block in blocks_of(PAGE, "CONTRIBUTING.md") if block.language == "python"]
 FILES = {block.words[1]: block.text for block in BLOCKS}
 DOMAIN = "rbxcompose/domains/sirens"
-COMMANDS = """\
-import json, sys
-from rbxcompose.commands.main import main
-for words in json.loads(sys.argv[1]):
-    try:
-        main(words)
-    except SystemExit:
-        pass  # after help
-    print(end="\\f", flush=True)
-"""
 SITE = """rbx: 1
 kind: Robot
 name: site
@@ -113,7 +104,7 @@ def test_its_tests_pass(copy: Path) -> None:
 def test_its_domain_has_a_section_a_component_a_check_and_a_command(copy: Path) -> None:
     site = written(copy, {"site/robot.yaml": SITE, "circle/robot.yaml": SITE.replace("[front]", "[back]")}) / "site"
     commands = [["--help"], ["siren"], ["check"], ["check", "../circle"], ["up", "--rate", "max", "--for", "1s"]]
-    helped, listed, checked, circle, up, _ = run("-c", COMMANDS, json.dumps(commands), cwd=site, path=copy).split("\f")
+    helped, listed, checked, circle, up, _ = run("-c", SEVERAL, json.dumps(commands), cwd=site, path=copy).split("\f")
     assert "List the sirens of a robot" in helped
     assert listed.splitlines()[-2:] == ["front  base", "back   base"]
     assert "'front' needs '/alarm', which nothing in the robot provides" in checked

@@ -2,36 +2,17 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.conftest import ROOT
 from tests.lsp.client import Client
 
 ROBOT = "robots/turtlebot/robot.yaml"
 MISSION = "missions/patrol.yaml"
 AT = {"line": 0, "character": 1}
 RANGE = {"start": AT, "end": AT}
-
-
-@pytest.fixture(scope="module")
-def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
-    """One server for all tests: no question spoils the answers to the next ones."""
-    with Client(tmp_path_factory.mktemp("editor")) as client:
-        yield client
-    assert client.process.returncode == 0
-    assert client.errors == b""
-
-
-@pytest.fixture
-def project(tmp_path: Path) -> Path:
-    shutil.copytree(ROOT / "robots/turtlebot", tmp_path / "robots/turtlebot")
-    shutil.copytree(ROOT / "missions", tmp_path / "missions")
-    return tmp_path
 
 
 def opened(client: Client, path: Path, text: str | None = None) -> None:

@@ -70,7 +70,13 @@ def test_installed_it_is_a_type_like_any_other(tmp_path: Path) -> None:
 def test_it_keeps_what_every_type_keeps(tmp_path: Path) -> None:
     path = installed(tmp_path)
     suite = Path(__file__).parents[1] / "components/test_conformance.py"
-    words = ("-q", "-p", "no:cacheprovider", "--rootdir", str(suite.parent))  # whose conftest.py compiles for arms else
+    words = (
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "--rootdir",
+        str(suite.parent),
+    )  # without tests/conftest.py, which compiles
     done = run(suite.parents[2], "pytest", *words, "-k", "thermo_meter", str(suite), path=path)
     assert done.returncode == 0, done.stdout
     assert " passed" in done.stdout

@@ -12,17 +12,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.commands import SEVERAL
 from tests.conftest import ROOT
 from tests.third_party.places import LAMP, install
 from tests.third_party.rbx_lamp import make_messages
 
 LIGHTHOUSE = Path(__file__).parent / "lighthouse"
-COMMANDS = """\
-import json, sys
-from rbxcompose.commands.main import main
-for words in json.loads(sys.argv[1]):
-    print(f"[{main(words)}]\\f", end="", flush=True)
-"""
 COMPLETE = """\
 from pathlib import Path
 from rbxcompose.commands.main import main
@@ -65,7 +60,7 @@ class Installed:
 
     def do(self, *commands: list[str]) -> list[str]:
         """Run commands one after the other in the robot's folder, and return what each says in both streams."""
-        return self.run("-c", COMMANDS, json.dumps(commands)).split("\f")
+        return self.run("-c", SEVERAL, json.dumps(commands)).split("\f")
 
     def run(self, *words: str) -> str:
         """Run Python in the robot's folder, and return what it says in both streams."""
