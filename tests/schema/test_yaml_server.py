@@ -66,7 +66,7 @@ def test_it_proposes(kind: str, text: str, label: str, written: str, client: Cli
         ("Robot", "components:\n  bat|tery:\n    type: battery_sim\n    runtime: 1 h\n", "drains evenly"),
         ("Overlay", f"{BATTERY}    run|time: 1 h\n", "Time from full to empty."),
         ("Mission", "do:\n  - wait: 5 s\n    time|out: 6 s\n", "Fail when the node takes longer"),
-        ("Mission", "do:\n  - go|_to: dock\n", "Drives to a pose"),
+        ("Mission", "do:\n  - go|_to: dock\n", "Drives to poses"),
     ],
 )
 def test_it_shows(kind: str, text: str, shown: str, client: Client) -> None:

@@ -1,7 +1,7 @@
 """What an overlay writes of a section, where every key may be omitted or removed, and what a whole section has.
 
-A definition describes changes, and `whole_` before its name what is complete: it refers to the former, and adds what
-must be there. So each key is described once.
+A definition describes changes, and `whole_` before its name what a complete one has beyond that: what must be there. So
+each key is described once, and a complete one has to satisfy both.
 """
 
 import re
@@ -14,15 +14,24 @@ from rbxcompose.compiler.sections.components import components
 from rbxcompose.manifest.registry import sections as all_sections
 from rbxcompose.manifest.section import OPTIONS
 
-WHOLE = "whole_"  # prefix of a definition that allows neither to remove keys nor to omit required ones
+WHOLE = "whole_"  # prefix of what a definition demands where keys may neither be removed nor, if required, omitted
 SECTION = "section_"  # prefix of the definition of a section
 REMOVED = "removed"
 OR_REMOVED = "_or_no"  # suffix of a definition to which that is added
-PRESENT = "present"
+PRESENT, NULLABLE = "present", "nullable"
+_PRESENCE: Schema = {"$ref": f"{DEFINITIONS}{PRESENT}"}
 # No `enum` or `type`: editors would propose `null` and `""` as values of every key.
 _EMPTY: Schema = {"maxLength": 0, "not": {"type": ["number", "boolean", "object", "array"]}}
 _REMOVED: Schema = {**_EMPTY, "description": "With the tag `!remove`: removes it from the layers below."}
 _PRESENT: Schema = {"not": _EMPTY, "errorMessage": "must not be empty"}
+_NULLABLE: Schema = {"type": ["string", "number", "boolean", "object", "array", "null"], "minLength": 1}
+_NULL, _BLANK = "null", "blank"
+_DEMANDS: dict[frozenset[str], Any] = {  # by what a schema accepts itself of what a removed key looks like
+    frozenset(): _PRESENCE,
+    frozenset({_NULL}): {"$ref": f"{DEFINITIONS}{NULLABLE}"},
+    frozenset({_BLANK}): {"not": {"type": "null"}},
+    frozenset({_NULL, _BLANK}): True,
+}
 _NOT_NEEDED = ("required", "minProperties", "minItems")
 _NOTES = ("description", "default", "x-names", "x-dimension")  # what editors expect at the key itself
 
@@ -37,10 +46,12 @@ def laid_over(definitions: Mapping[str, Schema]) -> dict[str, Schema]:
             word = {"type": ["string", "number", "boolean", "array"], "description": section.short.only_over}
             entry = changes[f"{SECTION}{section.name}"]["additionalProperties"]
             changes[f"{SECTION}{section.name}"]["additionalProperties"] = {"anyOf": [word, entry]}
+            demanded = whole[f"{WHOLE}{SECTION}{section.name}"]
+            demanded["additionalProperties"] = {"type": "object", "allOf": [demanded["additionalProperties"]]}
     entry = changes[f"{SECTION}{components.name}"]["additionalProperties"]["anyOf"][0]
     entry["allOf"] = [*entry["allOf"], _untyped(definitions)]
     removable = {f"{name}{OR_REMOVED}": _removable(name, change) for name, change in changes.items()}
-    return {**changes, **whole, **removable, REMOVED: _REMOVED, PRESENT: _PRESENT}
+    return {**changes, **whole, **removable, REMOVED: _REMOVED, PRESENT: _PRESENT, NULLABLE: _NULLABLE}
 
 
 def _untyped(definitions: Mapping[str, Schema]) -> Schema:
@@ -88,33 +99,80 @@ def _loose(schema: Schema) -> Schema:
 
 
 def _wholes(definitions: Mapping[str, Schema]) -> dict[str, Schema]:
-    """Return the definitions that differ from the changes to them, which all others refer to."""
+    """Return what the definitions demand beyond the changes to them, of those that demand more."""
     changed = {name for name, definition in definitions.items() if _loose(definition) != definition}
     while more := {name for name, definition in definitions.items() if changed & {*references(definition)}} - changed:
         changed |= more
-    names = {f"{DEFINITIONS}{name}": f"{DEFINITIONS}{WHOLE}{name}" for name in changed}
-    return {name: _whole(name, definitions, names) for name in sorted(changed)}
+    made = _Whole(definitions, {f"{DEFINITIONS}{name}": f"{DEFINITIONS}{WHOLE}{name}" for name in changed})
+    return {name: made.beyond(definitions[name]) for name in sorted(changed)}
 
 
-def _whole(name: str, definitions: Mapping[str, Schema], names: Mapping[str, str]) -> Schema:
-    schema = definitions[name]
-    if schema.get("additionalProperties") is not False:
-        return dict(renamed(schema, names))
-    options = definitions[f"{SECTION}{components.name}"]["additionalProperties"]["properties"]
-    own = {
-        key: _bare(renamed(property_, names))
-        for key, property_ in schema["properties"].items()
-        if _may_be_empty(options[key] if property_ is True else property_, definitions)
-        or (property_ is not True and (_loose(property_) != property_ or renamed(property_, names) != property_))
-    }
-    needed = {key: schema[key] for key in _NOT_NEEDED if key in schema}
-    reference = {"allOf": [{"$ref": f"{DEFINITIONS}{name}"}]}
-    return {**reference, **needed, "properties": own, "additionalProperties": {"$ref": f"{DEFINITIONS}{PRESENT}"}}
+class _Whole:
+    """What a schema demands beyond the change to it: that nothing is missing, and nothing removed.
+
+    `names` are the references to definitions that demand more, and what takes their place. `True` is no demand.
+    """
+
+    def __init__(self, definitions: Mapping[str, Schema], names: Mapping[str, str]) -> None:
+        self._definitions = definitions
+        self._names = names
+        self._options = definitions[f"{SECTION}{components.name}"]["additionalProperties"]["properties"]
+
+    def beyond(self, schema: Any) -> Any:
+        needed = {key: schema[key] for key in _NOT_NEEDED if key in schema}
+        typed = {**({"type": schema["type"]} if "type" in schema else {}), **needed}
+        match schema:
+            case {"$ref": str(reference)} if reference in self._names:
+                return {"$ref": self._names[reference]}
+            case {"anyOf": members}:
+                found = [self.beyond(member) for member in members]
+                if shapes := [demand for demand in found if _is_shape(demand)]:
+                    others = [one for one, demand in zip(members, found, strict=True) if not _is_shape(demand)]
+                    return {"anyOf": [*shapes, *([self._outline({"anyOf": others})] if others else [])]}
+            case {"properties": properties}:
+                return {**typed, **self._keys(schema, properties)}
+            case {"additionalProperties": dict(entry)} if needed or (inner := self.beyond(entry)) is not True:
+                return {**typed, "additionalProperties": self.beyond(entry)}
+            case {"items": dict(entry)} if _is_shape(inner := self.beyond(entry)):
+                return {**typed, "items": inner}
+            case _ if needed:
+                return typed
+        return _DEMANDS[_empties(schema, self._definitions)]
+
+    def _outline(self, schema: Schema) -> Schema:
+        """Return which types of values a schema accepts; the change says the rest."""
+        is_text = _BLANK in _empties(schema, self._definitions)
+        return {"type": sorted(_types(schema, self._definitions)), **({} if is_text else {"minLength": 1})}
+
+    def _keys(self, schema: Schema, properties: Mapping[str, Any]) -> Schema:
+        """Return what is demanded of the keys of a map: of each by itself, where that is not just to be there."""
+        if schema.get("additionalProperties") is not False:
+            chosen = [{**one, "then": self.beyond(one["then"])} for one in schema.get("allOf", ())]
+            demands = {key: self.beyond(entry) for key, entry in properties.items()}
+            return {
+                "properties": {key: demand for key, demand in demands.items() if demand is not True},
+                "allOf": [one for one in chosen if _is_shape(one["then"])],
+            }
+        own = {}
+        for key, entry in properties.items():
+            demand = self.beyond(self._options.get(key, {}) if entry is True else entry)
+            if demand != _PRESENCE:
+                own[key] = True if entry is True else demand  # of an option, the entry demands the rest
+        return {"properties": own, "additionalProperties": _PRESENCE}
 
 
-def _bare(schema: Any) -> Any:
-    """Return a schema without its notes, which are those of the changes."""
-    return schema if schema is True else {key: entry for key, entry in schema.items() if key not in _NOTES}
+def _is_shape(demand: Any) -> bool:
+    return demand not in _DEMANDS.values()
+
+
+def _types(schema: Any, definitions: Mapping[str, Schema]) -> set[str]:
+    """Return the JSON types that a schema accepts; one that names none, all."""
+    if "$ref" in schema:
+        return _types(definitions[schema["$ref"].removeprefix(DEFINITIONS)], definitions)
+    if "anyOf" in schema:
+        return set().union(*(_types(one, definitions) for one in schema["anyOf"]))
+    types = schema.get("type", _NULLABLE["type"])
+    return {types} if isinstance(types, str) else {*types}
 
 
 def renamed(schema: Any, names: Mapping[str, str]) -> Any:
@@ -126,21 +184,21 @@ def renamed(schema: Any, names: Mapping[str, str]) -> Any:
     return {key: names.get(entry, entry) if key == "$ref" else renamed(entry, names) for key, entry in schema.items()}
 
 
-def _may_be_empty(schema: Schema, definitions: Mapping[str, Schema]) -> bool:
-    """Return whether a schema accepts `null` or an empty text."""
+def _empties(schema: Any, definitions: Mapping[str, Schema]) -> frozenset[str]:
+    """Return which of `null` and an empty text a schema accepts."""
     if "$ref" in schema:
-        return _may_be_empty(definitions[schema["$ref"].removeprefix(DEFINITIONS)], definitions)
+        return _empties(definitions[schema["$ref"].removeprefix(DEFINITIONS)], definitions)
     if "anyOf" in schema:
-        return any(_may_be_empty(one, definitions) for one in schema["anyOf"])
+        return frozenset().union(*(_empties(one, definitions) for one in schema["anyOf"]))
     if "enum" in schema:
-        return False
-    types = schema.get("type", "null")
+        return frozenset()
+    types = schema.get("type", (_NULL, "string"))
     is_text = (
         "string" in types
         and not schema.get("minLength")
         and re.compile(schema.get("pattern", "")).search("") is not None
     )
-    return "null" in types or is_text
+    return frozenset(([_NULL] if _NULL in types else []) + ([_BLANK] if is_text else []))
 
 
 def references(schema: Any) -> Iterator[str]:

@@ -53,24 +53,23 @@ def overlay_schema(types: Iterable[str]) -> Schema:
     return document(OVERLAY, file_model(OVERLAY), _sections(definitions, OVERLAY), definitions)
 
 
-def _sections(definitions: Mapping[str, Schema], kind: str, prefix: str = "") -> dict[str, Schema]:
-    """Return references to the sections of a kind of manifest, in their order: to changes, unless `prefix` is given."""
-    names = {
-        section.name: f"{SECTION}{section.name}"
-        for section in all_sections(kind)
-        if f"{SECTION}{section.name}" in definitions
-    }
-    found = {name: f"{prefix}{one}" if f"{prefix}{one}" in definitions else one for name, one in names.items()}
-    return {name: {"$ref": f"{DEFINITIONS}{text}"} for name, text in found.items()}
+def _sections(definitions: Mapping[str, Schema], kind: str) -> dict[str, Schema]:
+    """Return references to the sections of a kind of manifest, in their order, as changes."""
+    names = [section.name for section in all_sections(kind) if f"{SECTION}{section.name}" in definitions]
+    return {name: {"$ref": f"{DEFINITIONS}{SECTION}{name}"} for name in names}
 
 
 def _included(kind: str, definitions: Mapping[str, Schema], always: Mapping[str, Schema] | None = None) -> Schema:
     """Return the schema of a file that writes only changes to entries if it has `include`; `always` is the same."""
     changes = _sections(definitions, kind)
-    notes = {name: {"description": definitions[f"{SECTION}{name}"]["description"]} for name in changes}
-    own = _sections(definitions, kind, WHOLE)
-    choice = {"if": {"required": ["include"]}, "then": {"properties": changes}, "else": {"properties": own}}
-    return document(kind, file_model(kind), {**notes, **(always or {})}, definitions, choice)
+    described = {
+        name: {**change, "description": definitions[f"{SECTION}{name}"]["description"]}
+        for name, change in changes.items()
+    }
+    wholes = {name: {"$ref": f"{DEFINITIONS}{WHOLE}{SECTION}{name}"} for name in changes}
+    own = {name: whole for name, whole in wholes.items() if f"{WHOLE}{SECTION}{name}" in definitions}
+    choice = {"if": {"required": ["include"]}, "then": {}, "else": {"properties": own}}
+    return document(kind, file_model(kind), {**described, **(always or {})}, definitions, choice)
 
 
 def document(

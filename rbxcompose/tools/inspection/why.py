@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
@@ -15,6 +16,7 @@ from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, reso
 from rbxcompose.compiler.plan.model import BusPlan
 from rbxcompose.compiler.schema.guide import Guide
 from rbxcompose.compiler.schema.robot import robot_schema
+from rbxcompose.compiler.schema.scalars import Schema
 from rbxcompose.domains.muxes.sections.muxes import muxes
 from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode, at, key_span
 from rbxcompose.missions.engine.value_text import show as show_value
@@ -231,7 +233,12 @@ def why(robot: Robot, text: str) -> PathAnswer | Finding:
 
 def _guide(manifest: RobotManifest, path: KeyPath) -> Guide:
     types = {name: entry.type for name, entry in manifest.components.items()}
-    return Guide(robot_schema(set(types.values())), tree_of(manifest, path), types)
+    return Guide(_schema(frozenset(types.values())), tree_of(manifest, path), types)
+
+
+@lru_cache(maxsize=1)  # one robot is asked about many values
+def _schema(types: frozenset[str]) -> Schema:
+    return robot_schema(types)
 
 
 def _written(robot: Robot, guide: Guide, path: KeyPath, node: TreeNode) -> PathAnswer:
