@@ -51,7 +51,7 @@ def _compiled(
 
 def robot_and_plan(name: str, *profiles: str) -> tuple[Robot, Plan]:
     """Return a robot that ships, without a mistake."""
-    made = compiled(str(ROOT / "robots" / name), profiles=profiles, environment={}, tries_profiles=False)
+    made = compiled(str(ROOT / "robots" / name), profiles=profiles, environment={})
     assert made.robot
     assert made.plan
     return made.robot, made.plan

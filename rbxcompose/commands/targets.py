@@ -219,9 +219,9 @@ def chosen_layers(arguments: argparse.Namespace) -> ChosenLayers:
     return ChosenLayers(tuple(arguments.profile), overlays, tuple(arguments.sets), arguments.real)
 
 
-def compiled(robot: str, arguments: argparse.Namespace) -> Compilation:
+def compiled(robot: str, arguments: argparse.Namespace, *, tries_profiles: bool = False) -> Compilation:
     """Compile a robot with all layers that a command puts over its file."""
-    return compile_robot(robot, **layers_of(arguments))
+    return compile_robot(robot, **layers_of(arguments), tries_profiles=tries_profiles)
 
 
 def missing_extras(robot: Robot) -> Iterator[Finding]:

@@ -53,13 +53,13 @@ def compile_robot(
     environment: Mapping[str, str],
     unsaved: Mapping[Path, str] = MappingProxyType({}),
     outside: Outside = NOTHING,
-    tries_profiles: bool = True,
+    tries_profiles: bool = False,
 ) -> Compilation:
     """Compile a robot's file (a path, a folder with a `robot.yaml`, or `rbx:...`) and report all its mistakes.
 
     `overlays` are files that change it. `unsaved` are texts from an editor, by the real path of the file that each
-    replaces. `outside` is what it has of other robots. If no profile was chosen, each profile is tried as
-    well, so that a broken one is found before it is used, unless `tries_profiles` is false.
+    replaces. `outside` is what it has of other robots. With `tries_profiles`, each profile is tried as well if
+    none was chosen, so that a broken one is found before it is used.
     """
 
     parsed: dict[tuple[str, str], ParsedText] = {}  # a profile changes no text

@@ -81,7 +81,13 @@ def check_file(
     """Compile a robot's file."""
     return Checked(
         compile_robot(
-            str(path), profiles=profiles, overlays=overlays, sets=sets, real=real, environment=environment or {}
+            str(path),
+            profiles=profiles,
+            overlays=overlays,
+            sets=sets,
+            real=real,
+            environment=environment or {},
+            tries_profiles=True,
         )
     )
 

@@ -333,7 +333,7 @@ def try_(arguments: argparse.Namespace) -> int:
 
     put_robot_last(arguments, "name")
     path = arguments.path or robot_path(None, may_run=False)
-    out = compile_robot(path, environment=os.environ, unsaved=unsaved_of(arguments), tries_profiles=False)
+    out = compile_robot(path, environment=os.environ, unsaved=unsaved_of(arguments))
     if out.robot is not None and arguments.name in out.robot.manifest.missions:
         file = out.robot.manifest.missions[arguments.name].path
         try:

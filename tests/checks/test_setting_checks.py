@@ -42,7 +42,7 @@ components:
 
 @cache
 def robot_named(name: str) -> Robot:
-    found = compiled(str(ROOT / "robots" / name), environment={}, tries_profiles=False).robot
+    found = compiled(str(ROOT / "robots" / name), environment={}).robot
     assert found is not None
     return found
 

@@ -214,9 +214,7 @@ def test_an_arm_goes_around_what_a_camera_sees(tmp_path: Path) -> None:
     overlay.write_text(
         "rbx: 1\nkind: Overlay\nname: camera\nscene: {clouds: {camera: {topic: points, forget: 60 s}}}\n"
     )
-    compiled = compile_robot(
-        str(ROOT / "robots/pi_robot"), overlays=[str(overlay)], environment={}, tries_profiles=False
-    )
+    compiled = compile_robot(str(ROOT / "robots/pi_robot"), overlays=[str(overlay)], environment={})
     assert compiled.plan, compiled.report
     wanted = ("arm", "servo_bus", "scene", "cloud_mapper")
     bench = Bench(*(one for one in compiled.plan.instances if one.type in wanted))

@@ -172,7 +172,7 @@ def test_a_target_at_30_degrees_a_second_is_kept_within_3_degrees(
 def head_that(*sets: str, profile: str = "") -> tuple[Bench, Any]:
     """Return a head of two servos whose manifest is changed, and its component."""
     profiles = [profile] if profile else []
-    made = compiled(str(ROOT / "robots/head_only"), profiles=profiles, sets=sets, environment={}, tries_profiles=False)
+    made = compiled(str(ROOT / "robots/head_only"), profiles=profiles, sets=sets, environment={})
     assert made.plan is not None
     bench = Bench(plan=made.plan)
     bench.advance(0.5)

@@ -63,7 +63,7 @@ class EditedProject:
         self.live = LiveText(gateway, self.text)
 
     def compiled(self, unsaved: Any) -> Any:
-        return compile_robot(str(self.robot), environment=os.environ, unsaved=unsaved, tries_profiles=False)
+        return compile_robot(str(self.robot), environment=os.environ, unsaved=unsaved)
 
     def text(self, file: str = "robots/fetcher/robot.yaml") -> str:
         return (self.folder / file).read_text(encoding="utf-8")

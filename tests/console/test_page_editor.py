@@ -46,7 +46,7 @@ class Project:
         gateway.windows["mission/ListMissions"] = [{"name": "fetch", "state": "idle", **plain}]
 
     def compiled(self, unsaved: Any) -> Any:
-        return compile_robot(str(self.robot), environment=os.environ, unsaved=unsaved, tries_profiles=False)
+        return compile_robot(str(self.robot), environment=os.environ, unsaved=unsaved)
 
     def answer(self, do: str, given: dict[str, Any]) -> dict[str, Any]:
         try:

@@ -123,7 +123,7 @@ def test_a_field_of_another_section_is_found_where_it_is_written(tmp_path: Path)
 
 
 def test_its_mission_succeeds_and_the_lift_is_down_again() -> None:
-    plan = compile_robot(str(ROVER), environment={}, tries_profiles=False).plan
+    plan = compile_robot(str(ROVER), environment={}).plan
     assert plan
     bench = Bench(plan=plan)
     states = bench.collect("/joint_states", JointState)

@@ -23,7 +23,7 @@ HOUSE = "robots/house"
 
 
 def plan_of(path: str) -> Plan:
-    plan = compiled(path, environment={}, tries_profiles=False).plan
+    plan = compiled(path, environment={}).plan
     assert plan is not None
     return plan
 

@@ -12,7 +12,7 @@ from tests.conftest import ROOT
 
 @pytest.fixture(scope="module")
 def porter() -> Diagram:
-    robot = compile_robot(str(ROOT / "robots/porter"), environment={}, tries_profiles=False).robot
+    robot = compile_robot(str(ROOT / "robots/porter"), environment={}).robot
     assert robot
     return diagram_of(robot)
 

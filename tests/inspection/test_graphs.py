@@ -166,7 +166,7 @@ CORPUS = sorted((ROOT / "tests/misconfig/wrong").rglob("*.yaml"))
 def test_robots_with_mistakes_are_drawn_as_far_as_they_could_be_read(soak: Soak) -> None:
     drawn = 0
     for file in CORPUS[:: soak.examples(12, 1)]:
-        robot = compile_robot(str(file), environment={}, tries_profiles=False).robot
+        robot = compile_robot(str(file), environment={}).robot
         if robot is not None:
             found = diagram_of(robot)
             drawn += all(found.robot in write(found) for write in (dot, html)) and bool(mermaid(found))

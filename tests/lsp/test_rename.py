@@ -37,7 +37,7 @@ class Names:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         robots = self._files().of_kind(ROBOT)  # without findings, also in their profiles
-        self.before = {path: compile_robot(str(path), environment={}, tries_profiles=False) for path in robots}
+        self.before = {path: compile_robot(str(path), environment={}) for path in robots}
         self.plans = {path: dump(made.plan) for path, made in self.before.items() if made.plan}
         self.after: dict[tuple[Path, int], Compilation] = {}
         self.index = SymbolIndex(self._files(), lambda path: self.before[path].robot)

@@ -54,7 +54,7 @@ def editor_of(project: Path) -> MissionEditor:
     file = project / "robots/fetcher/robot.yaml"
 
     def compiled(unsaved: Any) -> Any:
-        return compile_robot(str(file), environment=os.environ, unsaved=unsaved, tries_profiles=False)
+        return compile_robot(str(file), environment=os.environ, unsaved=unsaved)
 
     return MissionEditor(compiled, file)
 

@@ -26,7 +26,7 @@ PI_ROBOT = ROOT / "robots/pi_robot/robot.yaml"
 def test_each_template_is_a_mission_without_findings(template: str) -> None:
     is_arm = template == "pick_and_place"
     file, profiles, name = (PI_ROBOT, ("table",), template) if is_arm else (PATROLLER, (), "patrol")
-    robot = compile_robot(str(file), environment=os.environ, profiles=profiles, tries_profiles=False).robot
+    robot = compile_robot(str(file), environment=os.environ, profiles=profiles).robot
     assert robot is not None
     path = robot.manifest.missions[name].path
     text = filled(template, name, robot)

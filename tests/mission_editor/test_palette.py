@@ -102,7 +102,7 @@ def library_editor(robot: str) -> MissionEditor:
     file = ROOT / robot
 
     def compiled(unsaved: Any) -> Any:
-        return compile_robot(str(file), environment=os.environ, unsaved=unsaved, tries_profiles=False)
+        return compile_robot(str(file), environment=os.environ, unsaved=unsaved)
 
     return MissionEditor(compiled, file)
 

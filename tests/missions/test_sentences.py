@@ -33,7 +33,7 @@ def lines(text: str) -> list[str]:
 def test_all_missions_that_ship_are_read_aloud(golden: Golden, subtests: pytest.Subtests) -> None:
     known: dict[str, tuple[Program, RobotNames]] = {}
     for home in sorted(path.parent for path in (ROOT / "robots").glob("*/robot.yaml")):
-        robot = compiled(str(home), environment={}, tries_profiles=False).robot
+        robot = compiled(str(home), environment={}).robot
         for mission in robot.missions.values() if robot else ():
             known.setdefault(Path(mission.program.file).name, (mission.program, robot.names if robot else ROBOT))
     for path in sorted((ROOT / "missions").glob("*.yaml")):

@@ -102,7 +102,7 @@ def test_only_physics_has_ports_between_servos_and_the_engine(tmp_path: Path) ->
 
 def test_servos_that_turn_wheels_drive_the_base(repository: Path) -> None:
     sets = ("world=rbx:worlds/blank.yaml", "simulator=physics", "start=")
-    plan = compiled(str(repository / "robots/rover"), sets=sets, environment={}, tries_profiles=False).plan
+    plan = compiled(str(repository / "robots/rover"), sets=sets, environment={}).plan
     assert plan is not None
     bench = Bench(plan=plan)
     told, truth = bench.collect("/odom", Odometry), bench.collect("/ground_truth", Odometry)
@@ -116,7 +116,7 @@ def test_servos_that_turn_wheels_drive_the_base(repository: Path) -> None:
 @pytest.mark.parametrize("robot", ["pi_robot", *rare("porter")])
 def test_missions_that_move_arms_and_grippers_succeed(repository: Path, robot: str) -> None:
     sets = ("world=rbx:worlds/blank.yaml", "simulator=physics", "start=open_and_close")
-    plan = compiled(str(repository / "robots" / robot), sets=sets, environment={}, tries_profiles=False).plan
+    plan = compiled(str(repository / "robots" / robot), sets=sets, environment={}).plan
     assert plan is not None
     assert run_robot(plan).outcome == "success"
 

@@ -64,7 +64,6 @@ def plan_of(folder: Path, text: str, **sets: object) -> Plan:
         overlays=[str(folder / "overlay.yaml")],
         sets=[f"{key}={value}" for key, value in sets.items()],
         environment={},
-        tries_profiles=False,
     )
     assert [finding for finding in made.report if finding.severity == "error"] == []
     assert made.plan

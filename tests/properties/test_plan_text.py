@@ -95,7 +95,7 @@ WORDS = st.text(alphabet=st.characters(codec="utf-8", categories=["L", "N", "P",
 
 
 def shipped(path: Path) -> Plan:
-    out = compiled(str(path), environment={}, tries_profiles=False)
+    out = compiled(str(path), environment={})
     assert out.plan
     return out.plan
 

@@ -60,7 +60,7 @@ def editor_of(project: Path, *shared_with: str, **layers: Any) -> RobotEditor:
     file = project / "robots/fetcher/robot.yaml"
 
     def compiled(unsaved: Any) -> Any:
-        return compile_robot(str(file), environment=os.environ, unsaved=unsaved, tries_profiles=False, **layers)
+        return compile_robot(str(file), environment=os.environ, unsaved=unsaved, **layers)
 
     return RobotEditor(compiled, file, shared_with)
 

@@ -34,7 +34,7 @@ TICK = 0.00512  # [rad] of an AX-12
 
 
 def made(name: str, *profiles: str) -> Compilation:
-    return compiled(str(ROOT / f"robots/{name}"), profiles=profiles, environment={}, tries_profiles=False)
+    return compiled(str(ROOT / f"robots/{name}"), profiles=profiles, environment={})
 
 
 def driver(name: str, profile: str = "") -> Any:

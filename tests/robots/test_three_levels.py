@@ -152,7 +152,7 @@ def spoken(tmp_path: Path) -> Iterator[Spoken]:
 
 
 def planned(name: str, *sets: str, **options: Any) -> Plan:
-    out = compile_robot(str(ROOT / "robots" / name), sets=sets, environment={}, tries_profiles=False, **options)
+    out = compile_robot(str(ROOT / "robots" / name), sets=sets, environment={}, **options)
     assert out.plan, list(out.report)
     return out.plan
 

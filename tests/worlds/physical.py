@@ -31,7 +31,7 @@ ORIGIN = Pose2()
 @cache
 def description(name: str) -> Description | None:
     """Return what a shipped robot says about its body."""
-    robot = compiled(f"robots/{name}", environment={}, tries_profiles=False).robot
+    robot = compiled(f"robots/{name}", environment={}).robot
     assert robot is not None
     return robot.manifest.contents.of(body)
 

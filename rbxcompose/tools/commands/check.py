@@ -81,9 +81,9 @@ def run(arguments: argparse.Namespace) -> int:
 def _check(wanted: Targets, arguments: argparse.Namespace) -> CheckedRobots:
     checked = CheckedRobots()
     for robot in wanted.robots:
-        checked.add(compiled(robot, arguments))
+        checked.add(compiled(robot, arguments, tries_profiles=True))
     for robot in wanted.users:
-        one = compiled(robot, arguments)
+        one = compiled(robot, arguments, tries_profiles=True)
         if any(file in one.sources for file in wanted.files):
             checked.add(one)
     if wanted.tests:

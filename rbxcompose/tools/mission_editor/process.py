@@ -54,7 +54,6 @@ def compile_with(file: str, layers: ChosenLayers) -> tuple[Compile, Compile, tup
             environment=os.environ,
             unsaved=unsaved,
             outside=outside,
-            tries_profiles=False,
         )
 
     return compiled, partial(compiled, real=False), others
