@@ -51,7 +51,7 @@ def pytest_configure(config: pytest.Config) -> None:
     many = bool(config.getoption("--soak"))
     settings.register_profile(
         "rbxcompose",
-        max_examples=300 if many else 12,
+        max_examples=300 if many else 8,
         derandomize=not many,  # what `make test` says does not depend on luck; `make soak` looks for what nobody tried
         deadline=None,
         suppress_health_check=[HealthCheck.too_slow],  # it is the machine that is slow, as with deadlines
@@ -61,6 +61,16 @@ def pytest_configure(config: pytest.Config) -> None:
     if CACHES not in os.environ:
         os.environ[CACHES] = os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp()
         atexit.register(shutil.rmtree, os.environ[CACHES], ignore_errors=True)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Let one worker compile the tests and the package of a new checkout, instead of each of them at the same time."""
+    with open(Path(os.environ[CACHES], "collecting"), "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if any(ROOT.glob("tests/worlds/__pycache__/*-pytest-*")):  # of a folder that is collected late
+            fcntl.flock(lock, fcntl.LOCK_UN)
+        return (yield)
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

@@ -49,6 +49,10 @@ LONG = {
     "many attributes in a URDF",
     "a long argument in many texts",
     "5,000 interrupts",
+    "100 missions that each use all later ones",
+    "3,000 stored nodes run in 1,400 places",
+    "10,000 patterns for 900 components",
+    "many quotes",
 }
 ALL = PROJECTS | {name: Project(code, {"robots/bad/robot.yaml": text}) for name, (text, code) in WORST.items()}
 THE_WORST = ("500,000 nodes", "doubling parts", "20 MB", "doubling aliases", "a long list filled in many times")

@@ -16,9 +16,18 @@ from tests.conftest import ROOT
 from tests.mission_tests.trying import Trying
 from tests.soak import Soak
 
-AGAIN = {
+AGAIN = {  # of each there is another one, or what they do is tried in `tests/navigation` and `tests/components`
     f"{name}.test.yaml"
-    for name in ("pedestal_pick_what_is_seen", "porter_pick_what_is_seen", "porter_follow_with_the_hand")
+    for name in (
+        "draw_triangle",
+        "find_dock",
+        "follow_me",
+        "follow_with_the_hand",
+        "pedestal_pick_what_is_seen",
+        "pick_what_is_seen",
+        "porter_follow_with_the_hand",
+        "porter_pick_what_is_seen",
+    )
 }
 PATROL = "missions/tests/patrol.test.yaml"
 

@@ -21,6 +21,7 @@ from rbxcompose.runtime.processes import Process
 from rbxcompose.sdk.ports import Qos
 from tests.cli.live_robot import Robot
 from tests.console.test_gateway_live import free_port
+from tests.soak import rare
 
 HERE = Path(__file__).parent
 DOMAIN = 57
@@ -246,7 +247,7 @@ def test_what_ros_has_is_listed_and_pinned(robot: Robot, tmp_path: Path) -> None
     assert "declares all" in robot.do("ros2", "pin", "somebody", "somebody", str(file)).stdout
 
 
-@pytest.mark.parametrize("what", ["node.py", "ros_side.py"])
+@pytest.mark.parametrize("what", ["node.py", *rare("ros_side.py")])
 def test_a_side_that_is_killed_comes_back_and_meanwhile_the_base_rests(robot: Robot, what: str) -> None:
     until(robot, lambda: pids_of(robot, what))
     restarted = int(somebody(robot)["restarts"])

@@ -13,7 +13,6 @@ from typing import Any
 from rbxcompose.base.config import Name, Time, field_docs
 from rbxcompose.base.files import replace_file
 from rbxcompose.compiler.schema.mission import mission_schema
-from rbxcompose.compiler.schema.overlays import renamed
 from rbxcompose.compiler.schema.robot import document, or_empty, overlay_schema, part_schema, robot_schema
 from rbxcompose.compiler.schema.scalars import DEFINITIONS, SHARED, Schema
 from rbxcompose.compiler.schema.settle import opened, schemas_of
@@ -148,8 +147,17 @@ def _beside(schema: Schema, definitions: Mapping[str, Schema]) -> Schema:
     """Return a schema that refers to the definitions of a robot's instead of having them itself."""
     own = {name: entry for name, entry in schema[SHARED].items() if definitions.get(name) != entry}
     there = {f"{DEFINITIONS}{name}": f"{_file(ROBOT)}{DEFINITIONS}{name}" for name in definitions if name not in own}
-    made: Schema = renamed({**schema, SHARED: own}, there)
+    made: Schema = _renamed({**schema, SHARED: own}, there)
     return made if own else {key: entry for key, entry in made.items() if key != SHARED}
+
+
+def _renamed(schema: Any, names: Mapping[str, str]) -> Any:
+    """Return a schema that refers to other definitions."""
+    if isinstance(schema, list):
+        return [_renamed(item, names) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    return {key: names.get(entry, entry) if key == "$ref" else _renamed(entry, names) for key, entry in schema.items()}
 
 
 def main(folder: Path) -> None:

@@ -26,11 +26,11 @@ _REMOVED: Schema = {**_EMPTY, "description": "With the tag `!remove`: removes it
 _PRESENT: Schema = {"not": _EMPTY, "errorMessage": "must not be empty"}
 _NULLABLE: Schema = {"type": ["string", "number", "boolean", "object", "array", "null"], "minLength": 1}
 _NULL, _BLANK = "null", "blank"
-_DEMANDS: dict[frozenset[str], Any] = {  # by what a schema accepts itself of what a removed key looks like
-    frozenset(): _PRESENCE,
-    frozenset({_NULL}): {"$ref": f"{DEFINITIONS}{NULLABLE}"},
-    frozenset({_BLANK}): {"not": {"type": "null"}},
-    frozenset({_NULL, _BLANK}): True,
+_DEMANDS: dict[tuple[bool, bool], Any] = {  # by whether the value may be null or an empty text, as removed ones are
+    (False, False): _PRESENCE,
+    (True, False): {"$ref": f"{DEFINITIONS}{NULLABLE}"},
+    (False, True): {"not": {"type": "null"}},
+    (True, True): True,
 }
 _NOT_NEEDED = ("required", "minProperties", "minItems")
 _NOTES = ("description", "default", "x-names", "x-dimension")  # what editors expect at the key itself
@@ -119,6 +119,7 @@ class _Whole:
         self._options = definitions[f"{SECTION}{components.name}"]["additionalProperties"]["properties"]
 
     def beyond(self, schema: Any) -> Any:
+        """Return the demands of one schema: of its structure, or that it is there."""
         needed = {key: schema[key] for key in _NOT_NEEDED if key in schema}
         typed = {**({"type": schema["type"]} if "type" in schema else {}), **needed}
         match schema:
@@ -131,18 +132,19 @@ class _Whole:
                     return {"anyOf": [*shapes, *([self._outline({"anyOf": others})] if others else [])]}
             case {"properties": properties}:
                 return {**typed, **self._keys(schema, properties)}
-            case {"additionalProperties": dict(entry)} if needed or (inner := self.beyond(entry)) is not True:
-                return {**typed, "additionalProperties": self.beyond(entry)}
+            case {"additionalProperties": dict(entry)} if (inner := self.beyond(entry)) is not True or needed:
+                return {**typed, "additionalProperties": inner}
             case {"items": dict(entry)} if _is_shape(inner := self.beyond(entry)):
                 return {**typed, "items": inner}
             case _ if needed:
                 return typed
-        return _DEMANDS[_empties(schema, self._definitions)]
+        accepted = _accepted(schema, self._definitions)
+        return _DEMANDS[_NULL in accepted, _BLANK in accepted]
 
     def _outline(self, schema: Schema) -> Schema:
         """Return which types of values a schema accepts; the change says the rest."""
-        is_text = _BLANK in _empties(schema, self._definitions)
-        return {"type": sorted(_types(schema, self._definitions)), **({} if is_text else {"minLength": 1})}
+        accepted = _accepted(schema, self._definitions)
+        return {"type": sorted(accepted - {_BLANK}), **({} if _BLANK in accepted else {"minLength": 1})}
 
     def _keys(self, schema: Schema, properties: Mapping[str, Any]) -> Schema:
         """Return what is demanded of the keys of a map: of each by itself, where that is not just to be there."""
@@ -165,40 +167,18 @@ def _is_shape(demand: Any) -> bool:
     return demand not in _DEMANDS.values()
 
 
-def _types(schema: Any, definitions: Mapping[str, Schema]) -> set[str]:
-    """Return the JSON types that a schema accepts; one that names none, all."""
+def _accepted(schema: Any, definitions: Mapping[str, Schema]) -> set[str]:
+    """Return the JSON types of the values that a schema accepts, and whether an empty text is one of them."""
     if "$ref" in schema:
-        return _types(definitions[schema["$ref"].removeprefix(DEFINITIONS)], definitions)
+        return _accepted(definitions[schema["$ref"].removeprefix(DEFINITIONS)], definitions)
     if "anyOf" in schema:
-        return set().union(*(_types(one, definitions) for one in schema["anyOf"]))
-    types = schema.get("type", _NULLABLE["type"])
-    return {types} if isinstance(types, str) else {*types}
-
-
-def renamed(schema: Any, names: Mapping[str, str]) -> Any:
-    """Return a schema that refers to other definitions."""
-    if isinstance(schema, list):
-        return [renamed(item, names) for item in schema]
-    if not isinstance(schema, dict):
-        return schema
-    return {key: names.get(entry, entry) if key == "$ref" else renamed(entry, names) for key, entry in schema.items()}
-
-
-def _empties(schema: Any, definitions: Mapping[str, Schema]) -> frozenset[str]:
-    """Return which of `null` and an empty text a schema accepts."""
-    if "$ref" in schema:
-        return _empties(definitions[schema["$ref"].removeprefix(DEFINITIONS)], definitions)
-    if "anyOf" in schema:
-        return frozenset().union(*(_empties(one, definitions) for one in schema["anyOf"]))
+        return set().union(*(_accepted(one, definitions) for one in schema["anyOf"]))
     if "enum" in schema:
-        return frozenset()
-    types = schema.get("type", (_NULL, "string"))
-    is_text = (
-        "string" in types
-        and not schema.get("minLength")
-        and re.compile(schema.get("pattern", "")).search("") is not None
-    )
-    return frozenset(([_NULL] if _NULL in types else []) + ([_BLANK] if is_text else []))
+        return {"string"}
+    types = schema.get("type", _NULLABLE["type"])
+    found = {types} if isinstance(types, str) else {*types}
+    is_long = schema.get("minLength") or not re.compile(schema.get("pattern", "")).search("")
+    return found if is_long or "string" not in found else found | {_BLANK}
 
 
 def references(schema: Any) -> Iterator[str]:
