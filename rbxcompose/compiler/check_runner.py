@@ -7,7 +7,7 @@ from typing import Any
 from rbxcompose.base.findings import Finding, Report, Severity
 from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
 from rbxcompose.base.printable import plain
-from rbxcompose.base.rooms import domain_of
+from rbxcompose.base.rooms import domain_of, package_of
 from rbxcompose.base.rules import OUR_CODES, Rule, declared
 from rbxcompose.compiler.doubts import Doubts, doubts_of, half_read
 from rbxcompose.compiler.model.robot import NOTHING, Robot
@@ -22,6 +22,7 @@ FindBy = Callable[[Rule[Any], Robot | Examined], list[Finding]]
 
 PLUGINS = Plugins("check", "checks")
 _CODE = re.compile(r"[A-Z]+\d+")
+EVERY_ROBOT = "every robot"
 
 
 CHECKS: dict[str, Check] = {}  # every check that has been imported, by code
@@ -61,21 +62,30 @@ def all_checks() -> list[Check]:
 def checks_of(robot: Robot) -> list[Check]:
     """Return `all_checks` without those that can find nothing: of domains of which the robot has nothing.
 
-    A domain's rules are about its sections and components. They are about other components, too, if they have what only
-    components of this domain have otherwise: components of other packages may, and other robots' skills.
+    A domain's rules are about its sections and components, and about what its `RULES_ABOUT` says: `EVERY_ROBOT`, or
+    names of capabilities. They are about other components, too, if they have what only components of this domain have
+    otherwise: components of other packages may, and other robots' skills.
     """
     types = [component.cls for component in robot.components.values()]
     if robot.outside is not NOTHING or any(map(is_foreign, types)):
         return all_checks()
     sections = filter(None, map(section_named, robot.manifest.root.entries))
-    used = {domain_of(part.__module__) for part in (*types, *(section.read for section in sections))}
+    used = {domain_of(part.__module__) for part in (*types, *(section.read for section in sections))} | {""}
     left_out = {domain_of(module) for module in SECTIONS.shipped.values()} - used
-    for name, module in PLUGINS.shipped.items():
-        if domain_of(module) not in left_out:
-            PLUGINS.load(name)
+    left_out = {domain for domain in left_out if not _is_about(domain, robot)}
+    names = {name for name, module in PLUGINS.shipped.items() if domain_of(module) in left_out}
+    for name in PLUGINS.shipped.keys() - names:
+        PLUGINS.load(name)
     for name in PLUGINS.third_party:
         _problem(name)
-    return [CHECKS[code] for code in sorted(CHECKS)]
+    silent = {PLUGINS.shipped[name] for name in names}  # they may have been imported for another robot
+    return [CHECKS[code] for code in sorted(CHECKS) if CHECKS[code].find.__module__ not in silent]
+
+
+def _is_about(domain: str, robot: Robot) -> bool:
+    """Return whether a domain says of itself that its rules are about any robot, or about what this one declares."""
+    declared = {EVERY_ROBOT, *(type(able).__name__ for part in robot.components.values() for able in part.capabilities)}
+    return not declared.isdisjoint(getattr(package_of(domain), "RULES_ABOUT", ()))
 
 
 def broken_checks() -> list[Finding]:

@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.compiler.model.instances import cycle_of, start_order
+from rbxcompose.compiler.model.flow import cycle_of, start_order
 
 NAMES = st.sampled_from("abcdef")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.domains.muxes.words import MuxProfile, mode_of
+from rbxcompose.domains.muxes.config import MuxProfile, mode_of
 from tests.mux.velocities import Driven, Input
 
 HIGH: Input = {"priority": 100, "timeout": 0.5}

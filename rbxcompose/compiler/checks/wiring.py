@@ -7,8 +7,7 @@ from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.composition.robot_manifest import IncludedPart
 from rbxcompose.compiler.model.build import MISSION
-from rbxcompose.compiler.model.flow import setting_span
-from rbxcompose.compiler.model.instances import answers, cycle_of, part_of, shared_names
+from rbxcompose.compiler.model.flow import answers, cycle_of, part_of, setting_span, shared_names
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent
 from rbxcompose.manifest.tree import at
 from rbxcompose.msgs.definitions import parse_type

@@ -1,6 +1,6 @@
 """From a checked robot to its plan."""
 
-from rbxcompose.compiler.model.instances import start_order
+from rbxcompose.compiler.model.flow import start_order
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
 from rbxcompose.compiler.plan.model import BusPlan, Instance, Plan, Wire
 from rbxcompose.sdk.capabilities import RunsMissions

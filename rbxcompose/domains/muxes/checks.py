@@ -13,11 +13,10 @@ from rbxcompose.compiler.checks.wiring import is_command
 from rbxcompose.compiler.model.build import MISSION
 from rbxcompose.compiler.model.flow import Wrong, is_written, period_of, setting_span
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, resolve
-from rbxcompose.domains.muxes.config import MuxConfig
+from rbxcompose.domains.muxes.config import HIGHEST, MODE_OF, OWN_NAMES, HoldFirst, MuxConfig
 from rbxcompose.domains.muxes.core import RAMPS
 from rbxcompose.domains.muxes.requests import NONE
 from rbxcompose.domains.muxes.sections.muxes import MuxModel, muxes
-from rbxcompose.domains.muxes.words import HIGHEST, MODE_OF, OWN_NAMES, HoldFirst
 from rbxcompose.missions.analysis.effects import published
 from rbxcompose.sdk.capabilities import CommandsMotion, Drives, Forwards, Setting
 from rbxcompose.sdk.ports import In, Looks, Out, Qos

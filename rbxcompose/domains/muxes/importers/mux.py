@@ -19,7 +19,7 @@ from rbxcompose.commands.importing.importer import (
 )
 from rbxcompose.commands.importing.manifest_text import Row, flow, header, place, quantity, row, section
 from rbxcompose.commands.importing.ros_parameters import NodeParameters, parameters_with, topic_name
-from rbxcompose.domains.muxes.words import OWN_NAMES
+from rbxcompose.domains.muxes.config import OWN_NAMES
 from rbxcompose.manifest.tree import MappingNode, SequenceNode
 from rbxcompose.manifest.validate import OUT_OF_RANGE, WRONG_TYPE, label_of
 
