@@ -74,9 +74,8 @@ def checks_of(robot: Robot) -> list[Check]:
     left_out = {domain_of(module) for module in SECTIONS.shipped.values()} - used
     left_out = {domain for domain in left_out if not _is_about(domain, robot)}
     names = {name for name, module in PLUGINS.shipped.items() if domain_of(module) in left_out}
-    for name in PLUGINS.shipped:
-        if name not in names:
-            PLUGINS.load(name)
+    for name in sorted(PLUGINS.shipped.keys() - names):
+        PLUGINS.load(name)
     for name in PLUGINS.third_party:
         _problem(name)
     silent = {PLUGINS.shipped[name] for name in names}  # they may have been imported for another robot
