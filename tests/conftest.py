@@ -80,6 +80,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     """
     gc.enable()
     gc.freeze()
+    gc.set_threshold(50_000, 10, 100)  # a tenth of the time of all tests went into looking for garbage
     if not session.config.option.collectonly and any(item.nodeid.startswith(WITH_ARMS) for item in session.items):
         with suppress(BlockingIOError):
             compile_for_arms(fcntl.LOCK_NB)
