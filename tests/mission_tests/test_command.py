@@ -16,7 +16,7 @@ from tests.conftest import ROOT
 from tests.mission_tests.trying import Trying
 from tests.soak import Soak
 
-AGAIN = {  # of each there is another one, or what they do is tried in `tests/navigation` and `tests/components`
+SOAKED = {  # of each there is another one, or what they do is tried in `tests/navigation` and `tests/components`
     f"{name}.test.yaml"
     for name in (
         "draw_triangle",
@@ -36,13 +36,13 @@ PATROL = "missions/tests/patrol.test.yaml"
 def test_all_tests_of_the_missions_pass(
     repository: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, soak: Soak
 ) -> None:
-    """On the robot that each names first; what further robots do with the same missions is tried under `--soak`."""
+    """On the robot that each names first; further robots, and those of `SOAKED`, are tried under `--soak` alone."""
     if not soak.is_on:
         every = TrialReader.every
-        monkeypatch.setattr(TrialReader, "every", lambda self, path: every(self, path)[: path.name not in AGAIN])
+        monkeypatch.setattr(TrialReader, "every", lambda self, path: every(self, path)[: path.name not in SOAKED])
     assert command(["test", "--json"]) == 0, capsys.readouterr().out
     told = json.loads(capsys.readouterr().out)
-    files = [file for file in (ROOT / "missions").rglob("*.test.yaml") if soak.is_on or file.name not in AGAIN]
+    files = [file for file in (ROOT / "missions").rglob("*.test.yaml") if soak.is_on or file.name not in SOAKED]
     assert {test["file"] for test in told["tests"]} == {str(file.relative_to(ROOT)) for file in files}
     assert all(test["passed"] for test in told["tests"])
 

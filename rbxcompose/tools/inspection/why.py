@@ -16,7 +16,6 @@ from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, reso
 from rbxcompose.compiler.plan.model import BusPlan
 from rbxcompose.compiler.schema.guide import Guide
 from rbxcompose.compiler.schema.robot import robot_schema
-from rbxcompose.compiler.schema.scalars import Schema
 from rbxcompose.domains.muxes.sections.muxes import muxes
 from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode, at, key_span
 from rbxcompose.missions.engine.value_text import show as show_value
@@ -236,9 +235,7 @@ def _guide(manifest: RobotManifest, path: KeyPath) -> Guide:
     return Guide(_schema(frozenset(types.values())), tree_of(manifest, path), types)
 
 
-@lru_cache(maxsize=1)  # one robot is asked about many values
-def _schema(types: frozenset[str]) -> Schema:
-    return robot_schema(types)
+_schema = lru_cache(maxsize=1)(robot_schema)  # one robot is asked about many values
 
 
 def _written(robot: Robot, guide: Guide, path: KeyPath, node: TreeNode) -> PathAnswer:
