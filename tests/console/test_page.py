@@ -246,6 +246,7 @@ def test_a_lost_connection_is_said_and_comes_back_without_motion(
     wait_for(lambda: gateway.commands(since), page)
 
 
+@pytest.mark.soak
 def test_a_robot_without_a_base_and_without_batteries_says_so(
     open_page: Callable[..., Page], gateway: FakeGateway
 ) -> None:
@@ -265,6 +266,7 @@ def test_the_manifest_says_which_pages_there_are_and_in_which_order(
     expect(links.first).to_have_attribute("aria-current", "page")
 
 
+@pytest.mark.soak
 def test_what_is_no_robot_is_an_error_with_a_way_out(pages: Pages, gateway: FakeGateway) -> None:
     gateway.config = []  # type: ignore[assignment]
     page = pages.blank()

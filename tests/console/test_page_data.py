@@ -15,6 +15,7 @@ from tests.console.browser import CHROMIUM
 from tests.console.fake_gateway import FakeGateway
 from tests.console.looks import PHONE, expect_fit, violations
 from tests.console.test_page_robot import DESCRIBED, component
+from tests.soak import rare
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
 
@@ -178,7 +179,7 @@ def test_what_check_found_stands_above_the_log(open_page: Callable[..., Page], g
     assert violations(page) == []
 
 
-@pytest.mark.parametrize("name", ["data", "mux", "log"])
+@pytest.mark.parametrize("name", ["data", *rare("mux", "log")])
 def test_they_fit_a_phone(open_page: Callable[..., Page], gateway: FakeGateway, name: str) -> None:
     has_topics(gateway)
     has_mux(gateway)
@@ -190,6 +191,7 @@ def test_they_fit_a_phone(open_page: Callable[..., Page], gateway: FakeGateway, 
     expect_fit(page)
 
 
+@pytest.mark.soak
 def test_what_is_not_there_is_said(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
     gateway.windows[DESCRIBED] = [component("base", "diff_drive_sim")]
     gateway.answers["/rosapi/topics"] = lambda _: {"topics": [], "types": []}

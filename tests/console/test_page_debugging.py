@@ -197,6 +197,7 @@ def test_data_are_set_in_their_table_with_their_type(open_page: Callable[..., Pa
     }
 
 
+@pytest.mark.soak
 def test_who_only_looks_sees_breakpoints_and_no_buttons(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
     patrol.config = {**CONFIG, "role": "view"}
     patrol.windows[BREAKPOINTS] = [breakpoint_("go_to", 2)]
@@ -212,6 +213,7 @@ def test_who_only_looks_sees_breakpoints_and_no_buttons(open_page: Callable[...,
     assert violations(page) == []
 
 
+@pytest.mark.soak
 def test_breakpoints_are_set_before_the_first_run(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
     patrol.windows["mission/ListMissions"] = listed("idle")
     del patrol.windows[LOOK_AT]
@@ -233,6 +235,7 @@ def test_debugging_fits_the_window_and_the_finger(open_page: Callable[..., Page]
         expect_fit(page)
 
 
+@pytest.mark.soak
 def test_a_phone_is_enough_to_watch_and_to_hold_a_mission(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
     for name in ("PauseMission", "CancelMission"):
         patrol.answers[f"mission.{name}"] = lambda given: f"{given['type']} is done"

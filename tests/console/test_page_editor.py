@@ -98,6 +98,7 @@ def test_a_mistake_is_marked_as_it_is_typed_and_a_button_fixes_it(
     expect(page.locator(".cm-content")).to_contain_text("tabel")
 
 
+@pytest.mark.soak
 def test_space_in_a_text_is_a_space_and_stops_nothing(
     open_page: Callable[..., Page], project: Project, gateway: FakeGateway
 ) -> None:
@@ -131,6 +132,7 @@ def test_save_shows_what_changes_and_writes_it(open_page: Callable[..., Page], p
     expect(page.get_by_role("button", name="Save")).to_be_disabled()
 
 
+@pytest.mark.soak
 def test_a_file_that_others_changed_is_not_overwritten(open_page: Callable[..., Page], project: Project) -> None:
     page = edits(open_page(page_name="mission"))
     theirs = FETCH.replace("table", "dock")
@@ -145,6 +147,7 @@ def test_a_file_that_others_changed_is_not_overwritten(open_page: Callable[..., 
     expect(page.locator(".cm-content")).to_contain_text("wait: 3 s")
 
 
+@pytest.mark.soak
 def test_after_a_connection_was_lost_in_a_save_it_is_told_what_became_of_it(
     open_page: Callable[..., Page], project: Project, gateway: FakeGateway
 ) -> None:
@@ -163,6 +166,7 @@ def test_after_a_connection_was_lost_in_a_save_it_is_told_what_became_of_it(
     assert project.text() == FETCH.replace("2 s", "3 s")
 
 
+@pytest.mark.soak
 def test_what_was_typed_stays_while_another_page_is_shown(open_page: Callable[..., Page], project: Project) -> None:
     page = edits(open_page(page_name="mission"))
     types(page, "wait: 2 s", "wait: 3 s")
@@ -184,6 +188,7 @@ def test_who_may_not_configure_reads_and_does_not_change(
     expect(page.get_by_role("button", name="Undo")).to_be_disabled()
 
 
+@pytest.mark.soak
 def test_a_mission_that_cannot_be_read_says_why(open_page: Callable[..., Page], project: Project) -> None:
     project.file.write_bytes(b"\xff")
     page = open_page(page_name="mission")
@@ -293,6 +298,7 @@ def test_the_form_of_a_step_has_what_it_can_be_given_and_writes_it(
         page.screenshot(path=f"{shots}/form.png", full_page=True)
 
 
+@pytest.mark.soak
 def test_what_is_typed_in_a_form_outlives_a_change_of_the_text(
     open_page: Callable[..., Page], project: Project
 ) -> None:
@@ -330,6 +336,7 @@ def test_a_dry_run_tells_the_story_and_colours_the_outline(open_page: Callable[.
     expect(page.get_by_text("there are no tests of 'fetch'")).to_be_visible()
 
 
+@pytest.mark.soak
 def test_a_dry_run_is_kept_as_a_test(open_page: Callable[..., Page], project: Project) -> None:
     page = edits(open_page(page_name="mission"))
     page.get_by_role("button", name="Dry run").click()
@@ -351,6 +358,7 @@ def test_tests_run_with_the_text_that_is_not_saved(open_page: Callable[..., Page
     assert project.text() == FETCH
 
 
+@pytest.mark.soak
 def test_a_robot_is_watched_paused_and_resumed_beside_the_editor_on_a_phone(
     open_page: Callable[..., Page], project: Project, gateway: FakeGateway
 ) -> None:

@@ -180,6 +180,7 @@ def test_a_drag_is_exactly_the_goal_at_each_zoom(open_page: Callable[..., Page],
     assert is_goal(second, 0.9, 0.3, -3 * math.pi / 4)
 
 
+@pytest.mark.soak
 def test_without_the_tool_a_drag_moves_the_view_and_not_the_robot(
     open_page: Callable[..., Page], rolling: FakeGateway
 ) -> None:
@@ -211,6 +212,7 @@ def test_a_finger_sends_the_same_goal_and_escape_gives_up(open_page: Callable[..
     assert len(rolling.goals()) == 1
 
 
+@pytest.mark.soak
 def test_two_fingers_and_the_wheel_zoom_and_send_no_goal(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
     page = open_page(page_name="map", has_touch=True)
     expect(page.get_by_text("Robot: x 1.00")).to_be_visible()
@@ -287,6 +289,7 @@ def test_zones_are_hatched_and_the_world_is_outlined_if_wanted(
     wait_for_colour(page, 0.7, 0.13, [0, 0, 0, 0])
 
 
+@pytest.mark.soak
 def test_a_goal_is_canceled_after_the_page_was_loaded_again(
     open_page: Callable[..., Page], rolling: FakeGateway
 ) -> None:
@@ -335,6 +338,7 @@ def test_places_are_the_way_without_the_canvas(open_page: Callable[..., Page], r
     expect(state(page)).to_have_text("Arrived at (0.25, 0.00)")
 
 
+@pytest.mark.soak
 def test_why_the_robot_does_not_go_is_said(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
     def refuse(_: dict[str, Any]) -> None:
         raise Refused("the goal is too far away")
@@ -393,6 +397,7 @@ def test_a_distance_is_measured(open_page: Callable[..., Page], rolling: FakeGat
     expect(page.locator(".map-hint")).to_have_text("0.50\u202fm")
 
 
+@pytest.mark.soak
 def test_what_is_not_known_is_said(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
     gateway.windows["robot/DescribeRobot"] = [CHARGER]
     page = open_page(page_name="map")
@@ -417,6 +422,7 @@ def test_an_old_position_is_said_to_be_old(open_page: Callable[..., Page], rolli
     expect(page.get_by_role("button", name="Go to Dock")).to_be_enabled()
 
 
+@pytest.mark.soak
 def test_places_are_not_drawn_without_a_way_to_map(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
     del rolling.latched["/tf_static"]
     page = open_page(page_name="map")
@@ -434,6 +440,7 @@ def test_it_fits_the_window_and_the_finger(open_page: Callable[..., Page], rolli
         expect_fit(page)
 
 
+@pytest.mark.soak
 def test_what_a_camera_sees_is_over_its_picture_until_it_is_old(
     open_page: Callable[..., Page], gateway: FakeGateway
 ) -> None:

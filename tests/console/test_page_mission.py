@@ -97,6 +97,7 @@ def trigger(name: str, cause: str, **more: Any) -> dict[str, Any]:
     return {"name": name, "mission": "patrol", "cause": cause, **plain, **more}
 
 
+@pytest.mark.soak
 def test_what_starts_missions_is_seen_live(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
     nightly = trigger("nightly", "at 22:00 on mon, fri", next="Fri 2026-11-27 22:00")
     empty = trigger("empty", "when $battery < 15 %", priority=10, running="interrupt")
@@ -120,6 +121,7 @@ def left_over(**more: Any) -> list[dict[str, Any]]:
     return [{"mission": "patrol", "at": 1.8e9, **plain, **more}]
 
 
+@pytest.mark.soak
 def test_a_run_that_did_not_end_goes_on_or_starts_again(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
     for name in ("ResumeMission", "CancelMission", "RunMission", "RestoreMission"):
         patrol.answers[f"mission.{name}"] = lambda given: f"{given['type']} is done"
@@ -146,6 +148,7 @@ def test_a_run_that_did_not_end_goes_on_or_starts_again(open_page: Callable[...,
     expect(page.get_by_role("button", name="Start again")).to_be_visible()
 
 
+@pytest.mark.soak
 def test_what_no_test_has_tried_is_marked(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
     missing = [{"node": 1, "text": "do.repeat.go_to: failure"}, {"node": 1, "text": "do.repeat.go_to: timeout"}]
     known = {"at": 1.8e9, "tests": 2, "ways": 5, "count": 3, "missing": missing}
@@ -157,6 +160,7 @@ def test_what_no_test_has_tried_is_marked(open_page: Callable[..., Page], patrol
     assert violations(page) == []
 
 
+@pytest.mark.soak
 def test_tests_of_another_version_are_said_to_be_so(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
     known = {"at": 1.8e9, "tests": 2, "ways": 5, "count": 4, "missing": [{"node": 1, "text": "x: failure"}]}
     patrol.answers["/console/tested"] = lambda _: {"success": True, "message": "", "answer": known}
@@ -165,6 +169,7 @@ def test_tests_of_another_version_are_said_to_be_so(open_page: Callable[..., Pag
     expect(page.get_by_text("not tested")).to_have_count(0)
 
 
+@pytest.mark.soak
 def test_a_robot_without_missions_says_where_they_are_written(
     open_page: Callable[..., Page], gateway: FakeGateway
 ) -> None:

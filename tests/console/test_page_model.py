@@ -180,6 +180,7 @@ def test_the_robot_stands_in_its_world_in_which_things_move(
     assert middle_of_blue(page) is None
 
 
+@pytest.mark.soak
 def test_a_robot_without_a_world_is_asked_for_nothing_of_it(open_page: Callable[..., Page], crane: FakeGateway) -> None:
     page = open_page(page_name="model")
     expect(page.get_by_role("button", name="Drag its tip")).to_be_visible()
@@ -236,6 +237,7 @@ def test_it_fits_a_phone(open_page: Callable[..., Page], crane: FakeGateway) -> 
     expect_fit(page)
 
 
+@pytest.mark.soak
 def test_meshes_that_are_missing_are_named(open_page: Callable[..., Page], crane: FakeGateway) -> None:
     mesh = b'<mesh filename="/console/meshes/0/face.stl"/>'
     crane.files["/console/model.urdf"] = URDF.replace(b'<box size="0.4 0.4 0.2"/>', mesh)
@@ -244,6 +246,7 @@ def test_meshes_that_are_missing_are_named(open_page: Callable[..., Page], crane
     expect(page.get_by_text("cannot be read: face.stl")).to_be_visible()
 
 
+@pytest.mark.soak
 def test_a_robot_without_a_body_says_so(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
     gateway.files.clear()
     page = open_page(page_name="parameters")

@@ -15,6 +15,7 @@ from tests.console.fake_gateway import FakeGateway
 from tests.console.looks import PHONE, WIDE, expect_fit
 from tests.console.test_page_data import has_mux
 from tests.robot_editor.test_muxes import MUXED
+from tests.soak import rare
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
 
@@ -56,6 +57,7 @@ def test_inputs_change_places_by_buttons_and_are_saved(open_page: Callable[..., 
     assert project.text() == after.replace("500 ms", "0.25 s")
 
 
+@pytest.mark.soak
 def test_what_is_wrong_is_told_before_it_is_saved(open_page: Callable[..., Page], project: EditedProject) -> None:
     page = open_page(page_name="mux")
     panel = edits(page)
@@ -73,7 +75,7 @@ def test_what_is_wrong_is_told_before_it_is_saved(open_page: Callable[..., Page]
     assert project.text() == MUXED
 
 
-@pytest.mark.parametrize("size", [WIDE, PHONE], ids=["wide", "phone"])
+@pytest.mark.parametrize("size", [PHONE, *rare(WIDE)], ids=["phone", "wide"])
 def test_the_editor_fits_and_everyone_can_read_it(
     open_page: Callable[..., Page], project: EditedProject, size: dict[str, int]
 ) -> None:

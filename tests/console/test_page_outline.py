@@ -75,6 +75,7 @@ def test_a_step_is_dragged_to_a_gap_with_its_comments(page: Page, project: Proje
     assert "\n".join(lines(page)) == NESTED
 
 
+@pytest.mark.soak
 def test_a_step_is_dragged_into_another_one_and_out_of_it(page: Page) -> None:
     drags(page, "wait 2 s", "repeat 2", 0.5)
     expect(page.get_by_text("Drop it into repeat 2")).to_be_visible()
@@ -87,6 +88,7 @@ def test_a_step_is_dragged_into_another_one_and_out_of_it(page: Page) -> None:
     assert lines(page)[-2] == "  - log: one"
 
 
+@pytest.mark.soak
 def test_escape_ends_a_drag_and_a_drop_that_cannot_be_says_why(page: Page) -> None:
     drags(page, "wait 2 s", "log the end", 0.9)
     page.keyboard.press("Escape")
@@ -112,6 +114,7 @@ def touched(page: Page) -> Callable[..., None]:
     return touch
 
 
+@pytest.mark.soak
 def test_a_finger_scrolls_and_drags_after_a_rest(open_page: Callable[..., Page], project: Project) -> None:
     project.file.write_text(NESTED, encoding="utf-8")
     page = edits(open_page(page_name="mission", viewport=PHONE, has_touch=True))
@@ -145,6 +148,7 @@ def test_who_may_not_configure_drags_nothing(
     page.mouse.up()
 
 
+@pytest.mark.soak
 def test_blocks_are_folded_by_keys_and_stay_folded_through_edits(page: Page) -> None:
     block(page, "repeat 2").locator(":scope > .outline-row").click()
     page.keyboard.press("ArrowLeft")
@@ -172,6 +176,7 @@ def test_blocks_are_folded_by_keys_and_stay_folded_through_edits(page: Page) -> 
     assert violations(page) == []
 
 
+@pytest.mark.soak
 def test_a_button_folds_and_what_is_moved_into_a_folded_block_is_shown(page: Page) -> None:
     page.get_by_role("button", name="Hide what is in repeat 2").click()
     expect(page.get_by_role("treeitem")).to_have_count(4)
@@ -182,6 +187,7 @@ def test_a_button_folds_and_what_is_moved_into_a_folded_block_is_shown(page: Pag
     expect(block(page, "log the end")).to_be_focused()
 
 
+@pytest.mark.soak
 def test_folds_fit_the_window_and_the_finger(page: Page) -> None:
     for size in (WIDE, PHONE):
         page.set_viewport_size(size)
@@ -243,6 +249,7 @@ LINES = f"""{FETCH}  - go_to:
 """
 
 
+@pytest.mark.soak
 def test_a_value_of_several_lines_is_edited_in_a_larger_field(open_page: Callable[..., Page], project: Project) -> None:
     project.file.write_text(LINES, encoding="utf-8")
     page = edits(open_page(page_name="mission"))
@@ -336,6 +343,7 @@ def test_machines_are_drawn_and_a_box_chooses_its_state(open_page: Callable[...,
     shot(page, "graph_phone")
 
 
+@pytest.mark.soak
 def test_else_is_added_and_deleted_again(open_page: Callable[..., Page], project: Project) -> None:
     text = f"{FETCH}  - if: 1 > 2\n    then:\n      wait: 3 s\n"
     project.file.write_text(text, encoding="utf-8")

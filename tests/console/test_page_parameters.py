@@ -118,6 +118,7 @@ def test_a_slider_changes_a_parameter_and_save_keeps_it(open_page: Callable[...,
     assert len(battery.gateway.calls("/battery/set_parameters")) <= 5
 
 
+@pytest.mark.soak
 def test_what_changed_after_it_was_shown_is_not_written(open_page: Callable[..., Page], battery: Battery) -> None:
     page = open_page(page_name="parameters")
     page.get_by_label("Runtime", exact=True).fill("60")
@@ -129,6 +130,7 @@ def test_what_changed_after_it_was_shown_is_not_written(open_page: Callable[...,
     assert battery.manifest["runtime"] == number(45.0)
 
 
+@pytest.mark.soak
 def test_limits_stand_beside_the_field(open_page: Callable[..., Page], battery: Battery) -> None:
     page = open_page(page_name="parameters")
     expect(page.get_by_text("Time from full to empty. 0 s to 100 s")).to_be_visible()
@@ -163,6 +165,7 @@ def test_what_is_wrong_or_refused_is_said_at_its_place(open_page: Callable[..., 
     assert battery.values["runtime"] == number(45.0)
 
 
+@pytest.mark.soak
 def test_a_change_is_taken_back_and_changes_of_others_appear(open_page: Callable[..., Page], battery: Battery) -> None:
     page = open_page(page_name="parameters")
     runtime = page.get_by_label("Runtime", exact=True)
@@ -188,6 +191,7 @@ def test_it_fits_a_phone(open_page: Callable[..., Page], battery: Battery) -> No
     expect_fit(page)
 
 
+@pytest.mark.soak
 def test_a_robot_without_parameters_says_so(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
     gateway.answers["/rosapi/services"] = lambda _: {"services": []}
     page = open_page(page_name="parameters")

@@ -22,6 +22,7 @@ from tests.console.fake_gateway import FakeGateway
 from tests.console.looks import PHONE, WIDE, expect_fit, violations
 from tests.console.test_page_robot import DESCRIBED
 from tests.robot_editor.test_parts import BUILT, POLE
+from tests.soak import rare
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
 
@@ -93,6 +94,7 @@ def test_a_part_is_found_seen_as_a_ghost_moved_and_saved(
     assert project.text() == BUILT + line
 
 
+@pytest.mark.soak
 def test_a_part_is_attached_elsewhere_and_what_it_carries_goes_along(
     open_page: Callable[..., Page], project: EditedProject
 ) -> None:
@@ -112,6 +114,7 @@ def test_a_part_is_attached_elsewhere_and_what_it_carries_goes_along(
     assert ghosts(page) == []
 
 
+@pytest.mark.soak
 def test_a_part_is_moved_by_its_arrows(open_page: Callable[..., Page], project: EditedProject) -> None:
     page = open_page(page_name="model")
     panel = edits(page)
@@ -135,6 +138,7 @@ def test_a_part_is_moved_by_its_arrows(open_page: Callable[..., Page], project: 
     assert set(ghosts(page)) >= {"camera_link"}
 
 
+@pytest.mark.soak
 def test_a_part_that_carries_another_is_deleted_and_that_is_said(
     open_page: Callable[..., Page], project: EditedProject
 ) -> None:
@@ -164,7 +168,7 @@ def test_what_a_part_needs_is_asked_for(open_page: Callable[..., Page], project:
     expect(page.get_by_text("1 warning", exact=True)).to_be_visible()  # which was there before
 
 
-@pytest.mark.parametrize("size", [WIDE, PHONE], ids=["wide", "phone"])
+@pytest.mark.parametrize("size", [PHONE, *rare(WIDE)], ids=["phone", "wide"])
 def test_the_editor_fits_and_everyone_can_read_it(
     open_page: Callable[..., Page], project: EditedProject, size: dict[str, int]
 ) -> None:

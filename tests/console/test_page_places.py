@@ -16,6 +16,7 @@ from tests.console.fake_gateway import FakeGateway
 from tests.console.looks import PHONE, WIDE, expect_fit, violations
 from tests.console.test_page_map import at, drag, move_fingers, rolls
 from tests.robot_editor.test_robot_editor import FETCH
+from tests.soak import rare
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
 
@@ -88,6 +89,7 @@ def test_a_place_is_moved_and_turned_by_hand_and_saved_with_all_comments(
     expect(page.get_by_text("The robot runs without what is saved: mission changed live.")).to_be_visible()
 
 
+@pytest.mark.soak
 def test_what_was_saved_is_brought_to_the_robot_that_runs_and_taken_back(
     open_page: Callable[..., Page], project: EditedProject
 ) -> None:
@@ -110,6 +112,7 @@ def test_what_was_saved_is_brought_to_the_robot_that_runs_and_taken_back(
     assert project.live.runs_with == ROBOT != project.text()
 
 
+@pytest.mark.soak
 def test_why_the_robot_cannot_be_changed_now_is_told(open_page: Callable[..., Page], project: EditedProject) -> None:
     project.live.why_not = "'base' moves"
     page = open_page(page_name="map")
@@ -122,6 +125,7 @@ def test_why_the_robot_cannot_be_changed_now_is_told(open_page: Callable[..., Pa
     expect(page.get_by_text("Not now")).to_be_hidden()
 
 
+@pytest.mark.soak
 def test_a_finger_moves_and_adds_places_as_well(open_page: Callable[..., Page], project: EditedProject) -> None:
     page = open_page(page_name="map", has_touch=True)
     panel = edits(page)
@@ -132,6 +136,7 @@ def test_a_finger_moves_and_adds_places_as_well(open_page: Callable[..., Page], 
     expect(panel.get_by_role("button", name="Place 1")).to_have_attribute("aria-pressed", "true")
 
 
+@pytest.mark.soak
 def test_without_a_way_to_the_map_no_drag_moves_a_place(
     open_page: Callable[..., Page], project: EditedProject, gateway: FakeGateway
 ) -> None:
@@ -179,6 +184,7 @@ def test_keys_alone_suffice(open_page: Callable[..., Page], project: EditedProje
     assert "dock: {x: 75 cm, y: 0.04 m, heading: 5 deg}" in project.text()
 
 
+@pytest.mark.soak
 def test_a_mission_that_uses_a_deleted_place_is_named(open_page: Callable[..., Page], project: EditedProject) -> None:
     page = open_page(page_name="map")
     panel = edits(page)
@@ -193,6 +199,7 @@ def test_a_mission_that_uses_a_deleted_place_is_named(open_page: Callable[..., P
     expect(page.get_by_text("No mistakes")).to_be_visible()
 
 
+@pytest.mark.soak
 def test_many_mistakes_can_be_read_by_keys(open_page: Callable[..., Page], project: EditedProject) -> None:
     mission = project.folder / "missions/fetch.yaml"
     mission.write_text(project.text("missions/fetch.yaml") + "  - go_to: window_seat\n" * 20, encoding="utf-8")
@@ -212,11 +219,11 @@ def test_many_mistakes_can_be_read_by_keys(open_page: Callable[..., Page], proje
     ("label", "text", "why"),
     [
         ("x", "NaN m", "must be a length"),
-        ("x", "1e300", "must be a length"),
-        ("x", "9999999 m", "farther away"),
-        ("Heading", "3 m", "must be an angle"),
         ("Name", "window_seat", "it is taken"),
-        ("Name", "Big Table!", "cannot be the name of a place"),
+        pytest.param("x", "1e300", "must be a length", marks=pytest.mark.soak),
+        pytest.param("x", "9999999 m", "farther away", marks=pytest.mark.soak),
+        pytest.param("Heading", "3 m", "must be an angle", marks=pytest.mark.soak),
+        pytest.param("Name", "Big Table!", "cannot be the name of a place", marks=pytest.mark.soak),
     ],
 )
 def test_what_is_no_value_is_refused_and_stays_to_be_corrected(
@@ -235,6 +242,7 @@ def test_what_is_no_value_is_refused_and_stays_to_be_corrected(
     assert project.text() == ROBOT
 
 
+@pytest.mark.soak
 def test_a_file_that_others_changed_is_loaded_again_with_ones_own_changes(
     open_page: Callable[..., Page], project: EditedProject
 ) -> None:
@@ -253,6 +261,7 @@ def test_a_file_that_others_changed_is_loaded_again_with_ones_own_changes(
     assert project.text() == theirs.replace("dock: {x: 0 m", "dock: {x: 0.5 m")
 
 
+@pytest.mark.soak
 def test_after_a_connection_was_lost_in_a_save_it_is_told_what_became_of_it(
     open_page: Callable[..., Page], project: EditedProject
 ) -> None:
@@ -276,7 +285,7 @@ def test_who_does_not_configure_sees_no_editor(
     expect(page.get_by_role("button", name="Edit places")).to_be_hidden()
 
 
-@pytest.mark.parametrize("size", [WIDE, PHONE], ids=["wide", "phone"])
+@pytest.mark.parametrize("size", [PHONE, *rare(WIDE)], ids=["phone", "wide"])
 def test_the_editor_fits_and_everyone_can_read_it(
     open_page: Callable[..., Page], project: EditedProject, size: dict[str, int]
 ) -> None:

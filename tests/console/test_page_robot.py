@@ -164,6 +164,7 @@ def test_arms_go_to_their_poses_grippers_open_and_a_mux_names_who_commands(
     expect(page.get_by_label("cmd_vel", exact=True)).to_contain_text("Teleop")
 
 
+@pytest.mark.soak
 def test_a_fault_of_a_simulated_servo_is_simulated(open_page: Callable[..., Page], robot: FakeGateway) -> None:
     robot.answers |= {
         "servo_bus.ListFaults": lambda _: {"jam": "does not turn", "overheat": "is as hot as it may be"},
@@ -196,6 +197,7 @@ def test_it_is_seen_how_components_are_wired_and_which_processes_run_them(
     expect(row).to_be_visible()
 
 
+@pytest.mark.soak
 def test_a_long_status_leaves_the_name_on_its_line(open_page: Callable[..., Page], robot: FakeGateway) -> None:
     words = "head_pan_joint: it was too hot and rests for 49 s, then until 45 degC: it has 80 degC"
     robot.windows[RUNNING] = {"stop": None, "components": [state("servos", state="failed", note=words)]}

@@ -88,12 +88,12 @@ class Triggered:
 
 @pytest.mark.timeout(100)
 def test_a_time_of_day_starts_a_mission_each_week(tmp_path: Path) -> None:
-    nightly = 'nightly: {at: "22:00", on: [thu, sat], mission: greet, with: {times: 2}}'
+    nightly = 'nightly: {at: "00:10", on: [thu, sat], mission: greet, with: {times: 2}}'
     robot = Triggered(tmp_path, nightly, is_alone=True)
-    robot.bench.advance(3 * DAY)  # the first day of virtual time is a Thursday
+    robot.bench.advance(2 * DAY + 3600)  # the first day of virtual time is a Thursday
     begun = [float(line.split()[0]) for line in robot.told if "starts" in line]
-    assert begun == [day * DAY + 22 * 3600 for day in (0, 2)]
-    assert robot.told[:2] == ["79200 trigger nightly (at 22:00 on thu, sat) starts mission greet", "79200 Hello 2"]
+    assert begun == [day * DAY + 600 for day in (0, 2)]
+    assert robot.told[:2] == ["600 trigger nightly (at 00:10 on thu, sat) starts mission greet", "600 Hello 2"]
 
 
 def test_the_list_has_the_next_time_and_the_last_start(tmp_path: Path) -> None:

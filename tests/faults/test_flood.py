@@ -94,6 +94,7 @@ def test_a_flood_is_refused_and_told_while_the_patrol_goes_on(soak: Soak, patrol
 
 @pytest.mark.timeout(MANY + 60)
 @pytest.mark.parametrize("what", ["requests", *rare("goals", "queries", "tokens")])
+@pytest.mark.soak
 def test_a_flood_of_questions_is_refused_while_the_patrol_goes_on(what: str, soak: Soak, patrol: Patrol) -> None:
     seconds = soak.examples(QUICK, FEW if what == "tokens" else MANY)
     observer, lines = patrol.observer, lines_of(patrol)

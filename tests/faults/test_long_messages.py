@@ -64,6 +64,7 @@ def subscribed(plan: Plan) -> Iterator[tuple[str, type[Message], Qos]]:
 @pytest.mark.parametrize(
     "robot", ["pi_robot table", *rare(*(path.parent.name for path in ROOT.glob("robots/*/robot.yaml")))]
 )
+@pytest.mark.soak
 def test_no_process_is_held_up_by_a_message(robot: str, tmp_path: Path) -> None:
     robot, *profiles = robot.split()
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "PYTHONPATH": str(ROOT), "NO_COLOR": "1"}

@@ -19,14 +19,20 @@ from tests.soak import Soak
 SOAKED = {  # of each there is another one, or what they do is tried in `tests/navigation` and `tests/components`
     f"{name}.test.yaml"
     for name in (
+        "around_obstacles",
         "draw_triangle",
+        "fast_and_slow",
         "find_dock",
         "follow_me",
         "follow_with_the_hand",
+        "lead_by_hand",
         "pedestal_pick_what_is_seen",
+        "pick_tagged",
         "pick_what_is_seen",
         "porter_follow_with_the_hand",
         "porter_pick_what_is_seen",
+        "reach_and_shift",
+        "return_to_where_it_was",
     )
 }
 PATROL = "missions/tests/patrol.test.yaml"

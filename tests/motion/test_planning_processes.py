@@ -91,6 +91,7 @@ def pair(both: list[PlanningProcess]) -> list[PlanningProcess]:
 
 
 @pytest.mark.parametrize("seed_and_helpers", [(CONFINED, 2), *rare((CONFINED, 1), *product(SCENES[1:], (1, 2)))])
+@pytest.mark.soak
 def test_one_two_and_three_processes_come_to_the_same(
     pair: list[PlanningProcess], pair_warned: list[str], seed_and_helpers: tuple[int, int]
 ) -> None:

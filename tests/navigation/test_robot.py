@@ -465,6 +465,7 @@ def test_what_is_wrong_is_said_before_a_motor_moves(tmp_path: Path, robot: str, 
     assert said in checked.text
 
 
+@pytest.mark.soak
 def test_the_house_cleans_the_house_and_never_touches_a_wall(repository: Path) -> None:
     plan = compile_robot("robots/house", environment={}).plan
     assert plan

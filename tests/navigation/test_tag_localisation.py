@@ -121,6 +121,7 @@ SELDOM = [("kitchen", "ideal"), ("sofa", "ideal"), ("hallway", "ideal"), ("bathr
 @pytest.mark.parametrize(
     ("spawn", "simulator"), [("bathroom", "ideal"), *(pytest.param(*each, marks=pytest.mark.soak) for each in SELDOM)]
 )
+@pytest.mark.soak
 def test_a_robot_that_was_put_down_anywhere_finds_its_dock(spawn: str, simulator: str) -> None:
     pytest.importorskip("cv2", reason="OpenCV is not installed")
     if simulator == "physics":

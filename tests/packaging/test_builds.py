@@ -31,6 +31,7 @@ def digests(folder: Path) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("modules", [NODE_MODULES if NODE_MODULES.exists() else None, *rare(None)])
+@pytest.mark.soak
 def test_who_builds_when_and_where_makes_no_difference(built: Path, tmp_path: Path, modules: Path | None) -> None:
     other = {"TZ": "Asia/Tokyo", "PYTHONHASHSEED": "7", "LC_ALL": "C"}
     assert build(tmp_path / "out", umask=0o077, environment=other, node_modules=modules) == digests(built)

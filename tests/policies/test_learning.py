@@ -86,6 +86,7 @@ def recorded_pick(folder: Path, number: int) -> Path:
     return write_recording(folder / f"pick_{number}.mcap", messages)
 
 
+@pytest.mark.soak
 def test_a_network_learns_from_recorded_picks_and_moves_the_arm_through_the_mux(tmp_path: Path, soak: Soak) -> None:
     picks = soak.examples(QUICK, MANY)
     (tmp_path / "pick.yaml").write_text(MISSION)

@@ -133,6 +133,7 @@ def test_it_turns_away_from_the_side_on_which_it_bumps(folder: Path, y: float, s
     assert wrap_angle(robot.pose.heading) * side > 0.5
 
 
+@pytest.mark.soak
 def test_it_never_crosses_the_edge_of_the_floor(folder: Path, soak: Soak) -> None:
     robot, edges = Kobuki(plan_in(ISLAND, folder)), 0
     headings = np.arange(0.1, math.tau, 1.6 if soak.is_on else 3.2)

@@ -37,6 +37,7 @@ def three_hosts(folder: Path, rounds: int) -> Iterator[PatrolOnHosts]:
 
 
 @pytest.mark.timeout(100)
+@pytest.mark.soak
 def test_a_host_of_three_may_be_cut_off_and_the_patrol_succeeds_once_it_is_back(tmp_path: Path) -> None:
     with three_hosts(tmp_path, rounds=1) as patrol:
         shares = {host: patrol.up(host) for host in patrol.hosts.addresses}

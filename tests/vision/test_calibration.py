@@ -127,6 +127,7 @@ def test_views_of_one_place_or_one_side_are_not_enough() -> None:
         flat.calibrated()
 
 
+@pytest.mark.soak
 def test_the_command_writes_a_file_that_cameras_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = chessboard()
     for number, pose in enumerate(poses(0.45)):

@@ -157,6 +157,7 @@ def test_without_what_is_wanted_it_fails_with_the_reason(
         assert why in looker.statuses[-1].message
 
 
+@pytest.mark.soak
 def test_what_never_stands_still_is_not_steady(tmp_path: Path) -> None:
     path = "path: [[0 s, 80 cm, -20 cm], [4 s, 80 cm, 20 cm]]"
     can = f"  can: {{cylinder: {{radius: 35 mm, length: 10 cm}}, z: 74 cm, {path}}}\n"
