@@ -17,6 +17,7 @@ from playwright.sync_api import Page, expect
 from tests.console.browser import CHROMIUM
 from tests.console.fake_gateway import FakeGateway
 from tests.console.looks import PHONE, expect_fit, violations
+from tests.console.test_page import wait_for
 from tests.console.test_page_robot import DESCRIBED, component, port
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
@@ -141,10 +142,11 @@ def test_sliders_move_a_ghost_unless_they_may_move_the_robot(
     page.get_by_role("button", name="Centre").click()
     assert scene(page, "ghost") == {"turn_joint": 0, "slide_joint": 0}
     page.get_by_label("Move the joints of the robot").check()
-    assert scene(page, "ghost") is None
+    wait_for(lambda: scene(page, "ghost") is None, page)
     turn.fill("-30")
     expect(page.locator(".scene")).to_have_attribute("data-ghost", "")
     expect(page.get_by_text("Nothing of the robot moves")).to_be_hidden()
+    wait_for(crane.goals, page)
     (goal,) = crane.goals()
     assert (goal["action"], goal["args"]["joints"]) == ("/crane/move", ["turn"])
     assert goal["args"]["positions"] == [pytest.approx(-math.pi / 6)]

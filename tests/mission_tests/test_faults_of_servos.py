@@ -144,6 +144,7 @@ def test_a_mission_notices_the_fault_and_its_end(watched: Watched, text: str) ->
     assert watched.problems(text) == []
 
 
+@pytest.mark.soak
 def test_a_group_with_a_servo_that_is_too_hot_rests_and_the_mission_goes_on_when_it_has_cooled(tmp_path: Path) -> None:
     assert Watched(tmp_path, RESTS, LOOK, "look").problems(HOT) == []
 

@@ -134,6 +134,7 @@ def answer(process: PlanningProcess, job: PlanJob) -> Planned:
     return found
 
 
+@pytest.mark.soak
 def test_a_goal_goes_on_without_those_that_are_killed_or_hang(pair: list[PlanningProcess], warned: list[str]) -> None:
     lost = [started(warned) for _ in range(2)]
     for process, number in zip(lost, (signal.SIGKILL, signal.SIGSTOP), strict=True):

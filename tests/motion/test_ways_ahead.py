@@ -120,6 +120,7 @@ WAITS = st.lists(st.one_of(st.none(), st.integers(0, 12)), max_size=4)
 
 
 @pytest.mark.timeout(200)
+@pytest.mark.soak
 @settings(max_examples=2, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.one_of(st.just(CONFINED), st.integers(0, 10_000)), st.lists(WAITS, min_size=1, max_size=3))
 def test_a_goal_ends_with_helpers_as_it_does_without(

@@ -15,7 +15,7 @@ from tests.mutate.project import Found, Project
 from tests.soak import Soak
 
 FOUND = Path(__file__).parent / "found"
-QUICK, MANY = 8, 20_000
+QUICK, MANY = 4, 20_000
 
 
 def try_seeds(seeds: range) -> Found:

@@ -154,6 +154,7 @@ def test_who_vanishes_is_searched_where_it_was_and_lost(tmp_path: Path) -> None:
     assert abs(both.speed) < 0.02
 
 
+@pytest.mark.soak
 def test_it_is_done_when_somebody_stands_still_at_a_place_or_a_goal_is_canceled(tmp_path: Path) -> None:
     both = Companions(tmp_path, ((0, -1.0, 0), (2, -1.0, 0), (12, 1.5, 0.0)), more=NAVIGATION)
     both.follow(FollowPerson.Goal(until=PoseStamped(Header(frame_id="map"), Pose(Point(1.5, 0.0)))))

@@ -111,6 +111,7 @@ def test_a_long_robot_does_not_turn_where_a_corner_of_it_would_touch_a_wall() ->
     assert moved(SpinManoeuvre(math.pi, 1.0, 1.5), Pose2(-1.5, 0.0), THROUGH_GAP)[1] is ManoeuvreState.DONE
 
 
+@pytest.mark.soak
 def test_a_robot_with_corners_drives_through_the_gap_in_its_world(tmp_path: Path) -> None:
     robot = f"{ROBOT}  footprint: {CORNERS}\n"
     for name, data in map_files(GAP, "gap").items():

@@ -477,6 +477,7 @@ def test_the_house_cleans_the_house_and_never_touches_a_wall(repository: Path) -
     assert base.core.distance > 15
 
 
+@pytest.mark.soak
 def test_somebody_who_walks_in_the_way_is_not_run_into(tmp_path: Path) -> None:
     walker = """objects:
   visitor:
@@ -526,6 +527,7 @@ def test_a_manifest_says_how_many_particles_there_are(tmp_path: Path) -> None:
     assert 50 <= len(localisation.filter.poses) <= 150
 
 
+@pytest.mark.soak
 def test_a_laser_finds_the_robot_where_its_odometry_errs(tmp_path: Path) -> None:
     robot = ROBOT.replace("diff_drive_sim}", "diff_drive_sim, drift: 16 %}")
     lost, found = (Room(tmp_path, f"{robot}{more}") for more in ("", "  localisation: {type: particles}\n"))

@@ -236,6 +236,7 @@ def test_bytes_that_are_no_text_are_no_error(run: Run) -> None:
     assert lines
 
 
+@pytest.mark.soak
 def test_a_flood_is_taken_in_pieces_so_that_its_component_can_do_other_things(run: Run) -> None:
     child = run("yes")
     longest = 0

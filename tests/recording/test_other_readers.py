@@ -50,6 +50,7 @@ def counted(path: Path) -> Counter[tuple[str, str]]:
         return Counter((message.topic.name, message.topic.type) for message in RecordingReader(file).messages())
 
 
+@pytest.mark.soak
 def test_rosbags_reads_every_message_with_its_type(patrol: Path) -> None:
     highlevel = pytest.importorskip("rosbags.highlevel", reason="needs rosbags")
     found: Counter[tuple[str, str]] = Counter()

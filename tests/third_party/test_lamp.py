@@ -110,6 +110,7 @@ def test_its_own_tests_pass(installed: Installed) -> None:
     assert "6 passed" in installed.run(*words)
 
 
+@pytest.mark.soak
 def test_its_skills_settings_and_check_are_told_like_ours(installed: Installed) -> None:
     misspelt = installed.robot("misspelt", "cool_down: $light.flashes", "cool_down: {flahes: 3}")
     unknown = installed.robot("unknown", "period: 500 ms", "perod: 500 ms")
@@ -127,6 +128,7 @@ def test_its_skills_settings_and_check_are_told_like_ours(installed: Installed) 
     assert page.startswith("LAMP01: A lamp that blinks too fast")
 
 
+@pytest.mark.soak
 def test_schema_and_editor_know_it(installed: Installed) -> None:
     types, settings, schema = installed.run("-c", COMPLETE).split("\n", 2)
     assert "'lamp'" in types
