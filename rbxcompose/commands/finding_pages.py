@@ -1,15 +1,13 @@
 """The pages of the kinds of findings: what a code means, why it matters, a bad and a good example."""
 
 import importlib
-import pkgutil
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import rbxcompose
 from rbxcompose.base.findings import KINDS, FindingKind
-from rbxcompose.compiler.check_runner import all_checks
 from rbxcompose.manifest.files import library_root
-from rbxcompose.missions.analysis.check_runner import mission_checks
 
 FAMILIES = {
     "10": "keys and values",
@@ -41,18 +39,34 @@ FAMILIES = {
 }
 """Meaning of the first two digits of a code."""
 
-_DECLARES = re.compile(r"^(\w+ = kind\(|@check\()", re.MULTILINE)
+_DECLARED = re.compile(r"\(\s*\"(RBX\d{4})\"")  # what is called with a code first: `kind`, `check`, `mission_check`
 _HEAD = re.compile(r"\A# \w+: (.*)\n(\n\*.*\*\n)?")  # title and, if it is there already, the line of facts
 _BLOCK = re.compile(r"^```\w*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
+def declared() -> Iterator[tuple[str, str]]:
+    """Yield the kinds of findings of this project, as its texts declare them: module and code."""
+    [home] = map(Path, rbxcompose.__path__)
+    for path in sorted(home.rglob("*.py")):
+        if codes := _DECLARED.findall(path.read_text(encoding="utf-8")):
+            module = ".".join((home.name, *path.relative_to(home).with_suffix("").parts))
+            yield from ((module, code) for code in codes)
+
+
+def kind_of(code: str) -> FindingKind | None:
+    """Return a kind of finding of this project, None if it has none of this code: imports what declares it alone."""
+    if module := next((module for module, known in declared() if known == code), None):
+        importlib.import_module(module)
+    return KINDS.get(code)
+
+
 def all_kinds() -> dict[str, FindingKind]:
     """Import every module that declares a kind of finding, including those of plug-ins, and return all by code."""
-    for folder in rbxcompose.__path__:
-        for module in pkgutil.walk_packages([folder], "rbxcompose."):
-            path = Path(folder, *module.name.split(".")[1:]).with_suffix(".py")
-            if not module.ispkg and _DECLARES.search(path.read_text(encoding="utf-8")):
-                importlib.import_module(module.name)
+    from rbxcompose.compiler.check_runner import all_checks  # which imports the compiler: a page does without
+    from rbxcompose.missions.analysis.check_runner import mission_checks
+
+    for module in dict.fromkeys(module for module, _ in declared()):
+        importlib.import_module(module)
     all_checks()
     mission_checks()
     return dict(sorted(KINDS.items()))

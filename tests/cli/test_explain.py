@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 
 import pytest
 
@@ -40,3 +42,11 @@ def test_programs_get_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["explain", "RBX1110", "--json"]) == 0
     page = json.loads(capsys.readouterr().out)
     assert (page["severity"], page["family"], page["is_fixable"]) == ("warning", "YAML", False)
+
+
+def test_a_page_imports_what_declares_its_code_and_not_the_compiler() -> None:
+    script = "import sys; from rbxcompose.commands.main import main; main(['explain', 'RBX1301']); print(*sys.modules)"
+    told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+    assert told.startswith("RBX1301: ")
+    assert "rbxcompose.manifest.reader" in told
+    assert "rbxcompose.compiler.check_runner" not in told

@@ -9,11 +9,11 @@ from functools import cache
 import pytest
 
 from docs import generate
-from docs.generating.families import declared, next_code
+from docs.generating.families import next_code
 from rbxcompose.base.expressions.types import TYPES
 from rbxcompose.base.findings import KINDS, kind
 from rbxcompose.base.rules import OUR_CODES
-from rbxcompose.commands.finding_pages import FAMILIES, all_kinds, family_of, page_folder
+from rbxcompose.commands.finding_pages import FAMILIES, all_kinds, declared, family_of, page_folder
 from rbxcompose.compiler.check_runner import all_checks
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import ROBOT

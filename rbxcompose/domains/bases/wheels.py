@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
+from rbxcompose.domains.bases.twins import ABSURD
 
-ABSURD = 2.0  # a command above this many times a limit is a fault of its sender, not a wish to go fast
 ROUNDING = 1e-12  # a smaller difference of velocities counts as none [m/s, rad/s]
 
 

@@ -8,7 +8,7 @@ import json
 
 from rbxcompose.base.findings import FindingKind, suggest
 from rbxcompose.commands.console import emit, misused
-from rbxcompose.commands.finding_pages import all_kinds, body_of, family_of, text_of, title_of
+from rbxcompose.commands.finding_pages import all_kinds, body_of, family_of, kind_of, text_of, title_of
 
 GROUP = "write"
 _PREFIX = "RBX"
@@ -22,17 +22,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the page of one code, or the list of all codes."""
-    kinds = all_kinds()
     if arguments.code is None:
+        kinds = all_kinds()
         emit(_as_json(list(kinds.values())) if arguments.json else _listed(kinds))
         return 0
     written = arguments.code.upper()
-    code = written if written in kinds else _PREFIX + written.removeprefix(_PREFIX)
-    if code not in kinds:
+    code = _PREFIX + written.removeprefix(_PREFIX)
+    found = kind_of(code) or all_kinds().get(written)  # of another package
+    if found is None:
+        kinds = all_kinds()
         family = [kind for kind in kinds if kind.startswith(code[: len(_PREFIX) + 2])]
         hint = suggest(code, family or kinds, "codes")
         return misused("explain", f"there is no code {arguments.code!r}; {hint}")
-    emit(_as_json(kinds[code]) if arguments.json else text_of(kinds[code]).rstrip("\n"))
+    emit(_as_json(found) if arguments.json else text_of(found).rstrip("\n"))
     return 0
 
 

@@ -10,7 +10,7 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Pose2, Transform3, Velocity2
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.bases.twins import ABSURD, DiffDriveCore, DiffDriveSettings
+from rbxcompose.domains.bases.twins import DiffDriveCore, DiffDriveSettings, drives
 from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import Odometry
@@ -98,15 +98,11 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
     @classmethod
     def capabilities(cls, config: DiffDriveSimConfig) -> tuple[sdk.Capability, ...]:
         """Declare its limits and the frame that it moves."""
-        base = sdk.Drives(
+        base = drives(
+            config,
             "cmd_vel",
             "odom",
-            max_speed=sdk.Setting(config.max_speed, "max_speed"),
-            max_turn_rate=sdk.Setting(config.max_turn_rate, "max_turn_rate"),
-            drops_above=sdk.Setting(ABSURD),
             stops_after=sdk.Setting(config.command_timeout, "command_timeout"),
-            acceleration=sdk.Setting(config.acceleration, "acceleration"),
-            turn_acceleration=sdk.Setting(config.turn_acceleration, "turn_acceleration"),
             wheel_distance=sdk.Setting(config.wheel_distance, "wheel_distance") if config.wheel_distance else None,
         )
         return base, sdk.WritesFrame("tf", sdk.Setting(ODOM), sdk.Setting(BASE))

@@ -13,8 +13,8 @@ from rbxcompose.base.geometry import Pose2, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.bases import wheel_board
 from rbxcompose.domains.bases.odometry_messages import odometry_message, odometry_transform
+from rbxcompose.domains.bases.twins import drives
 from rbxcompose.domains.bases.wheels import (
-    ABSURD,
     BaseLimits,
     OdometryPolicy,
     WheelDrive,
@@ -84,15 +84,11 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
     @classmethod
     def capabilities(cls, config: SerialBaseConfig) -> tuple[sdk.Capability, ...]:
         """Declare its limits, the frame that it moves, and its port."""
-        base = sdk.Drives(
+        base = drives(
+            config,
             "cmd_vel",
             "odom",
-            max_speed=sdk.Setting(config.max_speed, "max_speed"),
-            max_turn_rate=sdk.Setting(config.max_turn_rate, "max_turn_rate"),
-            drops_above=sdk.Setting(ABSURD),
             stops_after=sdk.Setting(config.command_timeout, "command_timeout"),
-            acceleration=sdk.Setting(config.acceleration, "acceleration"),
-            turn_acceleration=sdk.Setting(config.turn_acceleration, "turn_acceleration"),
             wheel_distance=sdk.Setting(config.wheel_distance, "wheel_distance"),
         )
         return *super().capabilities(config), base, sdk.WritesFrame("tf", sdk.Setting(ODOM), sdk.Setting(BASE))

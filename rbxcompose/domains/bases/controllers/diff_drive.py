@@ -12,7 +12,8 @@ from rbxcompose import sdk
 from rbxcompose.base.config import AngularJerk, Config, Jerk, JointName, LinkName
 from rbxcompose.base.geometry import Velocity2
 from rbxcompose.domains.bases.odometry_messages import odometry_message, odometry_transform
-from rbxcompose.domains.bases.wheels import ABSURD, BaseLimits, OdometryPolicy, WheelDrive, WheelGeometry, WheelOdometry
+from rbxcompose.domains.bases.twins import drives
+from rbxcompose.domains.bases.wheels import BaseLimits, OdometryPolicy, WheelDrive, WheelGeometry, WheelOdometry
 from rbxcompose.domains.servos.controller import ControlledJoint, Controller, ControllerConfig, controller
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import geometry_msgs as geometry
@@ -110,16 +111,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
     def capabilities(cls, name: str, config: DiffDriveConfig) -> tuple[sdk.Capability, ...]:
         """Declare its limits, its wheels and the frame that it moves."""
         odometry, timeout = config.odometry, config.command_timeout
-        base = sdk.Drives(
-            "commands",
-            "odometry",
-            max_speed=sdk.Setting(config.max_speed, "max_speed"),
-            max_turn_rate=sdk.Setting(config.max_turn_rate, "max_turn_rate"),
-            drops_above=sdk.Setting(ABSURD),
-            stops_after=sdk.Setting(timeout or math.inf, "command_timeout"),
-            acceleration=sdk.Setting(config.acceleration, "acceleration"),
-            turn_acceleration=sdk.Setting(config.turn_acceleration, "turn_acceleration"),
-        )
+        base = drives(config, "commands", "odometry", stops_after=sdk.Setting(timeout or math.inf, "command_timeout"))
         radius = config.wheel_radius
         wheels = sdk.RollsOn(
             sdk.Setting(config.left, "left"),
