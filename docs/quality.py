@@ -9,7 +9,7 @@ DOCS = Path(__file__).parent
 ABOUT = """# Quality
 
 Random and hostile input, and faults of processes, hosts, links and disks, look for mistakes that nobody thought of.
-`make test` runs some hundreds of examples of each suite, `make soak` as many as the table says. An input that fails
+`make test` runs a few examples of each suite, `make soak` as many as the table says. An input that fails
 becomes a file that every later run tries again. [What the suites do](#what-the-suites-do) stands below the table.
 
 {table}

@@ -87,7 +87,7 @@ def test_the_tip_and_the_head_follow_until_the_point_is_lost(robot: str) -> None
     assert "no point has come on 'target'" in chased.ends[0].result.message
 
 
-@pytest.mark.parametrize("robot", ["pi_robot", *rare("pedestal_pi", "porter")])
+@pytest.mark.parametrize("robot", ["pi_robot", "pedestal_pi", "porter"])
 @pytest.mark.soak
 def test_a_point_that_hardly_moves_is_where_it_was(robot: str) -> None:
     chased, ahead = Chased(parts_of(robot)), AHEAD[robot]
@@ -101,7 +101,7 @@ def test_a_point_that_hardly_moves_is_where_it_was(robot: str) -> None:
     assert math.dist(chased.tip, moved) < 0.03
 
 
-@pytest.mark.parametrize("robot", ["pi_robot", *rare("pedestal_pi", "porter")])
+@pytest.mark.parametrize("robot", ["pi_robot", "pedestal_pi", "porter"])
 @pytest.mark.soak
 def test_far_points_are_reached_for_and_very_far_ones_let_the_arm_rest_until_they_are_back(robot: str) -> None:
     chased, ahead = Chased(parts_of(robot)), AHEAD[robot]

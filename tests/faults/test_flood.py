@@ -16,7 +16,7 @@ from rbxcompose.sdk.ports import Qos
 from tests.conftest import ROOT
 from tests.faults.observer import COMMAND, MOTION, Observer
 from tests.faults.patrol import Patrol
-from tests.soak import Soak, rare
+from tests.soak import Soak
 
 RATE = 175_000  # [Hz]; beyond what a machine can send, it sends what it can
 QUICK, MANY = 2, 600  # [s]
@@ -93,7 +93,7 @@ def test_a_flood_is_refused_and_told_while_the_patrol_goes_on(soak: Soak, patrol
 
 
 @pytest.mark.timeout(MANY + 60)
-@pytest.mark.parametrize("what", ["requests", *rare("goals", "queries", "tokens")])
+@pytest.mark.parametrize("what", ["requests", "goals", "queries", "tokens"])
 @pytest.mark.soak
 def test_a_flood_of_questions_is_refused_while_the_patrol_goes_on(what: str, soak: Soak, patrol: Patrol) -> None:
     seconds = soak.examples(QUICK, FEW if what == "tokens" else MANY)

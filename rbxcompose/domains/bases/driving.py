@@ -1,12 +1,16 @@
-"""Driving to a pose: turn to it, drive, turn to its heading; and the least time that it takes."""
+"""Driving to a pose: turn to it, drive, turn to its heading; the least time that it takes; and the limits of a base."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
+from rbxcompose import sdk
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2, wrap_angle
 
+ABSURD = 2.0  # a command above this many times a limit is a fault of its sender, not a wish to go fast
+LIMITS = ("max_speed", "max_turn_rate", "acceleration", "turn_acceleration")
 ALIGNED = math.radians(6)  # bearing error below which the base starts to drive [rad]
 ASTRAY = math.radians(45)  # bearing error above which it stops and turns on the spot [rad]
 CORRECTION = 2.0  # turn rate per bearing error while driving [1/s]
@@ -14,6 +18,12 @@ AIM = 0.5  # part of a tolerance at which the base is commanded to rest; the rem
 RESTING = Velocity2(0.05, math.radians(5))  # below this the base counts as at rest [m/s, rad/s]
 PROGRESS = 0.02  # moving this far counts as progress [m]
 PROGRESS_TURN = math.radians(2)  # and so does turning this far [rad]
+
+
+def drives(config: Any, commands: str, odometry: str, **more: sdk.Setting[float] | None) -> sdk.Drives:
+    """Return what a base does with `commands`: its settings `LIMITS` limit them, and absurd ones are dropped."""
+    limits = {name: sdk.Setting(getattr(config, name), name) for name in LIMITS}
+    return sdk.Drives(commands, odometry, drops_above=sdk.Setting(ABSURD), **limits, **more)
 
 
 @dataclass(frozen=True, slots=True)

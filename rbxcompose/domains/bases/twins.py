@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from rbxcompose import sdk
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
+from rbxcompose.domains.bases.driving import ABSURD
 
-ABSURD = 2.0  # a command above this many times a limit is a fault of its sender, not a wish to go fast
 ROUNDING = 1e-12  # a smaller difference of velocities counts as none [m/s, rad/s]
 NOTHING_LEFT = 1e-9  # [s]; anything less is rounding from many small steps, not work
-LIMITS = ("max_speed", "max_turn_rate", "acceleration", "turn_acceleration")
-
-
-def drives(config: Any, commands: str, odometry: str, **more: sdk.Setting[float] | None) -> sdk.Drives:
-    """Return what a base does with commands: its settings `LIMITS` limit them, and absurd ones are dropped."""
-    limits = {name: sdk.Setting(getattr(config, name), name) for name in LIMITS}
-    return sdk.Drives(commands, odometry, drops_above=sdk.Setting(ABSURD), **limits, **more)
 
 
 @dataclass(frozen=True, slots=True)

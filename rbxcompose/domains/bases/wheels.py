@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
-from rbxcompose.domains.bases.twins import ABSURD
+from rbxcompose.domains.bases.driving import ABSURD
 
 ROUNDING = 1e-12  # a smaller difference of velocities counts as none [m/s, rad/s]
 

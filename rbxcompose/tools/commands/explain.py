@@ -30,9 +30,8 @@ def run(arguments: argparse.Namespace) -> int:
     code = _PREFIX + written.removeprefix(_PREFIX)
     found = kind_of(code) or all_kinds().get(written)  # of another package
     if found is None:
-        kinds = all_kinds()
-        family = [kind for kind in kinds if kind.startswith(code[: len(_PREFIX) + 2])]
-        hint = suggest(code, family or kinds, "codes")
+        family = [known for known in all_kinds() if known.startswith(code[: len(_PREFIX) + 2])]
+        hint = suggest(code, family or all_kinds(), "codes")
         return misused("explain", f"there is no code {arguments.code!r}; {hint}")
     emit(_as_json(found) if arguments.json else text_of(found).rstrip("\n"))
     return 0

@@ -10,7 +10,8 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Pose2, Transform3, Velocity2
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.bases.twins import DiffDriveCore, DiffDriveSettings, drives
+from rbxcompose.domains.bases.driving import drives
+from rbxcompose.domains.bases.twins import DiffDriveCore, DiffDriveSettings
 from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import Odometry

@@ -12,8 +12,8 @@ from rbxcompose.base.config import BitRate
 from rbxcompose.base.geometry import Pose2, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.bases import wheel_board
+from rbxcompose.domains.bases.driving import drives
 from rbxcompose.domains.bases.odometry_messages import odometry_message, odometry_transform
-from rbxcompose.domains.bases.twins import drives
 from rbxcompose.domains.bases.wheels import (
     BaseLimits,
     OdometryPolicy,

@@ -11,8 +11,8 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.config import AngularJerk, Config, Jerk, JointName, LinkName
 from rbxcompose.base.geometry import Velocity2
+from rbxcompose.domains.bases.driving import drives
 from rbxcompose.domains.bases.odometry_messages import odometry_message, odometry_transform
-from rbxcompose.domains.bases.twins import drives
 from rbxcompose.domains.bases.wheels import BaseLimits, OdometryPolicy, WheelDrive, WheelGeometry, WheelOdometry
 from rbxcompose.domains.servos.controller import ControlledJoint, Controller, ControllerConfig, controller
 from rbxcompose.manifest.fields import TopicName
