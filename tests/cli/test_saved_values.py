@@ -23,6 +23,7 @@ from rbxcompose.sdk import Component, Live, component
 from rbxcompose.sdk.parameters import settings
 from rbxcompose.tools.parameters.files import LiveSettings, NewTexts, compiled_as_it_runs, files_with, write
 from tests.conftest import ROOT
+from tests.soak import rare
 
 
 class Axis(Config):
@@ -253,7 +254,7 @@ def test_a_file_that_changes_before_it_is_written_stays(tmp_path: Path) -> None:
     assert "runtime: 50 s" in (tmp_path / "robot.yaml").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("robot", ["turtlebot", "rooms", "rover"])
+@pytest.mark.parametrize("robot", ["turtlebot", *rare("rooms", "rover")])
 def test_every_live_setting_of_shipped_robots_is_saved_in_one_line_or_refused(robot: str, tmp_path: Path) -> None:
     for name in ("robots", "missions"):
         shutil.copytree(ROOT / name, tmp_path / name)

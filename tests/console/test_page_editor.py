@@ -346,6 +346,7 @@ def test_a_dry_run_is_kept_as_a_test(open_page: Callable[..., Page], project: Pr
     expect(page.get_by_text("1 of 1 test passed")).to_be_visible(timeout=20_000)
 
 
+@pytest.mark.soak
 def test_tests_run_with_the_text_that_is_not_saved(open_page: Callable[..., Page], project: Project) -> None:
     test = "rbx: 1\nkind: Test\nname: it_fetches\nrobot: ../robots/fetcher/robot.yaml\nmission: fetch\n"
     test += "expect:\n  outcome: success\n"

@@ -318,6 +318,7 @@ machine:
 """
 
 
+@pytest.mark.soak
 def test_machines_are_drawn_and_a_box_chooses_its_state(open_page: Callable[..., Page], project: Project) -> None:
     project.file.write_text(NESTED_MACHINE, encoding="utf-8")
     page = edits(open_page(page_name="mission"))

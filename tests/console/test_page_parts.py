@@ -156,6 +156,7 @@ def test_a_part_that_carries_another_is_deleted_and_that_is_said(
     assert project.text() == BUILT
 
 
+@pytest.mark.soak
 def test_what_a_part_needs_is_asked_for(open_page: Callable[..., Page], project: EditedProject) -> None:
     page = open_page(page_name="model")
     panel = edits(page)

@@ -17,6 +17,7 @@ from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.sdk.bound import Ended, Outcome
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
+from tests.soak import rare
 
 TRAVEL = 0.04  # [m] for each turn
 TABLE = [(0.0, 0.0), (math.tau, 0.03), (2 * math.tau, 0.08)]  # a lever: not straight
@@ -70,7 +71,7 @@ class Lift:
 
 
 @pytest.mark.parametrize("joint", [{}, {"calibration": TABLE}, {"acceleration": 0.05}], ids=str)
-@pytest.mark.parametrize("model", ["XL430-W250", "MX-28"])
+@pytest.mark.parametrize("model", ["XL430-W250", *rare("MX-28")])
 def test_it_goes_where_it_should(model: str, joint: dict[str, Any]) -> None:
     lift = Lift(model=model, **joint)
     for wanted in (0.06, 0.01):

@@ -9,14 +9,14 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from anyio.from_thread import BlockingPortal, start_blocking_portal
-from mcp.client import Client
-from mcp.client.stdio import StdioServerParameters
-from mcp.shared.exceptions import MCPError
 
 from tests.conftest import ROOT
+
+if TYPE_CHECKING:  # importing it takes a second, and each worker collects these tests
+    from mcp.client import Client
 
 
 class ToolClient:
@@ -58,6 +58,8 @@ class ToolClient:
         """Call a tool, cancel the call at once, and return what the client says of that."""
         self.called.append(tool)
         call = partial(self._client.call_tool, tool, given, read_timeout_seconds=0.1)
+        from mcp.shared.exceptions import MCPError
+
         try:
             self._portal.call(call)
         except MCPError as error:
@@ -71,6 +73,8 @@ class ToolClient:
     def read(self, uri: str) -> str:
         """Return the text of a resource, or why there is none."""
         self.called.append("resources/read")
+        from mcp.shared.exceptions import MCPError
+
         try:
             contents: Any = self._portal.call(self._client.read_resource, uri).contents
         except MCPError as error:
@@ -81,6 +85,9 @@ class ToolClient:
 @contextmanager
 def served(folder: Path, environment: Mapping[str, str], *options: str) -> Iterator[ToolClient]:
     """Start a server for a project, and connect a client."""
+    from mcp.client import Client
+    from mcp.client.stdio import StdioServerParameters
+
     whole = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
     words = ["-m", "rbxcompose", "mcp", *options]
     server = StdioServerParameters(command=sys.executable, args=words, cwd=folder, env=whole)

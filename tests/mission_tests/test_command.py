@@ -20,19 +20,24 @@ SOAKED = {  # of each there is another one, or what they do is tried in `tests/n
     f"{name}.test.yaml"
     for name in (
         "around_obstacles",
+        "carry_a_tool",
+        "carry_upright",
         "draw_triangle",
         "fast_and_slow",
         "find_dock",
         "follow_me",
         "follow_with_the_hand",
         "lead_by_hand",
+        "look_around",
         "pedestal_pick_what_is_seen",
         "pick_tagged",
         "pick_what_is_seen",
         "porter_follow_with_the_hand",
         "porter_pick_what_is_seen",
+        "poses_and_gripper",
         "reach_and_shift",
         "return_to_where_it_was",
+        "tuck",
     )
 }
 PATROL = "missions/tests/patrol.test.yaml"

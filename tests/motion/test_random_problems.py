@@ -22,7 +22,7 @@ from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 from rbxcompose.domains.body.model import Geometry
 from tests.motion.toy_arm import Array
 from tests.shipped import robot_and_plan
-from tests.soak import Soak
+from tests.soak import Soak, rare
 
 QUICK, MANY = 3, 250  # problems for each robot and way of searching
 TIME = 0.5  # [s] of a search, counted by the positions that it examines: no clock runs
@@ -111,7 +111,7 @@ def wrong_with(works: ArmWorks, asked: Problem, trajectory: Trajectory) -> str:
 
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("is_fast", [False, True], ids=["by OMPL", "fast"])
-@pytest.mark.parametrize("robot", ["pi_robot", "porter"])
+@pytest.mark.parametrize("robot", ["porter", *rare("pi_robot")])
 def test_what_is_called_a_plan_may_be_followed_and_what_is_none_has_a_reason(
     robot: str, is_fast: bool, soak: Soak
 ) -> None:

@@ -135,7 +135,7 @@ def test_the_template_has_jobs_with_reports() -> None:
     assert job("test missions")["artifacts"]["reports"]["junit"] == "rbxcompose-tests.xml"
 
 
-@pytest.mark.parametrize("name", ["check robots", "test missions"])
+@pytest.mark.parametrize("name", ["check robots", *rare("test missions")])
 def test_the_lines_of_a_job_run_and_leave_what_it_keeps(project: Path, name: str) -> None:
     one = job(name)
     for part in ("before_script", "script", "after_script"):

@@ -254,6 +254,7 @@ def test_after_a_stop_it_begins_anew_and_still_gets_away(folder: Path) -> None:
     assert abs(robot.pose.heading) > 0.9
 
 
+@pytest.mark.soak
 def test_the_robot_that_ships_meets_everything_and_does_not_fall() -> None:
     _, plan = robot_and_plan("kobuki")
     robot = Kobuki(plan)

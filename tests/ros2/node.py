@@ -13,7 +13,7 @@ from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.action import ActionClient, ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.executors import MultiThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
@@ -97,7 +97,7 @@ class OtherNode(Node):  # type: ignore[misc]  # rclpy is not here
 def main() -> None:
     """Spin until it is interrupted."""
     rclpy.init(args=sys.argv)
-    executor = MultiThreadedExecutor(4)
+    executor = SingleThreadedExecutor()  # one of several threads keeps a processor busy
     executor.add_node(OtherNode())
     try:
         executor.spin()

@@ -15,6 +15,7 @@ import pytest
 from rbxcompose.bus.zenoh_session import tls_settings
 from rbxcompose.compiler.systems.certificates import make_authority, make_certificate, tls_of
 from tests.conftest import ROOT
+from tests.soak import rare
 from tests.systems.test_links import free_port
 
 pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl")
@@ -50,7 +51,7 @@ class Routers:
         return process, process.stdout.readline()
 
 
-@pytest.mark.parametrize("protocol", ["tls", "quic"])
+@pytest.mark.parametrize("protocol", ["tls", *rare("quic")])
 def test_only_a_valid_certificate_of_the_system_is_let_in(protocol: str, tmp_path: Path) -> None:
     ours, theirs = tmp_path / "ours", tmp_path / "theirs"
     listener, friend = proof(ours, "robot"), proof(ours, "desk")
