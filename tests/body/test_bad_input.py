@@ -37,6 +37,7 @@ SLOW = (
     "a long list",
     "much text",
     "100,000 elements in xacro",
+    "a circle of 10,000 joints",
     "10,000 links in a star",
     "10,000 links of their own",
     "10,000 joints without links",

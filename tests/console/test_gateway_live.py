@@ -540,6 +540,7 @@ def test_bad_frames_close_at_most_their_own_connection(robot: Robot) -> None:
     assert get("/console/config")[0] == 200
 
 
+@pytest.mark.soak
 def test_a_place_is_moved_in_the_file_of_the_robot_that_runs(robot: Robot) -> None:
     before = robot.file.read_text(encoding="utf-8")
 

@@ -256,6 +256,7 @@ def test_a_path_and_a_scan_are_drawn_in_their_frames(open_page: Callable[..., Pa
     wait_for_colour(page, 1.0, 0.25, [20, 113, 58, 255])
 
 
+@pytest.mark.soak
 def test_zones_are_hatched_and_the_world_is_outlined_if_wanted(
     open_page: Callable[..., Page], rolling: FakeGateway
 ) -> None:
@@ -390,6 +391,7 @@ def test_the_robot_is_told_where_it_is_if_something_listens(
     assert len(rolling.goals()) == 1
 
 
+@pytest.mark.soak
 def test_a_distance_is_measured(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
     page = open_page(page_name="map")
     tool(page, "Measure").click()

@@ -216,6 +216,7 @@ def test_a_goal_of_an_arm_is_planned_shown_and_executed(open_page: Callable[...,
     assert violations(page) == []
 
 
+@pytest.mark.soak
 def test_a_pose_that_cannot_be_reached_says_why_and_nothing_is_executed(
     open_page: Callable[..., Page], crane: FakeGateway
 ) -> None:

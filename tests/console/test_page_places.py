@@ -219,7 +219,7 @@ def test_many_mistakes_can_be_read_by_keys(open_page: Callable[..., Page], proje
     ("label", "text", "why"),
     [
         ("x", "NaN m", "must be a length"),
-        ("Name", "window_seat", "it is taken"),
+        pytest.param("Name", "window_seat", "it is taken", marks=pytest.mark.soak),
         pytest.param("x", "1e300", "must be a length", marks=pytest.mark.soak),
         pytest.param("x", "9999999 m", "farther away", marks=pytest.mark.soak),
         pytest.param("Heading", "3 m", "must be an angle", marks=pytest.mark.soak),

@@ -91,6 +91,7 @@ def test_a_robot_that_starts_programs_is_not_tried(editor: MissionEditor, projec
         ask(editor, "try", text=FETCH)
 
 
+@pytest.mark.soak
 def test_the_tests_of_a_mission_run_with_coverage(editor: MissionEditor, project: Path) -> None:
     with pytest.raises(Refused, match="there are no tests of 'fetch'"):
         ask(editor, "test", text=FETCH)

@@ -19,11 +19,13 @@ from tests.soak import Soak
 SOAKED = {  # of each there is another one, or what they do is tried in `tests/navigation` and `tests/components`
     f"{name}.test.yaml"
     for name in (
+        "arm_and_head",
         "around_obstacles",
         "carry_a_tool",
         "carry_upright",
         "draw_triangle",
         "fast_and_slow",
+        "fetch_and_carry",
         "find_dock",
         "follow_me",
         "follow_with_the_hand",
@@ -38,6 +40,7 @@ SOAKED = {  # of each there is another one, or what they do is tried in `tests/n
         "reach_and_shift",
         "return_to_where_it_was",
         "tuck",
+        "tucked_patrol",
     )
 }
 PATROL = "missions/tests/patrol.test.yaml"

@@ -17,6 +17,7 @@ from rbxcompose.domains.arms.motion.compiled_collisions import near_pairs, works
 from rbxcompose.domains.arms.motion.library import Library, flat
 from rbxcompose.domains.arms.motion.numba_cache import CompiledFunction, borrowed, can_link, compiled, inlined, is_empty
 from tests.motion.toy_arm import fast_planner
+from tests.soak import rare
 
 Array = NDArray[np.float64]
 pytestmark = pytest.mark.skipif(not can_link(), reason="there is no linker")
@@ -71,7 +72,9 @@ def test_a_library_answers_as_numba(kept: CompiledFunction) -> None:
     assert found == asked(kept.dispatcher, TABLE)
 
 
-@pytest.mark.parametrize("table", [np.asfortranarray(TABLE), TABLE.astype(np.float32), np.repeat(TABLE, 2, 0)[::2]])
+@pytest.mark.parametrize(
+    "table", [np.asfortranarray(TABLE), *rare(TABLE.astype(np.float32), np.repeat(TABLE, 2, 0)[::2])]
+)
 def test_other_arrays_are_left_to_numba(kept: CompiledFunction, table: Array) -> None:
     assert asked(kept, table) == asked(kept.dispatcher, TABLE.astype(table.dtype))
     assert "dispatcher" in vars(kept)

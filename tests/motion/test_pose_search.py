@@ -106,6 +106,7 @@ def test_no_small_step_gets_nearer_than_what_is_approximate_and_the_start_is_not
     assert order == sorted(order)
 
 
+@pytest.mark.soak
 @settings(max_examples=3)
 @given(SEEDS)
 def test_plain_and_compiled_code_get_as_near(seed: int) -> None:

@@ -58,6 +58,7 @@ def test_a_robot_pushes_what_is_light_and_stalls_before_what_stands_fast(tmp_pat
     assert touched[0] == "crate"
 
 
+@pytest.mark.soak
 def test_a_kobuki_bumps_backs_off_and_goes_on(repository: Path) -> None:
     sets = ("simulator=physics",)
     plan = compile_robot("robots/kobuki", sets=sets, environment={}).plan

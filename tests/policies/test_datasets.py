@@ -292,6 +292,7 @@ def test_without_the_extra_it_says_how_to_install_it(tmp_path: Path, monkeypatch
     assert "pip install 'rbxcompose[lerobot]'" in made(tmp_path, "--from", "r.mcap", code=1)
 
 
+@pytest.mark.soak
 def test_of_two_who_add_to_a_data_set_one_waits(data_set: Path, tmp_path: Path) -> None:
     shutil.copytree(data_set, tmp_path / "picks")
     write_recording(tmp_path / "r.mcap", arm_with_cameras())

@@ -102,6 +102,7 @@ def test_rerun_loads_each_topic_with_the_frames_and_the_body(patrol: Path, rerun
     assert any(entity.startswith("/turtlebot/visual_geometries/") for entity in entities), "the body is drawn"
 
 
+@pytest.mark.soak
 def test_rerun_loads_a_tape_too(tape: Path, rerun: list[str], tmp_path: Path) -> None:
     words = [*rerun, "mcap", "convert", str(tape), "-o", str(tmp_path / "tape.rrd")]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)

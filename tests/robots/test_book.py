@@ -12,6 +12,7 @@ from rbxcompose.commands.formats.text import render_text
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.testing.bench import Ran, run_robot
+from tests.soak import rare
 
 FOLDER = Path(__file__).parents[2] / "robots"
 ROBOTS = ("rooms", "patroller")
@@ -54,7 +55,7 @@ def test_a_robot_has_no_findings(robot: str) -> None:
     assert list(compiled(robot, "tired").report) == []
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", ["rooms", *rare("patroller")])
 def test_each_mission_does_what_it_should(robot: str, subtests: pytest.Subtests) -> None:
     for mission in missions_of(robot):
         with subtests.test(mission):

@@ -23,6 +23,7 @@ from rbxcompose.testing import Bench
 from tests.commands import command
 from tests.conftest import ROOT
 from tests.forked import run_command
+from tests.soak import rare
 
 PAN, LIFT = "head_pan_joint", "right_arm_shoulder_lift_joint"
 LIFT_ID = 4
@@ -170,7 +171,7 @@ def follow_the_book(stage: Stage) -> None:
     stage.relax(LIFT)
 
 
-@pytest.mark.parametrize("level", ["ideal", "servo"])
+@pytest.mark.parametrize("level", ["servo", *rare("ideal")])
 def test_simulated_joints_do_what_the_book_commands_and_start_again_where_they_were_turned(level: str) -> None:
     stage = Stepped(level)
     follow_the_book(stage)

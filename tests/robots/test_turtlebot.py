@@ -97,6 +97,7 @@ def test_a_corner_that_was_moved_is_visited_where_it_is_now() -> None:
     assert pose(run.bench).distance(Pose2(-0.5, 0.0)) < 0.05
 
 
+@pytest.mark.soak
 def test_the_threshold_decides_how_often_it_docks() -> None:
     assert (
         sum(text == "2.1.2 Recharge" for text in done(ran("missions.patrol.with.low=10 %", "battery.runtime=2 min")))

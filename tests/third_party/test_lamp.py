@@ -140,6 +140,7 @@ def test_its_messages_are_those_of_its_texts() -> None:
     assert (LAMP / "rbx_lamp/msgs.py").read_text(encoding="utf-8") == make_messages.text()
 
 
+@pytest.mark.soak
 def test_a_robot_that_does_not_use_it_does_not_import_it(installed: Installed) -> None:
     installed.robot("other", "type: lamp\n    period: 500 ms", "type: battery_sim\n    runtime: 45 s")
     out = installed.run("-c", IS_IMPORTED)

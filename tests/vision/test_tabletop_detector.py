@@ -138,9 +138,18 @@ def test_things_have_names_shapes_and_places_and_a_tag_names_its_thing(tmp_path:
 @pytest.mark.parametrize(
     ("world", "depth", "goal", "outcome", "why"),
     [
-        (TABLE, True, {"duration": 0.7}, "none_found", "nothing stands on the table"),
+        pytest.param(
+            TABLE, True, {"duration": 0.7}, "none_found", "nothing stands on the table", marks=pytest.mark.soak
+        ),
         (TABLE + THINGS, True, {"least": 3, "duration": 0.7}, "too_few", "2 of 3 things stand on the table"),
-        (TABLE.replace("z: 70 cm", "z: 5 cm"), True, {"duration": 1.0}, "no_table", "nothing as large as a table"),
+        pytest.param(
+            TABLE.replace("z: 70 cm", "z: 5 cm"),
+            True,
+            {"duration": 1.0},
+            "no_table",
+            "nothing as large as a table",
+            marks=pytest.mark.soak,
+        ),
         (TABLE + THINGS, False, {"duration": 3.0}, "not_seen", "no cloud on 'eye/points' for"),
     ],
 )
