@@ -52,7 +52,7 @@ def pytest_configure(config: pytest.Config) -> None:
     many = bool(config.getoption("--soak"))
     settings.register_profile(
         "rbxcompose",
-        max_examples=300 if many else 8,
+        max_examples=300 if many else 5,
         derandomize=not many,  # what `make test` says does not depend on luck; `make soak` looks for what nobody tried
         deadline=None,
         suppress_health_check=[HealthCheck.too_slow],  # it is the machine that is slow, as with deadlines

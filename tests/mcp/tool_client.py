@@ -56,10 +56,10 @@ class ToolClient:
 
     def gives_up(self, tool: str, **given: Any) -> str:
         """Call a tool, cancel the call at once, and return what the client says of that."""
-        self.called.append(tool)
-        call = partial(self._client.call_tool, tool, given, read_timeout_seconds=0.1)
         from mcp.shared.exceptions import MCPError
 
+        self.called.append(tool)
+        call = partial(self._client.call_tool, tool, given, read_timeout_seconds=0.1)
         try:
             self._portal.call(call)
         except MCPError as error:
@@ -72,9 +72,9 @@ class ToolClient:
 
     def read(self, uri: str) -> str:
         """Return the text of a resource, or why there is none."""
-        self.called.append("resources/read")
         from mcp.shared.exceptions import MCPError
 
+        self.called.append("resources/read")
         try:
             contents: Any = self._portal.call(self._client.read_resource, uri).contents
         except MCPError as error:
