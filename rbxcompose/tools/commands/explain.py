@@ -28,10 +28,12 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     written = arguments.code.upper()
     code = _PREFIX + written.removeprefix(_PREFIX)
-    found = kind_of(code) or all_kinds().get(written)  # of another package
+    found = kind_of(code)
+    kinds = {} if found else all_kinds()  # those of other packages, too
+    found = found or kinds.get(written)
     if found is None:
-        family = [known for known in all_kinds() if known.startswith(code[: len(_PREFIX) + 2])]
-        hint = suggest(code, family or all_kinds(), "codes")
+        family = [known for known in kinds if known.startswith(code[: len(_PREFIX) + 2])]
+        hint = suggest(code, family or kinds, "codes")
         return misused("explain", f"there is no code {arguments.code!r}; {hint}")
     emit(_as_json(found) if arguments.json else text_of(found).rstrip("\n"))
     return 0
