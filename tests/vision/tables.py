@@ -38,4 +38,5 @@ def cloud(
     """Return what a camera measures (h, w, 3) [m], nan where that is nothing; `noise` is that of a depth of 1 m."""
     depths = WorldView(SimulatedWorld("", shapes=tuple(shapes))).seen(pose, camera, 0.0, 10.0).depths.astype(float)
     depths += np.random.default_rng(seed).normal(0.0, noise, depths.shape) * np.nan_to_num(depths, posinf=0.0) ** 2
-    return np.asarray(camera.rays * np.where(np.isfinite(depths), depths, math.nan)[:, :, None])
+    depths[~np.isfinite(depths)] = math.nan
+    return np.asarray(camera.rays * depths[:, :, None])

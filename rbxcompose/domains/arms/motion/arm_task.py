@@ -270,7 +270,7 @@ class ArmTask:
         shifts = np.random.default_rng(self._planner.settings.seed).uniform(-off, off, (NEARBY, len(aim)))
         near = space.clamped(np.concatenate(([aim], aim + shifts)))
         free = [item for item in near if np.max(np.abs(item - aim)) <= off and is_free(item)]
-        return sorted(free, key=lambda one: float(np.max(np.abs(one - aim))))[: inverse_kinematics.ENOUGH] or [aim]
+        return list(inverse_kinematics.by_distance(free, aim)[: inverse_kinematics.ENOUGH]) or [aim]
 
     def _frame(self) -> Transform3:
         """Return the frame of the goal."""

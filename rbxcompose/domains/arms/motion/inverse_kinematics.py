@@ -147,11 +147,12 @@ def solved(search: PoseSearch) -> Generator[None, None, PoseSolutions]:
         if len(free) >= search.enough or search.is_late() or not len(firsts):
             break
         yield
-    return PoseSolutions(_sorted(free, start), _sorted(colliding, start), nearest, attempts)
+    return PoseSolutions(by_distance(free, start), by_distance(colliding, start), nearest, attempts)
 
 
-def _sorted(found: list[Array], start: Array) -> tuple[Array, ...]:
-    return tuple(sorted(found, key=lambda values: float(np.max(np.abs(values - start)))))
+def by_distance(found: Sequence[Array], start: Array) -> tuple[Array, ...]:
+    """Return positions, first those to which the joint that moves furthest moves least."""
+    return tuple(sorted(found, key=lambda values: float(np.abs(values - start).max())))
 
 
 def descended(

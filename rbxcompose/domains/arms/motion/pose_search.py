@@ -245,6 +245,6 @@ def kept_solutions(
         if len(free) >= inverse_kinematics.ENOUGH + len(guesses) - 1:
             break
         yield
-    by_distance = [sorted(item, key=lambda values: float(np.max(np.abs(values - start)))) for item in (free, colliding)]
-    ordered = tuple(by_distance[0]) if posture is None else nearest_first(space, posture, by_distance[0])
-    return inverse_kinematics.PoseSolutions(ordered, tuple(by_distance[1]), nearest, attempts)
+    near, not_free = (inverse_kinematics.by_distance(item, start) for item in (free, colliding))
+    ordered = near if posture is None else nearest_first(space, posture, near)
+    return inverse_kinematics.PoseSolutions(ordered, not_free, nearest, attempts)
