@@ -19,7 +19,6 @@ ROS_2 = "ros__parameters"
 _DUMPED = "dictitems"  # what Python's classes of maps are written as
 _GROUPS = "groups"
 _OF_A_GROUP = frozenset({"id", "name", "parameters", "parent", "state", "type"})
-ALL_NODES = "/**"
 _TOPIC = re.compile(r"/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*")
 
 

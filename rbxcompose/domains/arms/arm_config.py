@@ -262,10 +262,6 @@ class ArmWorks:
         return tuple(self.kinematics.tip_pose(values).translation for values in some)
 
 
-def _as_it_is(checker: collisions.MeshChecker) -> collisions.Checker:
-    return checker
-
-
 def _hastened() -> Callable[[collisions.MeshChecker], collisions.Checker]:
     """Return what makes a checker that gives the same answers, and searches fast.
 

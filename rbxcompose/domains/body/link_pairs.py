@@ -39,8 +39,6 @@ PairReason = Literal["adjacent", "always", "user", "default", "never"]
 REASONS: tuple[PairReason, ...] = get_args(PairReason)
 """A joint connects them; they collided in all positions that were tried; somebody said so; they collide at rest, and
 not always, so that a shape or the rest is wrong; they collided in none."""
-IGNORED: tuple[PairReason, ...] = ("adjacent", "always", "user")
-"""Reasons for which arms do not watch a pair at all."""
 
 
 @dataclass(frozen=True, slots=True)

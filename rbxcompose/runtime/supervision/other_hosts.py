@@ -115,14 +115,6 @@ class OtherHosts:
         self._effects.log(Level.WARN, text)
         self._send(messages.Lost([instance.name for instance in host.instances], text))
 
-    def told_lost(self) -> Iterator[messages.Lost]:
-        """Yield what a process must know that has missed it."""
-        for name, known in self._known.items():
-            if known.is_lost:
-                yield messages.Lost(
-                    [instance.name for instance in self._others[name].instances], f"host '{name}' does not answer"
-                )
-
     # Starting together
 
     def reached(self, instances: Iterable[Instance]) -> Iterator[Instance]:

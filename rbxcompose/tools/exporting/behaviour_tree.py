@@ -26,10 +26,8 @@ from rbxcompose.tools.behaviour_trees.forest_importer import assignments_script,
 from rbxcompose.tools.behaviour_trees.nodes import CANNOT_EXPORT, NODES, TWIN
 from rbxcompose.tools.behaviour_trees.scripts import ScriptError, condition, script_of, statements, text_of, unplaced
 
-_NO_OPTION = ("none", "written", "false", "stop", "all", "any")
 _HELP = "write it with what BehaviorTree.CPP has, or keep this mission here"
 _ATTRIBUTES = {"on_success": "_onSuccess", "on_failure": "_onFailure", "on_halt": "_onHalted"}
-_DIRECTIONS = ("input", "output")
 
 
 @dataclass(slots=True)

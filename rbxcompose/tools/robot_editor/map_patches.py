@@ -13,7 +13,6 @@ from rbxcompose.tools.mission_editor.patch import TextEdit, TextPatch
 from rbxcompose.tools.mission_editor.yaml_places import Path, PlacedNode, PlainTree, TextLines, placed
 
 INDENT = 2
-MERGE = "<<"
 _BY_HAND = "change it in the file"
 _SCALAR = (None, None, "")  # the mark of a scalar without quotes
 _BLOCK = (None, None)  # of a map

@@ -170,11 +170,6 @@ class Keep:
     """What a sensor sees."""
 
     @property
-    def is_any(self) -> bool:
-        """Return whether it asks for nothing."""
-        return not (self.is_about_tip or self.joints)
-
-    @property
     def is_about_tip(self) -> bool:
         """Return whether it asks for something besides ranges of joints."""
         return any(self.turned) or any(self.inside) or self.sight is not None

@@ -13,7 +13,6 @@ from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 from rbxcompose.domains.arms.section_models import OMPL
 
 IsFree = Callable[[Array], bool]
-Ompl = Any  # of an extra, without types
 
 SLICE = 2_000  # examined positions, after which a search lets others run
 SHORTCUTS = 60  # attempts to shorten a path
