@@ -17,8 +17,9 @@ from rbxcompose.msgs.rcl_interfaces import Parameter, ParameterValue
 from rbxcompose.msgs.types import Message
 from rbxcompose.runtime.log import Record
 from rbxcompose.runtime.process_group.host import Host, Notice
+from rbxcompose.runtime.process_group.parameters import Deciders
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.parameters import changed, to_message
+from rbxcompose.sdk.parameters import RobotRules, changed, to_message
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.sdk.robot_events import MissionOver
@@ -42,11 +43,16 @@ def instance(
 class Bench:
     """Instances, or a whole `plan`, in one process on a stepped clock, configured and active immediately.
 
-    `records` holds what they logged, `events` what they reported to the supervisor.
+    `records` holds what they logged, `events` what they reported to the supervisor; live settings keep `rules`.
     """
 
     def __init__(
-        self, *instances: Instance, plan: Plan | None = None, start: bool = True, clock: SteppedClock | None = None
+        self,
+        *instances: Instance,
+        plan: Plan | None = None,
+        start: bool = True,
+        clock: SteppedClock | None = None,
+        rules: RobotRules | None = None,
     ) -> None:
         self.clock = clock or SteppedClock()
         self.scheduler = Scheduler()
@@ -67,6 +73,7 @@ class Bench:
             self.bus,
             self.records.append,
             self.events.append,
+            deciders=Deciders(rules=rules),
         )
         self.host.configure()
         self.host.activate([one.name for one in self.plan.instances])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import field
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 
@@ -17,15 +17,15 @@ from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.sdk.parameters import ChangeRefusal, Configs
 
 
-@dataclass(slots=True)
+@dataclass
 class LiveRules:
     """The rules of a compiled robot; a supervisor's judge asks them in a process of its own."""
 
     robot: Robot
-    _checks: SettingChecks = field(init=False)
 
-    def __post_init__(self) -> None:
-        self._checks = SettingChecks(self.robot)
+    @cached_property
+    def _checks(self) -> SettingChecks:
+        return SettingChecks(self.robot)
 
     def remade(self, file: str, layers: ChosenLayers) -> LiveRules | None:
         """Return the rules of the robot as its files are now, with these layers; None if they have errors."""

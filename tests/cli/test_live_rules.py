@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.base.config import Bound, Config
+from rbxcompose.commands.main import main as command
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.diff import difference
 from rbxcompose.compiler.plan.dump import dump, load
@@ -103,6 +104,22 @@ do:
   - set_parameter: {component: go_to, parameter: speed, value: 0.4 m/s}
   - set_parameter: {component: go_to, parameter: speed, value: 0.55 m/s}
 """
+
+
+def test_a_test_and_a_trial_of_a_mission_keep_them_as_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = ROBOT.replace("components:", "missions: {hurry: hurry.yaml}\ncomponents:", 1)
+    (tmp_path / "robot.yaml").write_text(text)
+    (tmp_path / "hurry.yaml").write_text(MISSION)
+    test = "rbx: 1\nkind: Test\nname: hurried\nrobot: robot.yaml\nmission: hurry\nexpect: {outcome: failure}\n"
+    (tmp_path / "hurried.test.yaml").write_text(test)
+    assert command(["test", "hurried.test.yaml"]) == 0
+    command(["mission", "try", "hurry", "robot.yaml"])
+    assert (
+        "failure: hurry.yaml:6: 'go_to' drives at 0.55 m/s, but its base 'base' can do 0.5" in capsys.readouterr().out
+    )
 
 
 @pytest.mark.parametrize("pace", [(), ("--rate", "max")])

@@ -221,6 +221,7 @@ def test_after_a_release_a_paused_mission_is_in_the_way_like_one_that_runs(tmp_p
         ("{mission: home}", "needs one of at, cron, when, message, at_start, ends"),
         ('{at: "22:00", at_start: true, mission: home}', "it has 'at' and 'at_start'"),
         ("{at_start: true, on: [mon], mission: home}", "has 'on', which belongs to 'at'"),
+        ('{at: "22:00", on: [], mission: home}', "'on' must have at least 1 entry"),
         ('{at: "25:00", mission: home}', "must be a time of day"),
         ("{cron: 0 22 * *, mission: home}", "must have 5 fields"),
         ("{when: $battery < 15 s, mission: home}", "RBX4106"),

@@ -220,6 +220,18 @@ def test_what_only_looks_like_a_file_is_told(tmp_path: Path, capsys: pytest.Capt
     assert "opened" not in captured.out + captured.err
 
 
+def test_a_file_that_is_called_a_test_and_is_none_is_a_mistake(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "cut.test.yaml").touch()
+    (tmp_path / "slip.test.yaml").write_text("rbx: 1\nkind: test\nname: a\n")
+    (tmp_path / ".#slip.test.yaml").touch()
+    assert command(["test", str(tmp_path)]) == 1
+    captured = capsys.readouterr()
+    assert [captured.err.count(code) for code in ("error[RBX1102]", "error[RBX1304]", "error[")] == [1, 1, 2]
+    assert "did you mean 'Test'?" in captured.err
+
+
 def test_nothing_that_a_user_wrote_reaches_the_terminal_raw(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "a.test.yaml").write_text('rbx: 1\nkind: Test\nname: "\\e[31mred"\nrobot: robot.yaml\nmission: m\n')
     junit = tmp_path / "junit.xml"

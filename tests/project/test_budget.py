@@ -52,12 +52,12 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/vision": Cost(code=2602, files=31, small=1, imports=354),
     "domains/worlds": Cost(code=4629, files=41, small=4, imports=561),
     "manifest": Cost(code=3509, files=26, small=1, imports=277),
-    "missions": Cost(code=12299, files=135, small=19, imports=1301),
+    "missions": Cost(code=12301, files=135, small=19, imports=1302),
     "msgs": Cost(code=1558, files=16, small=3, imports=107),
     "runtime": Cost(code=7597, files=46, small=1, imports=712),
     "sdk": Cost(code=1467, files=12, small=2, imports=156),
-    "testing": Cost(code=635, files=7, small=2, imports=78),
-    "tools": Cost(code=18212, files=143, small=10, imports=1975),
+    "testing": Cost(code=642, files=7, small=2, imports=79),
+    "tools": Cost(code=18213, files=143, small=10, imports=1976),
 }
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 

@@ -34,7 +34,7 @@ class TriggerModel(Config):
     """The mission that it starts."""
     at: Annotated[str, AfterValidator(_time)] | None = None
     """A time of day, such as `22:00`."""
-    on: tuple[Literal["mon", "tue", "wed", "thu", "fri", "sat", "sun"], ...] = ()
+    on: tuple[Literal["mon", "tue", "wed", "thu", "fri", "sat", "sun"], ...] = Field((), min_length=1)
     """Days of the week for `at`; without it, every day."""
     cron: Annotated[str, AfterValidator(_cron)] | None = None
     """Times in the five fields of cron: minute, hour, day of the month, month, day of the week."""

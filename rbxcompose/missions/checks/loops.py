@@ -16,6 +16,7 @@ from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.facts import Constants, constants_of
 from rbxcompose.missions.analysis.scope_types import View
 from rbxcompose.missions.engine.world import POSE
+from rbxcompose.missions.program.outcomes import ANY, either
 from rbxcompose.missions.program.program import MissionNode, Program
 
 _MAY_BE = (TypeKind.PLACE, TypeKind.POSE, TypeKind.TEXT, TypeKind.UNKNOWN)  # a text may name a place
@@ -76,7 +77,8 @@ def never_waits(mission: Examined) -> Iterator[Finding]:
         node = view.node
         if view.waits:
             continue
-        ends = mission.ending.of(node.number)
+        below = (one.step.ends_mission for one in mission.program.below(node.number))
+        ends = either((mission.ending.of(node.number), *(ANY.of(result) for result in below if result)))
         for advice in (node.step.endless(ends), *(modifier.endless for modifier in node.modifiers.values())):
             if advice:
                 yield never_waits.at(node.span, advice.message, help=advice.help)

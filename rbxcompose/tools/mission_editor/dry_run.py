@@ -96,7 +96,7 @@ def tried(made: Compilation, mission: str) -> tuple[TrialRecord, _Watching, Prog
     where = Span(program.file, 1, 1, 1, 1)
     inputs: Any = robot.missions[mission].inputs
     trial = Trial(
-        "dry run", "", program.file, where, mission, program, linked, names, plan, inputs, {}, (),
+        "dry run", "", program.file, where, mission, program, linked, robot, plan, inputs, {}, (),
         Expectations(until=LONGEST), is_complete=False,
     )  # fmt: skip
     run = RobotRun(trial, seen)

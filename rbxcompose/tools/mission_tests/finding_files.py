@@ -15,22 +15,23 @@ _SUFFIXES = (".yaml", ".yml")
 def tests_of(paths: Iterable[Path]) -> list[Path]:
     """Return the tests that paths mean; a file that is named is one, whatever it contains.
 
-    So is what cannot be a file although its name is that of one, such as a pipe: reading it gives the finding.
+    So is what has the name of one, such as an empty file or a pipe: reading it gives the finding.
     """
     found: dict[Path, None] = {}
     for path in paths:
-        below = sorted(one for one in path.rglob("*") if is_test(one) or _is_odd(one)) if path.is_dir() else [path]
+        below = sorted(filter(_may_be_test, path.rglob("*"))) if path.is_dir() else [path]
         found.update((one.absolute() if _is_odd(one) else one.resolve(), None) for one in below)
     return list(found)
 
 
-def _is_odd(path: Path) -> bool:
-    """Return whether a name is that of a test, but leads to a pipe, a device or nothing that can be read.
+def _may_be_test(path: Path) -> bool:
+    """Return whether a file is a test, or is called one; hidden ones are left out: editors keep theirs there."""
+    is_called_one = path.name.endswith(_TESTS) and not path.name.startswith(".")
+    return is_test(path) or (is_called_one and (path.is_file() or _is_odd(path)))
 
-    Hidden ones are left out: editors mark open files by links to nowhere.
-    """
-    if path.name.startswith(".") or not path.name.endswith(_TESTS):
-        return False
+
+def _is_odd(path: Path) -> bool:
+    """Return whether a path leads to a pipe, a device or nothing that can be read."""
     try:
         mode = path.stat().st_mode
     except OSError:  # such as a link to itself

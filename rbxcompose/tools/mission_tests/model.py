@@ -9,6 +9,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.values import Scope, Value
 from rbxcompose.base.findings import Span
 from rbxcompose.base.requests import Command
+from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.missions.analysis.effects import sent_by
 from rbxcompose.missions.analysis.examined import Ending
@@ -136,13 +137,18 @@ class Trial:
     mission: str
     program: Program
     linked: Program
-    names: RobotNames
+    robot: Robot
     plan: Plan
     inputs: Mapping[str, Value]
     mocks: Mapping[str, Mock]
     events: tuple[TrialEvent, ...]
     expect: Expectations
     is_complete: bool
+
+    @property
+    def names(self) -> RobotNames:
+        """Return the names that the robot gives to its missions."""
+        return self.robot.names
 
 
 def missions_in(program: Program) -> Iterator[Program]:

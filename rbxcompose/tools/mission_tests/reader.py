@@ -674,7 +674,7 @@ def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial 
         chosen.text,
         program,
         linked,
-        names,
+        robot,
         plan,
         inputs,
         mocks,

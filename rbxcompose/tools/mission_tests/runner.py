@@ -24,6 +24,7 @@ from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.sdk.registry import declared
 from rbxcompose.testing.bench import Bench
+from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.mission_tests.coverage import SeenWays
 from rbxcompose.tools.mission_tests.judge import UnmetExpectation, judge
 from rbxcompose.tools.mission_tests.model import FAILS, SUCCEEDS, EventDeed, Mock, Trial, TrialEvent, ValueSetting
@@ -334,7 +335,7 @@ class RobotRun:
         self.ended: WhenEnded = lambda leaf, result: None  # notifies the engine, once there is one
         self.events = list(trial.events)  # events still to come
         plan = _with_mission(trial.plan, trial)
-        self.bench = Bench(plan=plan, start=False)
+        self.bench = Bench(plan=plan, start=False, rules=LiveRules(trial.robot))
         name = next(
             instance.name for instance in plan.instances if declared(instance.type, instance.config, RunsMissions)
         )

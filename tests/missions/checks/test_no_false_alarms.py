@@ -33,6 +33,7 @@ def codes(text: str) -> list[str]:
         MACHINE.format("two", "{do: b, next: {success: one, failure: two}}"),  # it has no end at all
         MACHINE.format("finished", "{do: {repeat: forever, do: {go_to: dock, optional: true}}}"),  # meant to stay there
         MACHINE.format("finished", "{do: b, next: {success: one, failure: two}}"),
+        "do: {machine: {start: one, states: {one: {do: {end: success}}}}}",
         PARALLEL.format("{wait: 1 s, timeout: 2 s}", "failure"),
         PARALLEL.format("{look: {}}", "empty"),
         PARALLEL.format("{repeat: 2, do: a}", "halted"),
