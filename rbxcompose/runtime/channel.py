@@ -179,7 +179,9 @@ class Activate:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """The whole robot is active: missions may begin, and stepped time runs."""
+    """The whole robot is active: missions may begin, and stepped time runs; `begins`: also the one that `up` starts."""
+
+    begins: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,6 +46,11 @@ class Context(Protocol):
         ...
 
     @property
+    def begins(self) -> bool:
+        """Return whether the mission that `up` starts begins: not when it is over, nor because files have changed."""
+        ...
+
+    @property
     def is_again(self) -> bool:
         """Return whether it was already started since the robot came up: it, or its process, has failed since."""
         ...

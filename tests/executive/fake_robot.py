@@ -168,6 +168,7 @@ class Robot:
         self.stepped = SteppedClock()
         self.clock: Clock = self.stepped
         self.is_stopped = self.is_over = self.is_again = False
+        self.begins = True
         self.lines: list[str] = []
         self.levels: list[Level] = []
         self.events: list[RobotEvent] = []

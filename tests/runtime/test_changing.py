@@ -109,6 +109,16 @@ def test_who_refuses_a_live_setting_keeps_the_old_one_and_that_is_told() -> None
     assert stage.conductor.plan == robot()
 
 
+def test_an_executive_in_another_process_begins_no_mission() -> None:
+    moved = [replace(one, process="brain") if one.name == "mission" else one for one in robot().instances]
+    stage = Changed().apply(replace(robot(), instances=tuple(moved)))
+    stage.retire("mission")
+    stage.exit("mission")
+    stage.configure("brain")
+    stage.activate()
+    assert stage.orders(say.Start) == [("brain", say.Start(begins=False))]
+
+
 def test_a_new_process_is_forked_with_the_new_plan_and_started() -> None:
     stage = Changed().apply(replace(robot(), instances=(*robot().instances, lamp("lights"))))
     assert [name for name, *_ in stage.forks] == ["lights"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -200,6 +201,18 @@ def test_a_dead_process_is_forked_again_and_the_others_hear_of_it() -> None:
     stage.speak("robot", say.States({"mux": ("active", 0), "go_to": ("active", 0)}))
     assert stage.told(say.Start) == ["world", "robot", "mission", "robot"]
     assert stage.ups == 1
+
+
+@pytest.mark.parametrize("is_over", [False, True])
+def test_a_mission_begins_again_after_a_crash_unless_it_was_over(is_over: bool) -> None:
+    stage = Stage(options=RunOptions(is_detached=True)).start()
+    if is_over:
+        stage.speak("mission", MissionOver("patrol", "halted"))
+    stage.exit("mission")
+    stage.scheduler.advance(stage.scheduler.now + 0.1)
+    stage.configure("mission")
+    stage.speak("mission", say.States({"mission": ("active", 0)}))
+    assert stage.orders(say.Start)[-1] == ("mission", say.Start(begins=not is_over))
 
 
 def test_a_process_that_comes_again_to_a_stopped_robot_is_told_so() -> None:

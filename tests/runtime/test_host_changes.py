@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated
 
+import pytest
+
 from rbxcompose.base.config import Live, Restart
 from rbxcompose.base.levels import Level
-from rbxcompose.missions.execution.requests import PauseMission, ResumeMission
+from rbxcompose.missions.execution.requests import CancelMission, PauseMission, ResumeMission
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.runtime.process_group.hosted import Lifecycle
@@ -155,6 +157,30 @@ def test_a_mux_that_was_exchanged_during_a_stop_lets_through_what_comes_after_th
     one.host.ask("mission", ResumeMission())
     one.advance(0.5)
     assert not one.component("base").is_at_rest
+
+
+@pytest.mark.parametrize("happens", ["it is exchanged", "it raises"])
+def test_an_executive_begins_no_mission_that_is_over(happens: str) -> None:
+    one = Bench(plan=turtlebot())
+    one.advance(3.0)
+    one.host.ask("mission", CancelMission())
+    one.advance(3.0)
+    if happens == "it raises":
+        one.host.failed("mission", RuntimeError("oh"))
+    else:
+        one.host.prepare([next(each for each in one.plan.instances if each.name == "mission")])
+        one.host.activate(["mission"])
+    one.advance(3.0)
+    assert one.component("base").is_at_rest
+    assert one.host.work() == ([], {})
+
+
+def test_a_mission_that_runs_begins_again_when_its_executive_raises() -> None:
+    one = Bench(plan=turtlebot())
+    one.advance(3.0)
+    one.host.failed("mission", RuntimeError("oh"))
+    one.advance(3.0)
+    assert one.host.work()[1] == {"mission": "mission patrol runs"}
 
 
 def test_a_mission_that_was_paused_is_still_held_when_it_was_exchanged() -> None:

@@ -151,10 +151,11 @@ class Triggering:
             return
         self._is_begun = True
         self._follow_stop()
-        if self._executive.context.is_again and not self._took_over:
-            self._recall()
-        elif not self._took_over:
-            self.core.at_start(self._executive.now, self)
+        if not self._took_over:
+            if self._executive.context.is_again:
+                self._recall()
+            elif self._executive.context.begins:
+                self.core.at_start(self._executive.now, self)
         self._executive.look_soon()
 
     def take_over(self, old: Triggering) -> None:

@@ -22,9 +22,10 @@ from rbxcompose.runtime.process_group.hosted import Hosted, Lifecycle, Statuses
 from rbxcompose.runtime.process_group.live_ports import Frames
 from rbxcompose.runtime.process_group.parameters import NOBODY_ELSE, Deciders, Parameters
 from rbxcompose.runtime.process_group.worker import Post, Worker
+from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Looks, Qos
-from rbxcompose.sdk.registry import component_type
+from rbxcompose.sdk.registry import component_type, declared
 from rbxcompose.sdk.robot_events import RobotEvent
 
 TOPIC = "/rosout"
@@ -127,6 +128,7 @@ class Host:
         self.is_stopped = is_stopped
         self.is_restart = is_restart
         self.has_started = False
+        self.begins = True  # the mission that `up` starts: not when it is over, and not because files have changed
         self.is_braking = False
         self.is_held = False  # robot time stands still
         self._log, self._post = log, post
@@ -171,10 +173,10 @@ class Host:
             if self.hosted[name].state is Lifecycle.INACTIVE:
                 self._guarded(name, self.hosted[name].activate)
 
-    def start(self) -> None:
-        """Start everything that waits for the whole robot to be active."""
+    def start(self, begins: bool = True) -> None:
+        """Start everything that waits for the whole robot to be active; `begins`: also the mission that `up` starts."""
         self._on_order("start")
-        self.has_started = True
+        self.has_started, self.begins = True, begins
         self._deliveries.start()
         self._each_active("start")
         for hosted in self.hosted.values():
@@ -287,6 +289,7 @@ class Host:
     def prepare(self, instances: Sequence[Instance]) -> None:
         """Configure components beside those that run, or in their place."""
         self.retire([one.name for one in instances])
+        self.begins &= not any(declared(one.type, one.config, RunsMissions) for one in instances)
         self.frames = self.frames or self._frames(instances)
         for instance in instances:
             self.hosted[instance.name] = Hosted(self, instance)

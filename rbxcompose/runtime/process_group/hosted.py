@@ -30,7 +30,7 @@ from rbxcompose.sdk.bound import Window
 from rbxcompose.sdk.component import BusAddress, Component
 from rbxcompose.sdk.ports import In, Port, Qos, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
-from rbxcompose.sdk.robot_events import RobotEvent, RobotHeld
+from rbxcompose.sdk.robot_events import MissionOver, RobotEvent, RobotHeld
 from rbxcompose.sdk.updater import DiagnosticTask
 
 ROUNDING = 1e-9  # of a period
@@ -495,6 +495,11 @@ class Hosted:
         return self.host.is_stopped
 
     @property
+    def begins(self) -> bool:
+        """Return whether the mission that `up` starts begins."""
+        return self.host.begins
+
+    @property
     def is_over(self) -> bool:
         """Return whether nobody waits any more: never for what runs in the scheduler's thread."""
         return False
@@ -533,6 +538,7 @@ class Hosted:
         """Report something that concerns the whole robot to the supervisor; what must stop stops here at once."""
         if isinstance(event, RobotHeld) and event.reason:
             self.host.scheduler.at(self.clock.now(), self.instance.name, self.host.stop)
+        self.host.begins &= not isinstance(event, MissionOver)
         self.host.notify(event)
 
     def repeat(self, requests: Sequence[Command]) -> None:

@@ -285,6 +285,11 @@ class HandedOver:
         return self._context.is_stopped
 
     @property
+    def begins(self) -> bool:
+        """Return whether the mission that `up` starts begins."""
+        return self._context.begins
+
+    @property
     def is_again(self) -> bool:
         """Return whether the component was already started since the robot came up."""
         return self._context.is_again
