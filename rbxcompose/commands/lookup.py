@@ -30,6 +30,12 @@ def add_robot_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--robot", metavar="NAME", help="the robot, if several are up")
 
 
+def add_robot_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare the robot as the only argument, for what is typed in a hurry; `--robot` says the same."""
+    words = "the robot, by name or file; or a system"
+    parser.add_argument("robot", nargs="?", default=argparse.SUPPRESS, metavar="ROBOT|PATH", help=words)
+
+
 def find_robot(wanted: str | None) -> RobotFolder:
     """Return the folder of the robot with a given name or path, or of the only one.
 

@@ -153,9 +153,11 @@ def test_with_several_robots_one_must_be_named(verb: str, capsys: pytest.Capture
     assert "error[RBX9003]: several robots are up: a, b" in capsys.readouterr().err
 
 
-def test_a_misspelt_robot_gets_a_hint(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("verb", ["stop", "release"])
+@pytest.mark.parametrize("words", [["--robot", "turtelbot"], ["turtelbot"]])
+def test_a_misspelt_robot_gets_a_hint(verb: str, words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     written("turtlebot")
-    assert command.main(["stop", "--robot", "turtelbot"]) == 1
+    assert command.main([verb, *words]) == 1
     assert "did you mean 'turtlebot'?" in capsys.readouterr().err
 
 

@@ -5,7 +5,7 @@ A mission continues after `mission resume`.
 
 import argparse
 
-from rbxcompose.commands.lookup import add_asking_options, pass_on
+from rbxcompose.commands.lookup import add_asking_options, add_robot_argument, pass_on
 from rbxcompose.commands.options import BUS
 from rbxcompose.runtime.requests import ReleaseRobot
 
@@ -15,6 +15,7 @@ ON_SYSTEM = BUS
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
+    add_robot_argument(parser)
     add_asking_options(parser)
 
 

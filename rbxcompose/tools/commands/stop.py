@@ -21,6 +21,7 @@ _OTHERS = ("parent", "router")  # processes in which nothing moves
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
+    lookup.add_robot_argument(parser)
     lookup.add_asking_options(parser)
 
 
