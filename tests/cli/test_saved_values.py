@@ -243,6 +243,14 @@ def test_what_no_file_can_say_alone_is_refused_and_nothing_is_written(
     assert (tmp_path / "robot.yaml").read_text(encoding="utf-8") == ROBOT
 
 
+def test_a_value_that_others_follow_without_being_written_is_saved(tmp_path: Path) -> None:
+    project(tmp_path, ROBOT + "console: {}\n")
+    state = state_of(tmp_path, ChosenLayers())
+    before = live(state, base__max_speed=0.4)
+    (text,) = files_with(before, list(before.changes), partial(compiled_as_it_runs, state)).after.values()
+    assert b"base: {type: diff_drive_sim, max_speed: 0.4}" in text
+
+
 def test_a_file_that_changes_before_it_is_written_stays(tmp_path: Path) -> None:
     project(tmp_path)
     state = state_of(tmp_path, ChosenLayers())

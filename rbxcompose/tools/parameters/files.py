@@ -27,7 +27,7 @@ from rbxcompose.commands.messages import to_json
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.composition.value_edits import UnsavableError, edit_of, is_same, merged, value_text
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.compiler.plan.diff import Difference, difference
+from rbxcompose.compiler.plan.diff import Change, Difference, difference
 from rbxcompose.compiler.plan.dump import dump
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.model import PlacedRobot, System
@@ -290,11 +290,21 @@ def _require_nothing_else(
         wanted[change.component] = with_values(
             config, {change.name: said if is_same(said, change.live) else change.live}
         )
-    side_effects = difference(live.plan_with(wanted), found.plan)
+    side_effects = _written_among(difference(live.plan_with(wanted), found.plan), found.robot)
     if not side_effects.is_empty:
         message = f"nothing is saved: {_keys_of(side_effects)} would change, too, which is written at the same place"
         help_text = "set that as well, or write the value into the component by hand"
         raise NotDoneError(NOT_SAVED.at(texts.fix.edits[0].span, message, help=help_text))
+
+
+def _written_among(found: Difference, robot: Robot) -> Difference:
+    """Return a difference without the settings that no file has, such as limits that follow those of another one."""
+    root, kept = robot.manifest.root, dict[str, tuple[Change, ...]]()
+    for name, each in found.changed.items():
+        place = robot.components[name].place
+        if written := tuple(change for change in each if at(root, place(change.key)) is not None):
+            kept[name] = written
+    return replace(found, changed=kept)
 
 
 def _keys_of(found: Difference) -> str:
