@@ -96,7 +96,7 @@ class ZenohTransport:
 
     def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Closable:
         """Receive what other processes publish; if latched, also what they published last."""
-        handler = _direct(lambda sample: arrived(_Arrival(sample)))
+        handler = direct(lambda sample: arrived(_Arrival(sample)))
         if qos is not Qos.LATCHED:
             return self._keep(self._session.declare_subscriber, key, handler, allowed_origin=zenoh.Locality.REMOTE)
         return self._keep(
@@ -111,7 +111,7 @@ class ZenohTransport:
 
     def serve(self, key: str, asked: Callable[[Question], None]) -> Closable:
         """Receive the requests of other processes."""
-        handler = _direct(lambda query: asked(_Question(key, query, self._on_own)))
+        handler = direct(lambda query: asked(_Question(key, query, self._on_own)))
         remote = zenoh.Locality.REMOTE
         return self._keep(self._session.declare_queryable, key, handler, complete=True, allowed_origin=remote)
 
@@ -121,7 +121,7 @@ class ZenohTransport:
         """Send a request. It ends with an answer, or with an error when the server is gone; closing forgets it."""
         token = zenoh.CancellationToken()
         # The query ends with `drop`: after an answer, that means nothing; without one, the server is gone.
-        handler = _direct(lambda reply: answered(_answer(reply)), lambda: answered(TransportReply(error=GONE)))
+        handler = direct(lambda reply: answered(_answer(reply)), lambda: answered(TransportReply(error=GONE)))
         get: Callable[[], Any] = partial(
             self._session.get,
             key,
@@ -143,7 +143,7 @@ class ZenohTransport:
 
     def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Closable:
         """Report matching tokens: those that exist now or appear (True), and those that go (False)."""
-        handler = _direct(lambda sample: changed(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
+        handler = direct(lambda sample: changed(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
         return self._keep(self._session.liveliness().declare_subscriber, pattern, handler, history=True)
 
     def close(self) -> None:
@@ -290,12 +290,14 @@ def _at_once(callback: Callable[[], None]) -> None:
     callback()
 
 
-def _direct(callback: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Callback[Any]:
+def direct(callback: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Callback[Any]:
+    """Return what calls `callback` in Zenoh's thread, and `drop` at the end; no channel between could be full."""
+
     def called(value: Any) -> None:
         keep_attached()
         callback(value)
 
-    return Callback(called, drop, indirect=False)  # no thread and no bounded channel in between
+    return Callback(called, drop, indirect=False)
 
 
 def _options(how: Sending, *without: str) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import math
 import selectors
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -17,6 +18,7 @@ from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import zenoh
+from zenoh.handlers import Callback
 
 from rbxcompose.base.clock import MonotonicClock
 from rbxcompose.base.dataclass import dataclass
@@ -28,7 +30,7 @@ from rbxcompose.bus.names import Attachment, data_key, decode_attachment
 from rbxcompose.bus.tokens import SPACE, EntityKind, NodeToken, parse_token
 from rbxcompose.bus.transport import Arrival
 from rbxcompose.bus.zenoh_session import open_client, open_peer
-from rbxcompose.bus.zenoh_transport import ZenohTransport
+from rbxcompose.bus.zenoh_transport import ZenohTransport, direct
 from rbxcompose.commands import options
 from rbxcompose.commands.console import NotDoneError, emit, table
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place
@@ -114,26 +116,21 @@ class Guest:
 
     def tokens(self, pattern: str) -> list[str]:
         """Return the liveliness tokens that a key expression matches."""
-        replies: Iterator[zenoh.Reply] = iter(self._session.liveliness().get(pattern, timeout=PATIENCE))
-        return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+        get = partial(self._session.liveliness().get, timeout=PATIENCE)
+        return [str(sample.key_expr) for sample in _gathered(lambda into: get(pattern, into), PATIENCE)]
 
     def ask(self, key: str, seconds: float) -> list[bytes]:
         """Return all answers to a query at a key within `seconds`."""
-        return [sample.payload.to_bytes() for sample in self._answers(key, seconds)]
-
-    def _answers(self, key: str, seconds: float) -> Iterator[zenoh.Sample]:
-        replies: Iterator[zenoh.Reply] = iter(
-            self._session.get(key, target=zenoh.QueryTarget.ALL, consolidation=_EACH, timeout=seconds)
-        )
-        return (reply.ok for reply in replies if reply.ok is not None)
+        get = partial(self._session.get, target=zenoh.QueryTarget.ALL, consolidation=_EACH, timeout=seconds)
+        return [sample.payload.to_bytes() for sample in _gathered(lambda into: get(key, into), seconds)]
 
     def is_linked(self, session: str, seconds: float) -> bool | None:
         """Return whether a session is linked with those of all components; None if its admin space does not answer."""
         tokens = map(parse_token, self.tokens(f"{SPACE}/{self.domain}/*/*/*/{EntityKind.NODE}/**"))
         nodes = (token for token in tokens if isinstance(token, NodeToken) and not token.name.startswith("_"))
         peers = {node.session for node in nodes} - {session}
-        for sample in self._answers(f"@/{session}/peer", seconds):
-            linked = {link["peer"] for link in json.loads(sample.payload.to_bytes())["sessions"]}
+        for answer in self.ask(f"@/{session}/peer", seconds):
+            linked = {link["peer"] for link in json.loads(answer)["sessions"]}
             return peers <= linked
         return None
 
@@ -230,6 +227,17 @@ class Guest:
     def _arrived(self, queue: Inbox[ReceivedMessage], kind: WireType) -> Callable[[Arrival], None]:
         # In a thread of the transport: a message is stamped when it arrives, not when it is shown.
         return lambda arrival: queue.put(ReceivedMessage(self.clock.now(), kind, arrival), self.transport.wake)
+
+
+def _gathered(ask: Callable[[Callback[zenoh.Reply]], object], within: float) -> list[zenoh.Sample]:
+    """Return the good replies to a query.
+
+    They are not read from a channel: it may be full while the query is being sent, which Zenoh then never ends.
+    """
+    replies, ended = list[zenoh.Reply](), threading.Event()
+    ask(direct(replies.append, ended.set))
+    ended.wait(within + PATIENCE)  # Zenoh ends it when all have answered, or after its timeout
+    return [reply.ok for reply in replies if reply.ok is not None]
 
 
 def _short(router: str) -> zenoh.Session:
