@@ -69,6 +69,18 @@ class ApplyPlan(Command):
 
 
 @dataclass(frozen=True, slots=True)
+class AdoptSaved(Command):
+    """Take over settings that were saved as they are: the files are compared with them from now on.
+
+    `plan`, as text, has the values, and `names` says which settings of which components they are.
+    """
+
+    about = ROBOT
+    plan: str
+    names: dict[str, list[str]]
+
+
+@dataclass(frozen=True, slots=True)
 class RevertPlan(Command):
     """Apply the plan from before the last change; answered when everything new is active.
 

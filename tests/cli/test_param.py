@@ -202,9 +202,10 @@ def test_live_values_are_saved_at_their_places_reset_and_compared(do: Do, base: 
     assert file.read_text() == before.replace("45 s", "30 s")
     assert do("param", "reset", "second.tolerance").stdout == "left/second.tolerance = 0.05 m\n"
     assert do("param", "reset").returncode == 0
-    do("param", "set", "battery.runtime=45 s")
-    assert do("param", "save").returncode == do("param", "diff").returncode == 0
-    assert file.read_text() == before
+    assert "changed live" not in do("apply", str(file), "--dry-run").stdout
+    file.write_text(before)
+    assert "runtime: 30 s -> 45 s" in do("apply", str(file), "--yes").stdout
+    assert (do("param", "get", "battery", "runtime").stdout, do("param", "diff").returncode) == ("45 s\n", 0)
 
 
 def test_only_what_a_dry_run_showed_is_saved_if_that_is_wanted(do: Do, base: Path) -> None:

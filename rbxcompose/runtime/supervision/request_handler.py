@@ -1,8 +1,10 @@
 """Carries out the requests from the control socket, or passes them on to the component that takes them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
+from rbxcompose.base.config import value_at, with_values
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import plain
 from rbxcompose.base.requests import Command, Refused, Request, UnreadableError, as_data, name_in, requests, to_data
@@ -10,7 +12,7 @@ from rbxcompose.compiler.plan.dump import PlanTextError, load
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.folder import ChosenLayers, RobotState
-from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison, RevertPlan
+from rbxcompose.runtime.plan_requests import AdoptSaved, ApplyPlan, ComparePlan, PlanComparison, RevertPlan
 from rbxcompose.runtime.requests import ROBOT, BringDown, DescribeRobot, NoteInLog, ReleaseRobot, RobotStatus, StopRobot
 from rbxcompose.runtime.supervision.changes import Changes, changes
 from rbxcompose.runtime.supervision.conductor import FINE, Conductor
@@ -20,8 +22,9 @@ from rbxcompose.runtime.supervision.setting_changes import SettingChanges
 from rbxcompose.sdk.registry import component_type
 
 OWN = requests(
-    RobotStatus, DescribeRobot, StopRobot, ReleaseRobot, NoteInLog, ComparePlan, ApplyPlan, RevertPlan, BringDown
-)
+    RobotStatus, DescribeRobot, StopRobot, ReleaseRobot, NoteInLog, ComparePlan, ApplyPlan, RevertPlan, AdoptSaved,
+    BringDown,
+)  # fmt: skip
 
 
 class Supervised(Protocol):
@@ -81,6 +84,8 @@ class RequestHandler:
                 self._apply(request, number)
             case RevertPlan():
                 self._revert(request, number)
+            case AdoptSaved(plan, names):
+                self._adopt(_loaded(plan), names, number)
             case ComparePlan(plan):
                 self._compare(plan, number)
             case _:
@@ -172,6 +177,21 @@ class RequestHandler:
         if request.generation != conductor.generation:
             raise Refused("it was changed by someone else meanwhile: look at the difference again")
         self._change(found, request.layers, number)
+
+    def _adopt(self, saved: Plan, names: Mapping[str, Sequence[str]], number: int) -> None:
+        """Change the plan to what components have already."""
+        conductor, configs = self._supervisor.conductor, {one.name: one.config for one in saved.instances}
+
+        def with_saved(old: Instance) -> Instance:
+            new = {name: value_at(configs[old.name], name) for name in names.get(old.name, ())}
+            return replace(old, config=with_values(old.config, new))
+
+        plan = conductor.plan
+        found = changes(plan, replace(plan, instances=tuple(map(with_saved, plan.instances))))
+        if why_not := conductor.why_not(found):
+            raise Refused(why_not)
+        answer = self._supervisor.answer
+        conductor.change(found, lambda text, is_refused: answer(number, text))
 
     def _revert(self, request: RevertPlan, number: int) -> None:
         if self._before is None or request.generation not in (None, self._before[2]):

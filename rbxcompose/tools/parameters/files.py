@@ -36,7 +36,7 @@ from rbxcompose.manifest.tree import FILE_BYTES, at
 from rbxcompose.msgs.rbxcompose_parameters import ParameterChange
 from rbxcompose.msgs.rcl_interfaces import GetParameters, Parameter
 from rbxcompose.runtime.folder import RobotFolder, RobotState
-from rbxcompose.runtime.plan_requests import ComparePlan
+from rbxcompose.runtime.plan_requests import AdoptSaved, ComparePlan
 from rbxcompose.sdk.parameters import UnsettableError, changed, dimension_of, from_message, settings, to_message
 from rbxcompose.tools.inspection.origin import origin_of
 from rbxcompose.tools.live_rules import compiled_with
@@ -400,7 +400,13 @@ def param_save(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     changes = chosen(changed_since_up(live, folder, history), live, arguments.names)
     if changes:
         require_unedited(live, changes, folder, history)
-    return save(live, changes, partial(compiled_as_it_runs, state), arguments)
+    exit_code = save(live, changes, partial(compiled_as_it_runs, state), arguments)
+    if changes and not arguments.dry_run:
+        names: dict[str, list[str]] = {}
+        for change in changes:
+            names.setdefault(change.component, []).append(change.name)
+        answer_of(folder, AdoptSaved(dump(live.plan_with(live.now), reveals_secrets=True), names), timeout=_COMPARE)
+    return exit_code
 
 
 def save(live: LiveSettings, changes: Sequence[LiveChange], compiled: Compiled, arguments: argparse.Namespace) -> int:
