@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.domains.arms.teleoperation import STATUS, STREAM, TIMEOUT, ArmServo
+from rbxcompose.domains.arms.teleoperation import STATUS, STREAM, TIMEOUT, ArmServo, servo_ports
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion, Twist, TwistStamped, Vector3
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.sdk.ports import Qos
 from tests.motion.test_arm_task import KINEMATICS, PLANNER
 
 AT = {"turn": 0.8, "lift": 0.0, "bend": 0.5}
@@ -52,6 +53,11 @@ def test_a_command_that_is_none_is_refused_and_moves_nothing(message: TwistStamp
     assert not arm_servo.is_wanted
     assert not arm_servo.go_on(0.0, NOW, AT)
     assert sent == []
+
+
+def test_the_status_is_there_for_who_listens_later() -> None:
+    config: Any = SimpleNamespace(name="arm", stream="arm/joint_trajectory")
+    assert servo_ports(config)[STATUS].qos is Qos.LATCHED  # it is published at the start, and when it changes
 
 
 def test_each_message_to_the_controller_ends_at_rest_and_the_last_command_counts_for_a_while() -> None:

@@ -30,13 +30,13 @@ FASTEST, FASTEST_TURN = 0.2, 1.0  # [m/s], [rad/s] towards a pose
 
 
 def servo_ports(config: ArmConfig) -> dict[str, Port[Any]]:
-    """Return the ports; none if the controller takes no streams."""
+    """Return the ports; none if the controller takes no streams. Only news of the status are sent."""
     if not config.stream:
         return {}
     return {
         TWIST: In(TwistStamped, f"{config.name}/servo/twist", qos="command", is_open=True).named(TWIST),
         POSE: In(PoseStamped, f"{config.name}/servo/pose", qos="command", is_open=True).named(POSE),
-        STATUS: Out(String, f"{config.name}/servo/status").named(STATUS),
+        STATUS: Out(String, f"{config.name}/servo/status", qos="latched").named(STATUS),
         STREAM: Out(JointTrajectory, config.stream).named(STREAM),
     }
 
