@@ -2,7 +2,7 @@
 import { h, icon } from "./dom";
 import { MapCanvas, type ShownPlace } from "./elements/map_canvas";
 import { formatName } from "./format";
-import { poseAt, statusesAt, type DryRun, type Statuses } from "./trial";
+import { poseAt, statusesAt, timeAt, type DryRun, type Statuses } from "./trial";
 import "./replay.css";
 
 const FRAME = 50; // [ms] between two pictures
@@ -23,8 +23,8 @@ export class Replay {
   /** `show` gets the statuses of the blocks at the time that is shown. */
   constructor(run: DryRun, show: (statuses: Statuses) => void) {
     [this.#run, this.#show] = [run, show];
-    const length = { min: "0", max: String(run.time), step: "any", value: String(run.time) };
-    this.#slider = h("input", { type: "range", "aria-label": "Time of the dry run", ...length });
+    const share = { min: "0", max: "1", step: "any", value: "1" }; // of the run: a browser rounds what is no whole number
+    this.#slider = h("input", { type: "range", "aria-label": "Time of the dry run", ...share });
     this.#slider.oninput = () => {
       this.#stop();
       this.#draw();
@@ -38,23 +38,27 @@ export class Replay {
 
   /** Shows the statuses once more, since what they are shown on has changed. */
   colour(): void {
-    this.#show(statusesAt(this.#run, Number(this.#slider.value)));
+    this.#show(statusesAt(this.#run, timeAt(this.#run, this.#share)));
   }
 
   close(): void {
     clearInterval(this.#timer);
   }
 
+  get #share(): number {
+    return Number(this.#slider.value);
+  }
+
   #start(): void {
-    if (Number(this.#slider.value) >= this.#run.time) this.#slider.value = "0";
-    const rate = Math.max(1 / FASTEST, this.#run.time / LONGEST); // seconds of robot time in one
+    if (this.#share === 1) this.#slider.value = "0";
+    const length = Math.min(this.#run.time * FASTEST, LONGEST); // [s] that it takes to play
     let last = performance.now();
     this.#timer = setInterval(() => {
       const now = performance.now();
-      this.#slider.value = String(Math.min(this.#run.time, Number(this.#slider.value) + ((now - last) / 1000) * rate));
+      this.#slider.value = String(Math.min(1, this.#share + (now - last) / 1000 / length));
       last = now;
       this.#draw();
-      if (Number(this.#slider.value) >= this.#run.time) this.#stop();
+      if (this.#share === 1) this.#stop();
     }, FRAME);
     this.#play.replaceChildren(icon("pause"), "Hold");
   }
@@ -66,11 +70,11 @@ export class Replay {
   }
 
   #draw(): void {
-    const time = Number(this.#slider.value);
+    const time = timeAt(this.#run, this.#share);
     const words = `${time.toFixed(1)} s of ${this.#run.time.toFixed(1)} s`;
     this.#time.textContent = words;
     this.#slider.setAttribute("aria-valuetext", words);
-    this.#slider.style.setProperty("--share", String(time / (this.#run.time || 1)));
+    this.#slider.style.setProperty("--share", this.#slider.value);
     this.colour();
     const at = poseAt(this.#run, time);
     const places = this.#run.places.map((place) => ({ ...place, label: formatName(place.name), isDock: false }) satisfies ShownPlace);

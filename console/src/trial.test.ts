@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { ending, poseAt, statusesAt, tested, type DryRun } from "./trial";
+import { ending, poseAt, statusesAt, tested, timeAt, type DryRun } from "./trial";
 
 const run = { outcome: "success", why: "", time: 12.345, left_out: 0, story: [], statuses: [], changes: [], track: [], places: [] };
 
@@ -38,6 +38,11 @@ describe("a dry run at a time", () => {
     expect(statusesAt(played, -1)).toEqual([]);
     expect(statusesAt(played, 1.5).map(({ status }) => status)).toEqual(["running", "success"]);
     expect(statusesAt(played, 9).map(({ status }) => status)).toEqual(["success", "success"]);
+  });
+
+  it.each([10.700000000000001, 0.1 + 0.2, 0])("has its last change at its end, %d s", (time) => {
+    const run = { ...played, time, changes: [{ time, path: ["do"], status: "success" }] };
+    expect(statusesAt(run, timeAt(run, Number("1"))).map(({ status }) => status)).toEqual(["success"]);
   });
 
   it("has the robot where it was last, with its trail", () => {

@@ -28,6 +28,11 @@ export interface TestReport {
 
 const TRAIL = 60; // [s] of robot time
 
+/** Returns the time [s] at a share of a run: at 1, its very end, so that nothing which happened then is left out. */
+export function timeAt({ time }: DryRun, share: number): number {
+  return share * time;
+}
+
 /** Returns the status that each block had last at a time [s]. */
 export function statusesAt({ changes }: DryRun, time: number): Statuses {
   const found = new Map<string, { path: Path; status: string }>();
