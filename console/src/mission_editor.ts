@@ -145,7 +145,10 @@ export class MissionEditor {
       this.#draw();
       void this.#fillPalette();
       void this.#live.look();
-      if (!draft) this.#show(read);
+      if (!draft) {
+        this.#show(read);
+        void this.#ask("check");
+      }
       this.#mayUndo();
     } catch (error) {
       if (this.#isClosed) return;
@@ -277,8 +280,10 @@ export class MissionEditor {
       this.#fillView();
     }
     this.#text!.mark(looked.findings);
-    this.#verdict.dataset.state = looked.errors > 0 ? "failure" : looked.count > 0 ? "waiting" : "success";
-    this.#verdict.replaceChildren(icon(looked.count > 0 ? "warning" : "check"), verdict(looked));
+    const isFine = looked.count === 0;
+    const isChecked = !looked.outline || !isFine; // a look does not see all that a check finds
+    this.#verdict.dataset.state = looked.errors > 0 ? "failure" : isFine && isChecked ? "success" : "waiting";
+    this.#verdict.replaceChildren(icon(!isFine ? "warning" : isChecked ? "check" : "wait"), isChecked ? verdict(looked) : "Checking\u2026");
     const left = looked.count - looked.findings.length;
     this.#list.replaceChildren(
       ...looked.findings.map((found) => this.#row(found)),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import threading
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -96,6 +97,24 @@ def test_a_mistake_is_marked_as_it_is_typed_and_a_button_fixes_it(
     expect(page.locator(".cm-content")).to_contain_text("- go_to: table")
     page.get_by_role("button", name="Undo").click()
     expect(page.locator(".cm-content")).to_contain_text("tabel")
+
+
+def test_what_check_finds_is_told_when_it_opens_and_until_then_that_it_is_checked(
+    open_page: Callable[..., Page], project: Project, gateway: FakeGateway
+) -> None:
+    project.file.write_text(FETCH.replace("do:", "inputs:\n  speed: {type: speed}\ndo:"), encoding="utf-8")
+    seen = threading.Event()
+
+    def check(given: dict[str, Any]) -> dict[str, Any]:
+        assert seen.wait(10)
+        return project.answer("check", given)
+
+    gateway.answers["/console/mission/check"] = check
+    page = edits(open_page(page_name="mission"))
+    expect(page.get_by_text("Checking…", exact=True)).to_be_visible()
+    seen.set()
+    expect(page.get_by_text("1 warning", exact=True)).to_be_visible()
+    expect(page.get_by_label("Mistakes", exact=True)).to_contain_text("speed")
 
 
 @pytest.mark.soak
