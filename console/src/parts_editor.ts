@@ -68,7 +68,7 @@ export class PartsEditor {
   readonly #scene: RobotScene;
   readonly #edits: RobotEdits<EditedPart>;
   readonly #bar: EditsBar<EditedPart>;
-  readonly #list = h("div", { class: "row", role: "group", "aria-label": "Parts of the robot" });
+  readonly #list = h("div", { class: "row parts-list", role: "group", "aria-label": "Parts of the robot" });
   readonly #form = h("form", { class: "part-form", "aria-label": "The chosen part" });
   readonly #what = h("p", { class: "label" });
   readonly #to = linkList("Attached to", () => void this.#set({ to: this.#to.list.value }));

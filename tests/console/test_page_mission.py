@@ -227,6 +227,7 @@ def test_what_is_wrong_and_why_is_seen_at_once(open_page: Callable[..., Page], g
 @pytest.mark.parametrize("name", ["mission", "diagnostics"])
 def test_it_fits_the_window_and_the_finger(open_page: Callable[..., Page], patrol: FakeGateway, name: str) -> None:
     patrol.windows[TREE] = tree(2)
+    patrol.windows["mission/ListMissions"] = [*listed("running"), listed("idle")[0] | {"name": "m" * 60}]
     page = open_page(page_name=name)
     expect(page.get_by_role("treeitem").first).to_be_visible()
     for size in (WIDE, PHONE):

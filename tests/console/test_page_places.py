@@ -289,6 +289,8 @@ def test_who_does_not_configure_sees_no_editor(
 def test_the_editor_fits_and_everyone_can_read_it(
     open_page: Callable[..., Page], project: EditedProject, size: dict[str, int]
 ) -> None:
+    long_name = f"  {'x' * 60}: {{x: 2 m, y: 0 m}}\n"
+    project.robot.write_text(ROBOT.replace("include:", f"{long_name}include:"), encoding="utf-8")
     page = open_page(page_name="map")
     page.set_viewport_size(size)  # type: ignore[arg-type]
     panel = edits(page)
