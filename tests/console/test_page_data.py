@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Callable
 from typing import Any
@@ -49,6 +50,13 @@ def test_a_topic_shows_its_messages_and_a_number_is_plotted(
     expect(page.locator(".plot-host")).to_have_attribute("data-points", re.compile("^[2-9]"))
     expect(messages.get_by_role("button", name="x 3, plot")).to_be_visible()
     assert violations(page) == []
+    expect(page.locator(".plot-host .u-over")).to_have_css("left", "60px")  # beside it, the labels of the axis
+    gateway.say("/pose", POSE | {"x": 3e9})
+    expect(page.locator(".plot-host .u-over")).not_to_have_css("left", "60px")
+    gateway.say("/pose", POSE | {"x": 3.0})
+    expect(messages.get_by_role("button", name="x 3, plot")).to_be_visible()
+    if (shots := os.environ.get("SHOTS")) is not None:
+        page.screenshot(path=f"{shots}/data.png", full_page=True)
     messages.get_by_role("button", name="Pause").click()
     gateway.say("/pose", POSE | {"x": 4.0})
     page.get_by_role("button", name="Remove /pose x").click()

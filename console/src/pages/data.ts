@@ -11,6 +11,7 @@ const LIST = 3_000; // [ms] between two looks for topics
 const DRAW = 200; // [ms]
 const MOST_ITEMS = 50; // of a list
 const PLOTS = 6; // lines at once
+const FONT = "12px system-ui, sans-serif"; // of the labels of a plot
 const COLOURS = ["#1a7fd0", "#d0651a", "#2a9a4a", "#a83ab0", "#b0162a", "#6a6f00"];
 
 export const page: Page = {
@@ -334,13 +335,13 @@ class Plot {
     this.#library ??= (await import("uplot")).default;
     this.#chart?.destroy();
     const style = getComputedStyle(document.documentElement);
-    const axis = { stroke: style.getPropertyValue("--faint"), grid: { stroke: style.getPropertyValue("--edge") }, ticks: { stroke: style.getPropertyValue("--edge") } };
+    const axis = { stroke: style.getPropertyValue("--faint"), font: FONT, grid: { stroke: style.getPropertyValue("--edge") }, ticks: { stroke: style.getPropertyValue("--edge") } };
     const options: uPlot.Options = {
       width: this.#host.clientWidth || 300,
       height: 220,
       legend: { show: false },
       scales: { x: { time: false, range: [-60, 0] } },
-      axes: [{ ...axis, values: (_, ticks) => ticks.map((tick) => `${tick} s`) }, { ...axis, size: 60 }],
+      axes: [{ ...axis, values: (_, ticks) => ticks.map((tick) => `${tick} s`) }, { ...axis, size: roomFor }],
       series: [{}, ...[...this.#lines.values()].map(({ name, colour }) => ({ label: name, stroke: colour, width: 2, spanGaps: false }))],
     };
     this.#chart = new this.#library(options, [[]], this.#host);
@@ -354,4 +355,13 @@ class Plot {
     this.#chart.setData(columns([...this.#lines.values()].map(({ series }) => series), performance.now()) as uPlot.AlignedData);
     this.#host.dataset.points = String(this.#chart.data[0].length);
   }
+}
+
+/** Returns how wide the axis with the values must be [px], so that none of its labels is cut off. */
+function roomFor({ ctx, width }: uPlot, labels: readonly string[] | null): number {
+  ctx.save();
+  ctx.font = FONT;
+  const widest = Math.max(0, ...(labels ?? []).map((label) => ctx.measureText(label).width));
+  ctx.restore();
+  return Math.min(Math.max(60, Math.ceil(widest) + 20), width / 2); // 15 px of them between the labels and the plot
 }
