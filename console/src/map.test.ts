@@ -199,10 +199,14 @@ describe("the view", () => {
     });
   });
 
-  it("that fits shows every point", () => {
+  it("that fits shows every point, however far apart they are, and is zoomed out no further", () => {
+    const far = [{ x: -30_000, y: 1 }, { x: 90_000, y: 0 }];
     for (let count = 0; count < 20; count += 1) {
-      const view = fitted(points.slice(0, count), 390, 300);
-      for (const point of points.slice(0, count)) {
+      const shown = [...points.slice(0, count), ...far.slice(0, count % 3)];
+      const view = fitted(shown, 390, 300);
+      expect(zoomed(view, 0.5, { x: 0, y: 0 }).scale).toBeLessThanOrEqual(view.scale);
+      expect(zoomed(view, 2, { x: 0, y: 0 }).scale).toBeGreaterThan(view.scale);
+      for (const point of shown) {
         const { x, y } = toScreen(view, point);
         expect(x).toBeGreaterThanOrEqual(0);
         expect(x).toBeLessThanOrEqual(390);

@@ -326,7 +326,7 @@ export function panned(view: View, right: number, down: number): View {
 
 /** Returns the view in which a metre is larger by a factor, and what is at a pixel stays there. */
 export function zoomed(view: View, factor: number, at: Point): View {
-  const scale = clamp(view.scale * factor, SMALLEST_SCALE, LARGEST_SCALE);
+  const scale = clamp(view.scale * factor, Math.min(SMALLEST_SCALE, view.scale), LARGEST_SCALE); // a fit may have less
   const fixed = toWorld(view, at);
   const moved = toWorld({ ...view, scale }, at);
   return { ...view, scale, x: view.x + fixed.x - moved.x, y: view.y + fixed.y - moved.y };
@@ -338,7 +338,7 @@ export function fitted(points: readonly Point[], width: number, height: number):
   const [left, right] = extent(all.map(({ x }) => x));
   const [bottom, top] = extent(all.map(({ y }) => y));
   const room = (pixels: number, metres: number) => Math.max(1, pixels - 2 * MARGIN) / metres; // infinite for a point
-  const scale = clamp(Math.min(room(width, right - left), room(height, top - bottom)), SMALLEST_SCALE, USUAL_SCALE);
+  const scale = Math.min(room(width, right - left), room(height, top - bottom), USUAL_SCALE);
   return { x: (left + right) / 2, y: (bottom + top) / 2, scale, width, height };
 }
 
