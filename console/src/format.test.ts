@@ -1,6 +1,6 @@
 import { expect, it } from "vitest";
 import { ConfigError, parseConfig, pluck } from "./config";
-import { chargeOf, formatAge, formatName, formatNumber, formatValue } from "./format";
+import { chargeOf, formatAge, formatName, formatNumber, formatValue, numberIn } from "./format";
 
 it.each<[number | null, string, string]>([
   [0.2, "m/s", "0.20"],
@@ -19,6 +19,11 @@ it("a unit stands beside its number, if there is one", () => {
     "3.00",
     "\u2013",
   ]);
+});
+
+it("a number is typed with a point or a comma, and nothing is none", () => {
+  const texts = ["1.5", " 1,5 ", "-2", "0", "", " ", "1.2.3", "two"];
+  expect(texts.map(numberIn)).toEqual([1.5, 1.5, -2, 0, NaN, NaN, NaN, NaN]);
 });
 
 it("names are words", () => {

@@ -18,6 +18,11 @@ export function formatValue(value: number | null, unit: string): string {
   return unit === "%" ? number + unit : `${number}\u202f${unit}`;
 }
 
+/** Returns the number that a person typed, with a point or a comma; NaN if there is none. */
+export function numberIn(text: string): number {
+  return text.trim() === "" ? Number.NaN : Number(text.replace(",", "."));
+}
+
 /** Returns what a name of a manifest is for people: `main_battery` is "Main battery". */
 export function formatName(name: string): string {
   const words = name.replaceAll(/[_/]+/g, " ").trim();

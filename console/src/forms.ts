@@ -1,4 +1,5 @@
 /** Forms for messages: from the definition of a type, its units and the words it may hold, to what is sent. */
+import { numberIn } from "./format";
 import { isMessage, type Json, type Message } from "./rosbridge";
 
 /** One type as rosapi describes it; `fieldarraylen` is -1 for what is no array, and 0 for one of any length. */
@@ -140,8 +141,8 @@ function valueOf(one: Field, text: string): Json {
       throw new FieldError(`${label}: this is no JSON`);
     }
   }
-  const number = Number(text.replace(",", "."));
-  if (text === "" || !Number.isFinite(number)) throw new FieldError(`${label}: this is no number`);
+  const number = numberIn(text);
+  if (!Number.isFinite(number)) throw new FieldError(`${label}: this is no number`);
   if (one.kind === "integer" && !Number.isInteger(number)) throw new FieldError(`${label}: this must be a whole number`);
   if (one.least !== null && number < one.least) throw new FieldError(`${label}: at least ${one.least}`);
   if (one.most !== null && number > one.most) throw new FieldError(`${label}: at most ${one.most}`);

@@ -1,4 +1,5 @@
 /** Parameters as their page shows them, from what a node says by the services of ROS 2. */
+import { numberIn } from "./format";
 import { isMessage, type Json, type Message } from "./rosbridge";
 
 export type Value = boolean | number | string;
@@ -79,8 +80,8 @@ export function parameterOf(setting: Setting, value: Value): Message {
 /** Returns a typed text as a value, or why it is none. */
 export function parsed(setting: Setting, text: string): { value: Value } | { why: string } {
   if (setting.type === STRING) return { value: text };
-  const value = Number(text.trim().replace(",", "."));
-  if (text.trim() === "" || !Number.isFinite(value)) return { why: "This is no number." };
+  const value = numberIn(text);
+  if (!Number.isFinite(value)) return { why: "This is no number." };
   if (setting.type === INTEGER && !Number.isInteger(value)) return { why: "This must be a whole number." };
   if (setting.least !== null && value < setting.least) return { why: `At least ${tidy(setting.least)} ${setting.unit}`.trim() + "." };
   if (setting.most !== null && value > setting.most) return { why: `At most ${tidy(setting.most)} ${setting.unit}`.trim() + "." };

@@ -196,6 +196,10 @@ def test_a_goal_of_an_arm_is_planned_shown_and_executed(open_page: Callable[...,
     page.get_by_role("button", name="Drag its tip").click()
     x = page.get_by_label("X cm")
     expect(x).to_have_value("60")
+    x.fill(" ")
+    page.get_by_role("button", name="Plan").click()
+    expect(page.get_by_text("Each of the six must be a number.")).to_be_visible()
+    assert crane.calls("/arm/compute_ik") == []
     x.fill("50")
     page.get_by_role("button", name="Plan").click()
     expect(page.get_by_text("Planning")).to_be_visible()

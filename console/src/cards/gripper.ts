@@ -2,7 +2,8 @@
 import { runButton, type Card } from "../cards";
 import type { Component } from "../description";
 import { h } from "../dom";
-import { formatName } from "../format";
+import { formatName, numberIn } from "../format";
+import { FieldError } from "../forms";
 
 const GRIP = "rbxcompose_msgs/action/Grip";
 const gripsOf = (component: Component) => component.ports.filter(({ kind, type }) => kind === "serves_action" && type === GRIP);
@@ -17,7 +18,11 @@ export const card: Card = {
       const says = h("p", { class: "says", role: "status" });
       const id = `opening-${component.name}-${grip.name}`;
       const opening = h("input", { id, type: "number", min: "0", step: "1", value: String(WIDE) });
-      const open = () => ({ opening: Number(opening.value) / 1000 });
+      const open = () => {
+        const width = numberIn(opening.value);
+        if (!Number.isFinite(width)) throw new FieldError("The opening is no number.");
+        return { opening: width / 1000 };
+      };
       body.append(
         h("div", { class: "field" }, h("label", { for: id }, name, h("span", { class: "label" }, " opening, mm")), opening),
         h("div", { class: "row" }, runButton(grip, robot, "Open", open, says), runButton(grip, robot, "Close", () => ({ opening: 0 }), says)),

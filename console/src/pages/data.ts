@@ -2,6 +2,7 @@
 import type uPlot from "uplot";
 import { columns, numberAt, Rate, Series, shapeOf, valueAt, writable, type Path } from "../data";
 import { emptyCard, h, icon, setText } from "../dom";
+import { numberIn } from "../format";
 import type { Page, Robot } from "../page";
 import { isMessage, type Json, type Message } from "../rosbridge";
 import "uplot/dist/uPlot.min.css";
@@ -224,7 +225,7 @@ class TopicView {
     };
     again.onclick = () => {
       if (this.#timer !== undefined) return stop();
-      const hertz = Number(rate.value.replace(",", "."));
+      const hertz = numberIn(rate.value);
       if (!(hertz > 0 && hertz <= 50)) return this.#say("The rate is a number up to 50 Hz.", "bad");
       if (!this.#send()) return;
       this.#timer = setInterval(() => this.#send() || stop(), 1000 / hertz);

@@ -2,7 +2,7 @@
 import { watchComponents, type Component } from "../description";
 import { emptyCard, h, icon, setText } from "../dom";
 import type { RobotScene, Pose, View } from "../elements/robot_scene";
-import { formatName } from "../format";
+import { formatName, numberIn } from "../format";
 import { armsOf, centred, moversOf, onWay, planOf, positionsOf, randomized, sliderOf, thingsOf, wayOf, type Arm, type JointSlider, type Mover, type Waypoint } from "../model";
 import type { Page, Robot } from "../page";
 import { PartsEditor } from "../parts_editor";
@@ -307,7 +307,7 @@ class ArmGoal {
     const form = h("form", { class: "tip-form" }, ...fields.map(({ element }) => element), plan);
     form.onsubmit = (event) => {
       event.preventDefault();
-      const values = this.#poses.map((input, at) => Number(input.value.replace(",", ".")) * (at < 3 ? 0.01 : Math.PI / 180));
+      const values = this.#poses.map((input, at) => numberIn(input.value) * (at < 3 ? 0.01 : Math.PI / 180));
       if (values.some((value) => !Number.isFinite(value))) return this.#say("Each of the six must be a number.", "bad");
       const [x, y, z, roll, pitch, yaw] = values as [number, number, number, number, number, number];
       const pose = { x, y, z, roll, pitch, yaw };
