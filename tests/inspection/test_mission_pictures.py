@@ -88,6 +88,14 @@ def test_each_node_is_drawn_once() -> None:
     assert sorted(numbers) == list(range(tour().count))
 
 
+@pytest.mark.parametrize(
+    ("text", "shown"), [("$round of <b>4</b>", "$round of <b>4</b>"), ("many words " * 9, f"{'many words ' * 5}ma...")]
+)
+def test_a_line_for_the_log_is_shown_with_its_text_shortened_if_it_is_long(text: str, shown: str) -> None:
+    picture = picture_of(program_of(f'data: {{round: 0}}\ndo: {{log: "{text}"}}'), RobotNames())
+    assert picture.main.title == f"log {shown}"
+
+
 def test_a_picture_passes_through_json() -> None:
     assert picture_from_data(json.loads(json.dumps(picture_to_data(tour())))) == tour()
 

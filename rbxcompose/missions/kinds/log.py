@@ -38,6 +38,10 @@ class LogStep(sdk.Deed):
         """Say the text."""
         return sdk.logged_in_words(self.template, self.level)
 
+    def text(self, node: sdk.MissionNode) -> str:
+        """Return the text, in which names are not filled in."""
+        return self.template.text
+
     def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return that it fails only if it cannot read a value."""
         return sdk.ALWAYS_SUCCEEDS if sdk.is_sure(node, endings.program, endings.robot) else sdk.ANY
