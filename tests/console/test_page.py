@@ -202,15 +202,22 @@ def test_somebody_else_who_drives_is_named(open_page: Callable[..., Page], gatew
 
 
 def test_without_a_name_nobody_drives(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+    gateway.others = "Ben"
     page = open_page(name="")
+    expect(page.locator(".lease")).to_contain_text("Ben is driving")
+    page.locator("#name").press_sequentially("  Ad")
+    gateway.others = None
+    expect(page.locator(".lease")).not_to_contain_text("Ben")
+    expect(page.locator("#name")).to_be_focused()
+    page.keyboard.type("a ")
+    page.locator("#name").blur()
     page.keyboard.down("Shift")
     page.keyboard.down("KeyA")
     expect(page.locator(".hint").first).to_have_text("Enter your name first.")
     assert gateway.calls("/console/drive") == []
     page.keyboard.up("KeyA")
     page.keyboard.up("Shift")
-    page.fill("#name", "  Ada ")
-    page.keyboard.press("Enter")
+    page.locator("#name").press("Enter")
     page.reload()
     expect(page.locator(".lease")).to_contain_text("You are Ada")
 

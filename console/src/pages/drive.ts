@@ -152,10 +152,11 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
     painted = shown;
     const held = lease.contains(document.activeElement);
     lease.dataset.kind = kind;
+    const other = [icon("warning"), words(`${holder} is driving`, `You can drive when ${holder} lets go`)];
     if (kind === "name") {
-      lease.replaceChildren(nameForm());
+      lease.replaceChildren(...(holder ? other : []), nameForm);
     } else if (kind === "other") {
-      lease.replaceChildren(icon("warning"), words(`${holder} is driving`, `You can drive when ${holder} lets go`));
+      lease.replaceChildren(...other);
     } else if (kind === "mine") {
       lease.replaceChildren(
         icon("wheel"),
@@ -181,23 +182,20 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
     return element;
   };
 
-  const nameForm = () => {
-    const input = h("input", { id: "name", maxlength: String(NAME_LENGTH), autocomplete: "nickname", required: "" });
-    const form = h(
-      "form",
-      {},
-      h("label", { for: "name" }, "Your name, shown to others while you drive"),
-      h("div", { class: "row" }, input, h("button", {}, "OK")),
-    );
-    form.onsubmit = (event) => {
-      event.preventDefault();
-      name = input.value.trim().slice(0, NAME_LENGTH);
-      storeName(name);
-      blocked = "";
-      pad.focus();
-      paint();
-    };
-    return form;
+  const nameInput = h("input", { id: "name", maxlength: String(NAME_LENGTH), autocomplete: "nickname", required: "" });
+  const nameForm = h(
+    "form",
+    {},
+    h("label", { for: "name" }, "Your name, shown to others while you drive"),
+    h("div", { class: "row" }, nameInput, h("button", {}, "OK")),
+  );
+  nameForm.onsubmit = (event) => {
+    event.preventDefault();
+    name = nameInput.value.trim().slice(0, NAME_LENGTH);
+    storeName(name);
+    blocked = "";
+    pad.focus();
+    paint();
   };
 
   const interrupted = () => dispatch({ is: "interrupted" });
