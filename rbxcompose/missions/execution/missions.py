@@ -269,7 +269,7 @@ class RunningMissions:
         known = self._equipment.inputs.get(name, {})
         inputs, findings = bind_texts(program, given, known, self._equipment.names.places)
         if findings:
-            raise Refused("; ".join((*(finding.message for finding in findings), "give inputs by '--set NAME=VALUE'")))
+            raise Refused("; ".join(finding.message for finding in findings))
         return inputs
 
     def _clash(self, linked: Program, lent: frozenset[str]) -> str:
