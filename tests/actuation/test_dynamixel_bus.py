@@ -13,7 +13,8 @@ from rbxcompose.domains.servos.bus import FoundServo, ServoBus
 from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
 from rbxcompose.domains.servos.models import servo_models
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
-from rbxcompose.domains.servos.twins.servo_packets import READ, SYNC_READ, SYNC_WRITE
+from rbxcompose.domains.servos.twins.servo_line import FakeReply
+from rbxcompose.domains.servos.twins.servo_packets import READ, SYNC_READ, SYNC_WRITE, status
 from rbxcompose.domains.servos.twins.servo_port import FakePort
 from tests.actuation.conftest import Plugged
 from tests.soak import rare
@@ -206,6 +207,21 @@ def test_a_scan_finds_servos_and_their_models(connect: Connect) -> None:
     assert bus.ping(5) is None
     assert bus.count(1, 1) == 1
     assert bus.count(5, 2) == 0
+
+
+@pytest.mark.parametrize(("model", "protocol"), [("AX-12", 1), ("XL430-W250", 2)])
+def test_a_late_reply_to_something_else_tells_no_model(connect: Connect, model: str, protocol: int) -> None:
+    bus, port = connect({1: model}, timeout=BRISK, retries=0)
+    hear = port.line.receive
+    port.line.receive = lambda data, baud=None: [FakeReply(0.0, status(protocol, 1, 0))]  # type: ignore[method-assign]
+    assert bus.ping(1) is None
+    port.line.receive = lambda data, baud=None: [  # type: ignore[method-assign]
+        FakeReply(0.0, status(protocol, 1, 0)),
+        *hear(data, baud),
+    ]
+    found = bus.ping(1)
+    assert found
+    assert found.name == model
 
 
 @pytest.mark.parametrize("model", ["AX-12", "XL430-W250"])

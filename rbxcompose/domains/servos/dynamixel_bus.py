@@ -15,6 +15,7 @@ from rbxcompose.domains.devices.serial_ports import LostPortError, latency_of, p
 from rbxcompose.domains.servos import bus as servo_bus
 from rbxcompose.domains.servos.bus import ID_TAKEN, REFUSED, SILENT, UNKNOWN_MODEL
 from rbxcompose.domains.servos.dynamixel_port import (
+    MODEL,
     Answer,
     BlockingPort,
     NoAnswer,
@@ -194,7 +195,6 @@ def in_other_order(ids: Sequence[int]) -> list[int]:
 
 IDS = range(253)
 _SLACK = 0.001  # [s] beyond the latency timer of an adapter
-_MODEL = Stretch(0, 2)  # where all tables have the model's number
 _NOBODY = b"\xff\xff\xfe\x04\x83\x00\x01\x79"  # a group write to no servo, for which nobody sends a reply
 
 
@@ -297,9 +297,13 @@ class DynamixelBus:
         return next((servo for servo in found if servo), None)
 
     def _pinged(self, id: int, protocol: int) -> servo_bus.FoundServo | None:
+        packets = self._packets[protocol]
         with self._in_use() as port:
-            number, result, _ = self._packets[protocol].ping(port, id)
-        return servo_bus.FoundServo(id, protocol, number, self.baud) if result == COMM_SUCCESS else None
+            packets.ask_model(port, id)
+            while (answer := packets.receive(port)) is not NoAnswer.SILENCE:
+                if isinstance(answer, Answer) and answer.id == id and len(answer.data) == packets.greeting:
+                    return servo_bus.FoundServo(id, protocol, int.from_bytes(answer.data[:2], "little"), self.baud)
+        return None
 
     def scan(self, ids: Iterable[int] = IDS, protocols: Sequence[int] = (1, 2)) -> Iterator[servo_bus.FoundServo]:
         """Yield the servos that answer, asking each id once in each protocol."""
@@ -313,8 +317,8 @@ class DynamixelBus:
         replies = 0
         with self._in_use() as port:
             packets = self._packets[protocol]
-            packets.ask(port, {id: _MODEL})
-            port.wait_for(2 * (packets.reply + _MODEL.length), replies=2)
+            packets.ask(port, {id: MODEL})
+            port.wait_for(2 * (packets.reply + MODEL.length), replies=2)
             while (answer := packets.receive(port)) is not NoAnswer.SILENCE:
                 # Two that speak at once spoil each other's reply.
                 replies += 2 if answer is NoAnswer.CORRUPT else isinstance(answer, Answer)

@@ -10,7 +10,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import Enum
 from typing import NamedTuple
 
-from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PortHandler, Protocol1PacketHandler, Protocol2PacketHandler
+from dynamixel_sdk import (
+    COMM_RX_TIMEOUT,
+    COMM_SUCCESS,
+    INST_PING,
+    PortHandler,
+    Protocol1PacketHandler,
+    Protocol2PacketHandler,
+)
 
 from rbxcompose.domains.devices import serial_line, serial_ports
 from rbxcompose.domains.servos.bus import REPLY, ROOM
@@ -174,6 +181,9 @@ _ONE_REFUSED = 2 | 8 | 16 | 64  # bits in 1.0 that are about the request: limits
 _FAST_HEAD, _FAST_ID = 8, 254  # [B] before the first part of a fast reply; the id under which it comes
 
 
+MODEL = Stretch(0, 2)  # where all tables have the model's number
+
+
 class Answer(NamedTuple):
     """One reply."""
 
@@ -192,8 +202,8 @@ class NoAnswer(Enum):
 class PacketsOne(Protocol1PacketHandler):  # type: ignore[misc]  # the SDK has no types
     """Protocol 1.0. It has no group read but that of MX servos, which read different stretches."""
 
-    head, reply, group = b"\xff\xff", REPLY[1], ROOM[1]
-    """How packets begin; the length of a reply without data, and of what fits into one request [B]."""
+    head, reply, group, greeting = b"\xff\xff", REPLY[1], ROOM[1], MODEL.length
+    """How packets begin; the lengths of a reply without data, of what fits into one request, and of the model [B]."""
 
     def receive(self, port: BlockingPort) -> Answer | NoAnswer:
         """Return the next reply."""
@@ -201,6 +211,10 @@ class PacketsOne(Protocol1PacketHandler):  # type: ignore[misc]  # the SDK has n
         if result != COMM_SUCCESS:
             return _no_answer(port, raw, result, self.head)
         return Answer(raw[2], raw[4], bytes(raw[5:-1]))
+
+    def ask_model(self, port: BlockingPort, id: int) -> None:
+        """Ask a servo for its model, which its reply to a ping does not have."""
+        self.ask(port, {id: MODEL})
 
     def ask(self, port: BlockingPort, wanted: Mapping[int, Stretch]) -> bool:
         """Send one request for a stretch of each servo; return whether it was sent."""
@@ -223,7 +237,7 @@ class PacketsOne(Protocol1PacketHandler):  # type: ignore[misc]  # the SDK has n
 class PacketsTwo(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK has no types
     """Protocol 2.0."""
 
-    head, reply, group = b"\xff\xff\xfd", REPLY[2], ROOM[2]
+    head, reply, group, greeting = b"\xff\xff\xfd", REPLY[2], ROOM[2], MODEL.length + 1
     """As in protocol 1.0."""
 
     def addStuffing(self, packet: list[int]) -> list[int]:  # noqa: N802
@@ -248,6 +262,11 @@ class PacketsTwo(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK has n
             return
         for start in range(_FAST_HEAD, len(raw) - 1, length + 4):
             yield Answer(raw[start + 1], raw[start], bytes(raw[start + 2 : start + 2 + length]))
+
+    def ask_model(self, port: BlockingPort, id: int) -> None:
+        """Ask a servo for its model and firmware, also one that answers nothing but this."""
+        self.txPacket(port, [0, 0, 0, 0, id, 3, 0, INST_PING, 0, 0])
+        port.wait_for(self.reply + self.greeting)
 
     def ask(self, port: BlockingPort, wanted: Mapping[int, Stretch], *, is_fast: bool = False) -> bool:
         """Send one request for a stretch of each servo; return whether it was sent."""
