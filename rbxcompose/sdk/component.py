@@ -2,6 +2,7 @@
 
 import inspect
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from functools import cache
 from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, get_args
 
@@ -132,6 +133,7 @@ class Component(Generic[C]):
         self.config = config
         self.context = context
         self.bound: dict[str, Any] = {}  # by port name, filled before `configure`
+        self.at_end = ExitStack()  # closed after `cleanup`, and instead of it after an exception
 
     @classmethod
     def config_type(cls) -> type[Config]:
@@ -209,7 +211,11 @@ class Component(Generic[C]):
         self.context.watch(name, task)
 
     def configure(self) -> None:
-        """Prepare: import heavy packages, build the core, open devices. Nothing moves yet."""
+        """Prepare: import heavy packages, build the core, open devices. Nothing moves yet.
+
+        Give what must be released in any case, such as an open port, to `at_end`: a context, or a callback. It is
+        called even after an exception of this component, which is then called for nothing else.
+        """
 
     def reconfigure(self, old: C) -> None:
         """Apply `config`, which differs from `old` in fields that are marked `Live` or `Replaceable`.
@@ -236,7 +242,7 @@ class Component(Generic[C]):
         """Stop working; steps and messages end."""
 
     def cleanup(self) -> None:
-        """Release what `configure` acquired."""
+        """Release what `configure` acquired; not called after an exception, unlike what `at_end` was given."""
 
     def step(self, dt: float) -> None:
         """Advance by `dt` [s], `rate` times per second."""

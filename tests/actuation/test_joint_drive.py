@@ -117,7 +117,7 @@ def test_the_same_cycle_drives_servos_by_bytes() -> None:
         while abs(drive.measured.position - 0.2) > servo_joint.per_tick and time.monotonic() < begin + 10:
             cycle.run(time.monotonic(), PERIOD)
         assert drive.measured.position == pytest.approx(0.2, abs=servo_joint.per_tick)
-        cycle.relax(time.monotonic(), PERIOD)
+        cycle.end()
         assert bus.read([1], ["torque_enable"])[1].values["torque_enable"] == 0
 
 

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from rbxcompose.base.clock import SteppedClock
 from rbxcompose.base.requests import Refused
 from rbxcompose.domains.servos.components.servo_bus import ServoBusDriver
+from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
 from rbxcompose.domains.servos.joint_states import JointMode
+from rbxcompose.domains.servos.models import servo_models
 from rbxcompose.domains.servos.twins.fault_script import InjectFault, ListFaults
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.sdk.ports import Qos
-from rbxcompose.testing import Bench, instance
+from rbxcompose.testing import Bench, FakeLine, FakePort, FakeServo, instance
 from tests.soak import rare
 
 LIMITS = {"lower": -2.0, "upper": 2.0, "velocity": 1.5, "acceleration": 8.0}
@@ -45,6 +49,42 @@ class Head:
     def go(self, joint: str, position: float) -> None:
         self.robot.bus.publisher("me", f"/{joint}/command", Float64, Qos.COMMAND)(Float64(data=position))
         self.robot.advance(0.02)
+
+
+class Ticking(SteppedClock):
+    """Simulated time that advances whenever it is looked at, so that who waits for it goes on."""
+
+    def now(self) -> float:
+        self._now += 1e-3
+        return self._now
+
+    def advance_to(self, t: float) -> None:
+        super().advance_to(max(t, self._now))
+
+
+@pytest.mark.parametrize(
+    ("on_shutdown", "mode", "torque", "speed"),
+    [("relax", "position", 0, 300), ("park", "position", 1, 300), ("hold", "velocity", 1, 0)],
+)
+def test_a_driver_that_raises_ends_torque_as_declared_and_opens_its_port_again(
+    on_shutdown: str, mode: str, torque: int, speed: int, tmp_path: Path
+) -> None:
+    line = FakeLine([FakeServo("AX-12", 1)], SteppedClock().now)
+    joint = {**LIMITS, "mode": mode, "servos": [{"id": 1, "model": "AX-12"}]}
+    with FakePort(line, tmp_path / "servos") as port:
+        config = {"joints": {"pan": joint}, "port": str(port.path), "on_shutdown": on_shutdown}
+        robot = Bench(instance("servos", "servo_bus", config), clock=Ticking())
+        driver = robot.component("servos")
+        line[1].set("torque_enable", 1)
+        line[1].set("goal_velocity", 300)
+        driver.run_cycle = lambda: 1 / 0  # type: ignore[attr-defined]
+        assert robot.run_until(lambda: robot.host.states()["servos"][0] != "active", 1.0)
+        with DynamixelBus(str(port.path), {1: servo_models()["AX-12"]}, timeout=0.2) as bus:
+            left = bus.read([1], ["torque_enable", "goal_velocity"])[1].values
+        assert left == {"torque_enable": torque, "goal_velocity": speed}
+        robot.run_until(lambda: robot.host.states()["servos"] == ("active", 1), 2.0)
+        assert robot.host.states()["servos"] == ("active", 1)
+        robot.host.shutdown()
 
 
 @pytest.mark.parametrize("twin", ["servo", *rare("ideal")])

@@ -27,6 +27,7 @@ class ToyConfig(Config):
 
 
 BROKEN: dict[str, int] = {}  # how often each test's component has raised
+HELD: set[str] = set()  # components that hold what only one can hold at a time
 
 
 @component("toy_for_host")
@@ -40,6 +41,10 @@ class Toy(Component[ToyConfig]):
     def configure(self) -> None:
         self.steps = 0
         self.life: list[str] = ["configure"]
+        assert self.name not in HELD
+        HELD.add(self.name)
+        self.at_end.callback(HELD.discard, self.name)
+        self.at_end.callback(self.break_in, "release")
         self.break_in("configure")
 
     def activate(self) -> None:
@@ -68,6 +73,7 @@ class Toy(Component[ToyConfig]):
 @pytest.fixture(autouse=True)
 def _fresh() -> None:
     BROKEN.clear()
+    HELD.clear()
 
 
 def bench(breaks_in: str, times: int = 1) -> Bench:
@@ -83,6 +89,15 @@ def test_a_component_that_raises_is_restarted_and_the_others_go_on(method: str) 
     robot.advance(2.0)
     assert robot.host.states() == {"broken": ("active", 1), "healthy": ("active", 0)}
     assert robot.component("healthy").steps == 20  # type: ignore[attr-defined]
+
+
+def test_what_a_component_holds_is_released_at_its_end_although_a_part_of_that_raises() -> None:
+    robot = bench("release")
+    robot.host.failed("broken", ValueError("elsewhere"))
+    assert {"healthy"} == HELD
+    assert "broken: not all is released: break_in raised ValueError: planted (test_host.py:" in "".join(robot.texts())
+    robot.host.shutdown()
+    assert set() == HELD
 
 
 def test_a_mistake_is_told_with_method_cause_and_line_and_its_traceback_is_in_the_log() -> None:

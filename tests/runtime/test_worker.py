@@ -62,6 +62,7 @@ class Planner(Component[NoConfig]):
 
     blocking = True
     gate: ClassVar[Gate]
+    released: ClassVar[list[str]]  # the thread of each end
     raises: ClassVar[bool]
     work = In(Float32, "work", qos=Qos.EVENT)
     done = Out(Float32, "done", qos=Qos.EVENT)
@@ -77,6 +78,7 @@ class Planner(Component[NoConfig]):
         self.threads: set[str] = {threading.current_thread().name}
         self.stops = self.brakes = 0
         self.replies: list[Reply[Trigger.Response]] = []
+        self.at_end.callback(lambda: self.released.append(threading.current_thread().name))
 
     def on_work(self, message: Float32) -> None:
         self.threads.add(threading.current_thread().name)
@@ -195,7 +197,7 @@ class Process:
 
 @pytest.fixture
 def process() -> Iterator[Process]:
-    Planner.gate, Planner.raises = Gate(), False
+    Planner.gate, Planner.raises, Planner.released = Gate(), False, []
     made = Process()
     yield made
     made.close()
@@ -279,6 +281,7 @@ def test_a_fault_in_its_thread_restarts_it_alone(process: Process) -> None:
     error = next(record for record in process.records if record.level is Level.ERROR)
     assert error.source == "planner"
     assert error.text.startswith("on_work raised ValueError: planted (test_worker.py:")
+    assert Planner.released == ["planner"]  # what it held, without delaying the others
 
 
 def test_a_call_that_takes_long_is_told_and_one_that_never_returns_is_a_fault(process: Process) -> None:
@@ -303,6 +306,7 @@ def test_a_call_that_takes_long_is_told_and_one_that_never_returns_is_a_fault(pr
     process.send("work", 2.0)
     process.until(lambda: done)
     assert done == [2.0]  # and nothing of the one that was left behind
+    assert Planner.released == ["planner"]  # but what it held, when it returned at last
 
 
 def test_a_component_that_says_so_may_be_configured_for_longer() -> None:
@@ -370,7 +374,7 @@ def test_one_that_does_not_return_is_left_behind_when_the_robot_goes_down(proces
 
 
 def test_on_a_stepped_clock_it_runs_inline() -> None:
-    Planner.gate, Planner.raises = Gate(), False
+    Planner.gate, Planner.raises, Planner.released = Gate(), False, []
     Planner.gate.opened.set()
     bench = Bench(replace(instance("planner", "toy_planner")))
     done = bench.collect("done", Float32)

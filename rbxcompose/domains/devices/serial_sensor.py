@@ -50,6 +50,7 @@ class SerialSensor(sdk.Component[C]):
     def configure(self) -> None:
         """Begin with a closed port."""
         self.line = SerialLine(self.config.port, int(self.config.baud))
+        self.at_end.callback(self.line.close)
         self.patience = WAIT if self.context.clock.is_real else 0.0
         self.faults: Counter[str] = Counter()  # by what is wrong
         self.bytes_since = 0  # since something could be read
@@ -138,7 +139,3 @@ class SerialSensor(sdk.Component[C]):
     def values(self) -> dict[str, str]:
         """Return what people may want to know besides."""
         return {}
-
-    def cleanup(self) -> None:
-        """Close the port."""
-        self.line.close()

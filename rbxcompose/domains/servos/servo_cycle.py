@@ -12,7 +12,6 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.servos.bus import FAST, SELDOM, ServoBus, slow_items
 from rbxcompose.domains.servos.curves import JointSample
 from rbxcompose.domains.servos.joint_drive import JointDrive, JointServo, ServoJoint, Writes
-from rbxcompose.domains.servos.joint_states import Relax
 from rbxcompose.domains.servos.models import EXTENDED, ServoModel
 
 PERIOD = 0.1  # [s] between two uses of one item
@@ -298,13 +297,12 @@ class ServoCycle:
                 self.torques.write(self.bus, servo)
             yield from keep_speeds(self.bus, drive)
 
-    def relax(self, now: float, dt: float) -> None:
-        """Switch all torque off, twice, since nobody confirms a group write."""
-        for drive in self.drives.values():
-            drive.ask(Relax())
-            drive.step(now, dt)
+    def end(self, *, is_kept: bool = False) -> None:
+        """Switch all torque off, or stop what turns if it is kept; twice, since nobody confirms a group write."""
+        wheels = [id_ for drive in self.drives.values() if drive.joint.mode == "velocity" for id_ in drive.joint.ids]
+        ids, item = (wheels, "goal_velocity") if is_kept else (self.ids, "torque_enable")
         for _ in range(2):
-            self.bus.write({id_: {"torque_enable": 0} for id_ in self.ids})
+            self.bus.write({id_: {item: 0} for id_ in ids})
 
     def _write(self, stages: list[list[Writes]]) -> None:
         for stage in zip_longest(*stages):

@@ -24,6 +24,7 @@ from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, K
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.runtime.channel import Repeated
+from rbxcompose.runtime.faults import explain
 from rbxcompose.runtime.process_group.live_ports import Frames, bind, subscribe
 from rbxcompose.runtime.process_group.worker import ACTIVATE, CONFIGURE, HandedOver, Worker, handed_over
 from rbxcompose.sdk.bound import Window
@@ -404,13 +405,24 @@ class Hosted:
             self.host.bus.close_owner(self.instance.name)
 
     def abandon(self) -> None:
-        """Drop the component without cleaning up."""
-        if self.worker is not None:
-            self.worker.close(0.0)
+        """Drop the component without calling it again; what it holds is released, in its own thread if it has one."""
+        worker, component = self.worker, self.component
         self.component = self.worker = None
+        if worker is not None:
+            in_turn = partial(worker.post, self.instance.name)
+            worker.close(0.0, partial(self._release, component, in_turn) if component else None)
+        elif component is not None:
+            self._release(component, lambda call: call())
         self._claiming = []
         self._wakes.clear()
         self.state = Lifecycle.UNCONFIGURED
+
+    def _release(self, component: Component[Any], in_turn: Callable[[Callable[[], None]], None]) -> None:
+        try:
+            component.at_end.close()
+        except Exception as error:  # whatever it raises, all the rest has been released
+            words, detail = explain(error, self.file)
+            in_turn(partial(self.host.log, self.instance.name, Level.WARN, f"not all is released: {words}", detail))
 
     def _taken_back(self, component: Component[Any]) -> bool:
         """Return the component to the scheduler's thread; return whether its own thread has let go of it."""

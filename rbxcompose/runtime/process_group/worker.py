@@ -56,11 +56,12 @@ class Worker:
         self._configures_within = configures_within
         self.skipped = 0  # calls dropped in favour of newer ones
         self._owner, self._clock, self._failed = owner, clock, failed
-        self._post = post
+        self.post = post
         self._waiting: list[_Waiting] = []
         self._label = ""  # of the call that runs
         self._since = 0.0  # [s] of robot time
         self.is_closed = False
+        self._last: Call | None = None
         self._calls: SimpleQueue[Call | None] = SimpleQueue()
         self._thread = threading.Thread(target=self._run, name=owner, daemon=True)
         self._thread.start()
@@ -83,7 +84,7 @@ class Worker:
 
     def send(self, call: Call) -> None:
         """Run `call` in the scheduler's thread, unless the component is gone by then. Any thread may call this."""
-        self._post(self._owner, lambda: None if self.is_closed else call())
+        self.post(self._owner, lambda: None if self.is_closed else call())
 
     def busy_for(self) -> tuple[str, float]:
         """Return the label of the current call, and how long it has been running [s]."""
@@ -103,10 +104,11 @@ class Worker:
             self._failed(error)
         return f"has been in {label} for {seconds:.0f} s" if seconds > LONG else ""
 
-    def close(self, patience: float) -> bool:
-        """Drop the waiting calls and end the thread; return whether it has ended within `patience` [s]."""
+    def close(self, patience: float, last: Call | None = None) -> bool:
+        """Drop the waiting calls and end the thread, after the call `last`; return whether that took `patience` [s]."""
         self.is_closed = True
         self._waiting.clear()
+        self._last = last
         self._calls.put(None)
         if self._thread is not threading.current_thread():
             self._thread.join(patience)
@@ -125,7 +127,9 @@ class Worker:
                 call()
             except Exception as raised:  # whatever a component raises is its own failure, and reported as such
                 error = raised
-            self._post(self._owner, lambda error=error: self._returned(error))  # type: ignore[misc]
+            self.post(self._owner, lambda error=error: self._returned(error))  # type: ignore[misc]
+        if self._last is not None:
+            self._last()
 
     def _returned(self, error: Exception | None) -> None:
         self._label = ""

@@ -134,6 +134,8 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
         compile_elsewhere(self.config, self.context.clock)
         self.works = ArmWorks(self.config, lambda: self.now)
         self.works.helpers = self.helpers = planning_processes(self.config, self.context.clock, self.warn)
+        for helper in self.helpers:
+            self.at_end.callback(helper.close)
         if self.works.always:
             words = pairs_shown(self.works.always, len(self.works.always))
             self.info(f"links that always collide are not watched: {words}")
@@ -148,11 +150,6 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
         self.is_stopped = False
         self.stage, self.ended, self.duration = "", dict[str, str](), 0.0  # for viewers
         self.due = -math.inf  # [s], when it goes on with what is commanded by hand
-
-    def cleanup(self) -> None:
-        """End the processes that plan."""
-        for helper in self.helpers:
-            helper.close()
 
     def activate(self) -> None:
         """Let viewers see it."""

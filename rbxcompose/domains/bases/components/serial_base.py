@@ -106,6 +106,7 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
         self.last: wheel_board.BoardState | None = None
         self.was_alive = False
         self.refused = ""
+        self.at_end.callback(self.stand)
 
     def new_odometry(self, pose: Pose2) -> WheelOdometry:
         """Return an odometry that begins at a pose, wherever the encoders are."""
@@ -240,11 +241,10 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
         """Come to rest for good."""
         self.drive.brake()
 
-    def cleanup(self) -> None:
-        """Let the board stand, and close the port."""
+    def stand(self) -> None:
+        """Let the board stand, if it can hear that."""
         if self.line.is_open:
             self.say(WheelSpeeds())
-        super().cleanup()
 
     def summary(self) -> dict[str, str]:
         """Report where it went."""

@@ -207,6 +207,7 @@ class Gateway(Component[GatewayConfig]):
     def configure(self) -> None:
         """Serve nothing yet: the robot must be known from outside first."""
         self.server: GatewayThread | None = None
+        self.at_end.callback(self.close)
 
     def activate(self) -> None:
         """Take the port, unless robot time is stepped: browsers live in real time."""
@@ -224,7 +225,7 @@ class Gateway(Component[GatewayConfig]):
         if self.server is not None:
             self.server.start()
 
-    def cleanup(self) -> None:
+    def close(self) -> None:
         """Let all clients go, and free the port."""
         if self.server is not None:
             self.server.close()

@@ -89,6 +89,7 @@ class Gamepad(sdk.Component[GamepadConfig]):
     def configure(self) -> None:
         """Begin without a gamepad."""
         self.pad: EventPad | None = None
+        self.at_end.callback(self.close)
         self.held = HeldDrive(settings_of(self.config))
         self.patience = _WAIT if self.context.clock.is_real else 0.0
         self.there: object = None  # the input devices when it looked the last time
@@ -223,7 +224,7 @@ class Gamepad(sdk.Component[GamepadConfig]):
         """Come to rest for good."""
         self.stop()
 
-    def cleanup(self) -> None:
+    def close(self) -> None:
         """Close the gamepad."""
         if self.pad is not None:
             self.pad.close()

@@ -42,6 +42,7 @@ class Voice(sdk.Component[VoiceConfig]):
         self.pipeline, self.trouble = pipeline_of(self.config.engine, self.config.voice)
         self.goal: object = None  # what is being said
         self.utterance: Utterance | None = None
+        self.at_end.callback(self.be_silent)
         self.until = -math.inf  # [s] of robot time, until which words take time, or a program may speak
 
     def activate(self) -> None:
@@ -110,7 +111,3 @@ class Voice(sdk.Component[VoiceConfig]):
             self.status(Level.WARN, f"nobody hears it: {self.trouble}")
         else:
             self.status(Level.OK, f"speaks by {self.pipeline[0][0]}" if self.pipeline else "words are logged")
-
-    def cleanup(self) -> None:
-        """Be silent."""
-        self.be_silent()

@@ -277,6 +277,7 @@ class Runner(Component[R]):
                 self.add_diagnostic(end.key.name.lstrip("/"), self._frequency(end))
         self.add_diagnostic("program", lambda now: self.state)
         self.state = TaskStatus(Level.OK, "not started yet")
+        self.at_end.callback(self._release)
 
     def activate(self) -> None:
         """Start it, and wait until it is ready."""
@@ -359,10 +360,6 @@ class Runner(Component[R]):
             while not self.is_over and self.real_time.now() < deadline:
                 self.child.wait(_PAUSE)
                 self._hear()
-
-    def cleanup(self) -> None:
-        """Leave nothing of it behind."""
-        self._release()
 
     # Starting
 

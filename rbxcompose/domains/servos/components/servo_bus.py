@@ -155,7 +155,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     def configure(self) -> None:
         """Open the bus, real or simulated; nothing moves."""
-        config, self.at_end = self.config, ExitStack()
+        config = self.config
         self.period = 1.0 / config.rate
         self.pause = (cycles_between(config) - 0.5) * self.period  # [s] between two joint states, cycles being late
         self.periods = Periods(self.period)
@@ -167,6 +167,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.warn(opened.note)
         self.faults, self.physics = opened.faults, opened.physics
         self.cycle = ServoCycle(opened.bus, drives, mimics, config.watchdog, config.thermal.scope == "bus")
+        self.keeps_torque = config.on_shutdown != "relax"
+        self.at_end.callback(self.end_torque)
         self.reboots = Reboots(opened.bus, self.prepare)
         seats = {
             name: ControllerSite(self, name, {joint: drives[joint] for joint in item.config.claimed})
@@ -468,13 +470,15 @@ class ServoBusDriver(Component[ServoBusConfig]):
                 drive.ask(MoveTo(self.config.park[name]))
 
     def cleanup(self) -> None:
-        """Relax the joints, unless they are to hold, and give the port back."""
+        """Let go of joints that are parked."""
+        self.keeps_torque = self.config.on_shutdown == "hold"
+
+    def end_torque(self) -> None:
+        """Relax the joints; those that are to hold, or are not parked since this driver failed, only stop turning."""
         try:
-            if self.config.on_shutdown != "hold":
-                self.cycle.relax(self.now, self.period)
+            self.cycle.end(is_kept=self.keeps_torque)
         except PortError as error:
-            self.warn(f"the joints could not be relaxed: {error}")
-        self.at_end.close()
+            self.warn(f"the torque of joints is left as it was: {error}")
 
 
 def cycles_between(config: ServoBusConfig) -> int:

@@ -92,6 +92,7 @@ class UsbCamera(sdk.Component[UsbCameraConfig]):
     def configure(self) -> None:
         """Open the camera; if that fails, it is tried again."""
         self.camera: cv2.VideoCapture | None = None
+        self.at_end.callback(self.close)
         file = self.config.calibration
         self.known = CameraFile.read(Path(file)) if file else None
         self.tried = -math.inf  # [s]
@@ -133,7 +134,7 @@ class UsbCamera(sdk.Component[UsbCameraConfig]):
             return
         is_there, picture = self.camera.read()
         if not is_there:
-            self.cleanup()
+            self.close()
             self.fail(f"{self.config.device} gives no more pictures")
             return
         height, width, _ = picture.shape
@@ -159,7 +160,7 @@ class UsbCamera(sdk.Component[UsbCameraConfig]):
             self.warn(why)
         self.state = TaskStatus(Level.ERROR, why)
 
-    def cleanup(self) -> None:
+    def close(self) -> None:
         """Close the camera."""
         if self.camera is not None:
             self.camera.release()

@@ -125,6 +125,7 @@ class PhysicsSim(sdk.Component[PhysicsConfig]):
     def configure(self) -> None:
         """Wait for the world."""
         self.engine: PhysicsWorld | None = None
+        self.at_end.callback(self.end_engine)
         self.sensors = dict[str, PhysicsSensor]()  # on links that exist
         self.wanted, self.wanted_at = AT_REST, 0.0
         self.touched: frozenset[str] = frozenset()
@@ -295,7 +296,7 @@ class PhysicsSim(sdk.Component[PhysicsConfig]):
             self.contact(String(data=what))
         self.touched = touched
 
-    def cleanup(self) -> None:
+    def end_engine(self) -> None:
         """Let go of the engine."""
         if self.engine is not None:
             self.engine.close()
