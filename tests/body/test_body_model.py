@@ -62,6 +62,32 @@ def test_links_and_joints_are_read_with_their_values(arm: Body) -> None:
     assert arm.joints["finger"].span[:3] == ("arm.urdf", 18, 3)
 
 
+@pytest.mark.parametrize(
+    ("mimic", "expected"),
+    [
+        ('multiplier="4" offset="0.5"', (-0.875, 0.625, 0.5)),
+        ('multiplier="-4" offset="0.5"', (-0.625, 0.875, 0.5)),
+        ('multiplier="0" offset="9"', (-1.0, 1.0, 2.0)),
+        ('multiplier="2.9999999999"', (-1.0, 1.0, 2.0 / 3)),  # rounded
+        ('offset="9"', (-1.0, 1.0, 2.0)),  # which is told
+    ],
+)
+@pytest.mark.parametrize("kind", ["revolute", "continuous"])
+def test_a_joint_keeps_those_that_mimic_it_within_their_limits(
+    mimic: str, expected: tuple[float, float, float], kind: str
+) -> None:
+    limit = '<limit lower="-3" upper="3" effort="3" velocity="2"/>'
+    finger = f'<joint name="finger" type="{kind}">{limit}'
+    text = ARM.replace('<joint name="finger" type="continuous">', finger).replace('multiplier="2" offset="0.25"', mimic)
+    body, findings = read(text)
+    assert not findings
+    limits = body.joints["slide"].limits
+    assert limits
+    lower, upper, velocity = expected
+    wanted = (lower, upper, velocity) if kind == "revolute" else (-1.0, 1.0, velocity)
+    assert (limits.lower, limits.upper, limits.velocity) == pytest.approx(wanted, rel=1e-9)
+
+
 def test_each_link_is_where_its_joints_put_it(arm: Body) -> None:
     poses = arm.poses({"shoulder": 1.0, "slide": 0.5})
     cos, sin = math.cos(1.0), math.sin(1.0)

@@ -95,14 +95,20 @@ LIMITS = {
         "the range and the velocity and the effort of joint 'to_arm' are zero",
     ),
     "no speed of a follower": ("revolute", LIMIT.replace('y="1"', 'y="0"') + '<mimic joint="to_leader"/>', ""),
+    "none of the leader's": (
+        "revolute",
+        LIMIT + '<mimic joint="to_slide" offset="9"/>',
+        "the limits of joint 'to_arm' leave nothing of those of 'to_slide'",
+    ),
 }
 
 
 @pytest.mark.parametrize("name", LIMITS)
 def test_limits_that_keep_a_joint_from_moving_are_told(name: str) -> None:
     kind, limit, expected = LIMITS[name]
-    links = "".join(f'<link name="{link}">{HEAVY}</link>' for link in ("base", "arm", "leader"))
-    found = told(links + joint("arm", kind, limit=limit) + joint("leader", "continuous"))
+    links = "".join(f'<link name="{link}">{HEAVY}</link>' for link in ("base", "arm", "leader", "slide"))
+    leaders = joint("leader", "continuous") + joint("slide", "prismatic", limit=LIMIT)
+    found = told(links + joint("arm", kind, limit=limit) + leaders)
     assert found == ([f"RBX2011 {expected}"] if expected else [])
 
 

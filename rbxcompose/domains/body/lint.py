@@ -7,7 +7,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
-from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Severity, kind
+from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Related, Severity, kind
 from rbxcompose.base.geometry import Transform3, Vector3, rotate
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.body.files import mesh_places, named_also
@@ -226,6 +226,7 @@ def lint(body: Body, meshes: Collection[str], respelt: Mapping[str, str] = Mappi
             yield MILLIMETRES.at(joint.span, message, help=_LACKS_UNIT)
         if joint.limits is not None and joint.moves:
             yield from _limits(joint, joint.limits)
+            yield from _leading(joint, body)
 
 
 def orientations(root: XmlElement) -> Iterator[Finding]:
@@ -255,6 +256,19 @@ def _limits(joint: BodyJoint, limits: JointLimits) -> Iterator[Finding]:
         )
         help_text = f'limits in a URDF are in radians: for degrees, write \'lower="{lower:.4g}" upper="{upper:.4g}"\''
         yield DEGREES.at(limits.span, message, help=help_text)
+
+
+def _leading(joint: BodyJoint, body: Body) -> Iterator[Finding]:
+    """Yield that a joint and the one that it mimics are never both within their limits."""
+    leader = body.joints[joint.mimic.joint] if joint.mimic is not None else None
+    if leader is None or leader.limits is None or joint.limits is None or leader.kind == "continuous":
+        return
+    (least, greatest), own = joint.led_within, leader.limits.range
+    if max(least, own[0]) >= min(greatest, own[1]) and least < greatest and own[0] < own[1]:
+        names = f"'{plain(joint.name, _SHOWN)}' leave nothing of those of '{plain(leader.name, _SHOWN)}'"
+        help_text = "'multiplier' and 'offset' of '<mimic>' tell where it is"
+        related = [Related(leader.limits.span, "the limits of the joint that it mimics")]
+        yield NO_MOTION.at(joint.limits.span, f"the limits of joint {names}", help=help_text, related=related)
 
 
 def _stuck(joint: BodyJoint, limits: JointLimits) -> Iterator[str]:

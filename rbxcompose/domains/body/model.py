@@ -7,8 +7,8 @@ share it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import field, replace
 from functools import cached_property
 
 from rbxcompose.base.dataclass import dataclass
@@ -84,6 +84,11 @@ class JointLimits:
     span: Span
 
     @property
+    def range(self) -> tuple[float, float]:
+        """Return the least and greatest position, infinite where nothing is written."""
+        return -math.inf if self.lower is None else self.lower, math.inf if self.upper is None else self.upper
+
+    @property
     def may_be_degrees(self) -> bool:
         """Return whether these are angles that only degrees have: round ones, of many turns if they were radians."""
         written = [abs(value) for value in (self.lower, self.upper) if value]
@@ -154,6 +159,40 @@ class BodyJoint:
             return 0.0
         qx, qy, qz, qw = moved.rotation
         return math.remainder(2.0 * math.atan2(ax * qx + ay * qy + az * qz, qw), math.tau)
+
+    @property
+    def led_within(self) -> tuple[float, float]:
+        """Return the range of the joint that it mimics in which it is within its own limits."""
+        if self.limits is None or self.mimic is None or self.mimic.multiplier == 0.0 or self.kind == "continuous":
+            return -math.inf, math.inf
+        least, greatest = sorted((end - self.mimic.offset) / self.mimic.multiplier for end in self.limits.range)
+        return least, greatest
+
+
+ROUNDING = 1e-6  # of numbers that are written in a URDF
+
+
+def led(joints: Mapping[str, BodyJoint]) -> dict[str, BodyJoint]:
+    """Return joints whose limits also keep those that mimic them within theirs, unless nothing is left of the range."""
+    found = dict(joints)
+    for one in joints.values():
+        leader = found.get(one.mimic.joint) if one.mimic else None
+        if one.mimic is None or one.limits is None or leader is None or leader.limits is None:
+            continue
+        own, (least, greatest), speed = leader.limits, one.led_within, one.limits.velocity
+        lower, upper = _nearer(own.lower, least, max), _nearer(own.upper, greatest, min)
+        if leader.kind != "continuous" and (lower is None or upper is None or lower < upper):
+            own = replace(own, lower=lower, upper=upper)
+        if speed and one.mimic.multiplier:  # a speed of 0 is a filler
+            own = replace(own, velocity=_nearer(own.velocity, abs(speed / one.mimic.multiplier), min))
+        found[leader.name] = replace(leader, limits=own)
+    return found
+
+
+def _nearer(own: float | None, other: float, nearer: Callable[[float, float], float]) -> float | None:
+    if own is None:
+        return other if math.isfinite(other) else None
+    return own if math.isclose(own, other, rel_tol=ROUNDING, abs_tol=ROUNDING) else nearer(own, other)
 
 
 @dataclass(frozen=True)

@@ -156,7 +156,7 @@ class _BodyReader:
                 self.guarded(material, partial(self._remember, colour))
         links = self._named(root, "link", self._link)
         joints = self._named(root, "joint", self._joint)
-        return model.Body(root.attributes.get("name", ""), links, joints)
+        return model.Body(root.attributes.get("name", ""), links, model.led(joints))
 
     def _remember(self, colour: XmlElement, material: XmlElement) -> None:
         red, green, blue, opacity = numbers(colour, "rgba", 4)
