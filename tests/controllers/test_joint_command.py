@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.domains.servos.controllers.joint_command import JointCommandConfig, JointCommandController
 from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64, Float64MultiArray
@@ -120,12 +119,6 @@ def test_a_joint_that_may_not_move_and_a_stop_bring_all_to_rest() -> None:
     there = dict(gaze.at)
     gaze.command(1.0, 1.0, time=1.0)
     assert gaze.at == there
-
-
-def test_a_joint_named_twice_is_a_mistake() -> None:
-    assert JointCommandController.mistake(JointCommandConfig(joints=["a", "b"])) is None
-    mistake = JointCommandController.mistake(JointCommandConfig(joints=["a", "b", "a"]))
-    assert mistake == ("joints", "'a' is named twice")
 
 
 class Asked:

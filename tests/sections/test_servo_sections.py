@@ -63,6 +63,8 @@ WRONG = {
     "a speed of nothing": SERVOS.replace("velocity: 60 deg/s", "velocity: 0 deg/s"),
     "an acceleration below 0": SERVOS.replace("velocity: 60 deg/s", "acceleration: -60 deg/s^2"),
     "a gear of nothing": SERVOS.replace("{actuator: tilt}", "{actuator: tilt, ratio: 0}"),
+    "a joint twice in a controller": SERVOS.replace("[pan_joint, tilt_joint]", "[pan_joint, pan_joint]"),
+    "a servo twice in a joint": SERVOS.replace("{actuator: tilt}", "{actuators: [tilt, tilt]}"),
     "a bus that does not exist": SERVOS.replace("{bus: servos, model: AX", "{bus: servoes, model: AX"),
     "faults of nothing": SERVOS
     + "faults:\n  one: {at: 1 s, fault: mute}\n  two: {at: 1 s, fault: mute, joint: pan_joint, bus: servos}\n",

@@ -55,12 +55,6 @@ class JointCommandController(Controller[JointCommandConfig]):
             MOVE: ServesAction(MoveJoints, f"{name}/{MOVE}", claims=name, skill=name, entries=entries),
         }
 
-    @classmethod
-    def mistake(cls, config: JointCommandConfig) -> tuple[str, str] | None:
-        """Return a joint that is named twice: no command could lead it to two positions."""
-        twice = next((name for name in config.joints if config.joints.count(name) > 1), None)
-        return None if twice is None else ("joints", f"'{twice}' is named twice")
-
     def prepare(self) -> None:
         """Wait for a command."""
         self.wanted: dict[str, float] = {}  # positions of joints that have not arrived together

@@ -147,6 +147,8 @@ def _mistakes(
         place = ("controllers", name, field)
         span = decided_at(root, place, key_span(root, place))
         yield CANNOT_WORK.at(span, f"controller '{name}': {reason}")
+    elif twice := [joint for joint in config.claimed if config.claimed.count(joint) > 1]:
+        yield CANNOT_WORK.at(_place(reading, name, twice[0]), f"controller '{name}': '{twice[0]}' is named twice")
     else:
         yield from _beyond(reading, name, config)
         yield from _unknown_items(reading, name, config)

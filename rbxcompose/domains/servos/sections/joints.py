@@ -289,6 +289,8 @@ def _servos(
     at = reading.key("joints", name)
     there: Mapping[str, ActuatorModel] = {servo: known[servo] for servo in model.servos if servo in known}
     for servo in model.servos:
+        if model.servos.count(servo) > 1:
+            yield NOT_TOGETHER.at(at, f"the servo '{servo}' is named twice at joint '{name}'", help="name it once")
         if (other := users.setdefault(servo, name)) != name:
             free = ", ".join(f"'{actuator}'" for actuator in known if actuator not in _written_servos(reading.node))
             help_text = f"actuators without a joint: {free}" if free else ""
