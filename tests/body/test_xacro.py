@@ -70,6 +70,13 @@ MISTAKES = {
     "a missing parameter": ("<xacro:wheel/>", 3, "Undefined parameters [side]"),
     "a file that does not exist": ('<xacro:include filename="nothing.xacro"/>', 3, "cannot be read"),
     "an unknown package": ('<xacro:include filename="$(find nothing)/a.xacro"/>', 3, "package 'nothing' is not known"),
+    "a condition": ('<a/>\n<xacro:if value="$(eval f(1)"/>', 4, "'(' was never closed"),
+    "the default of an argument": ('<a/>\n<xacro:arg name="a" default="${1 +}"/>', 4, "invalid syntax"),
+    "a condition in a macro": (
+        '<xacro:macro name="m"><a/>\n<xacro:if value="x"/></xacro:macro>\n<xacro:m/>',
+        4,
+        "Xacro conditional",
+    ),
     "the environment": ('<link name="$(env HOME)"/>', 3, "HOME"),
     "a file elsewhere": ('<xacro:include filename="/etc/passwd"/>', 3, "outside the project"),
     "YAML elsewhere": ("<link name=\"${xacro.load_yaml('/etc/passwd')}\"/>", 3, "only read files of its project"),

@@ -39,7 +39,7 @@ OUTPUT = 8_000_000  # [bytes] of expanded text
 FILE = 2_000_000  # [bytes] of one file
 XACRO_CHILD_DEPTH = 16  # of files that include each other
 TOO_MUCH = "it needs more memory or deeper macros than a description may"
-_CLASS = re.compile(r"^<class '[^']*'>: ")  # what xacro writes before some messages
+_NOISE = re.compile(r"^<class '[^']*'>: | \(<\w+>, line \d+\)")  # what is written around some messages
 
 
 class BareTags:
@@ -82,7 +82,7 @@ class BareTags:
 
     def _give_prefix(self, element: Any) -> None:
         tag = _tag(element)
-        tags, _ = self._files[element.place.rsplit("|", 3)[0]]
+        tags, _ = self._files[element.getUserData(PLACE).rsplit("|", 3)[0]]
         tags[tag.line, tag.column] = tag
         element.tagName = element.nodeName = PREFIX + element.tagName
         element.removeAttribute(PLACE)
@@ -96,7 +96,7 @@ class BareTags:
 
 
 def _tag(element: Any) -> BareTag:
-    _, line, column, _ = element.place.rsplit("|", 3)
+    _, line, column, _ = element.getUserData(PLACE).rsplit("|", 3)
     return BareTag(int(line), int(column), element.tagName, element.closed)
 
 
@@ -126,9 +126,13 @@ class LocatedXml(expatbuilder.ExpatBuilderNS):
         super().start_element_handler(name, attributes)
         parser, element = self.getParser(), cast(Any, self.curNode)
         place = f"{self._path}|{parser.CurrentLineNumber}|{parser.CurrentColumnNumber + 1}|{len(element.tagName) + 1}"
-        element.place = place
+        element.setUserData(PLACE, place, self)
         if not element.tagName.startswith(PREFIX):
             element.setAttribute(PLACE, place.replace("${", "$${").replace("$(", "$$("))
+
+    def handle(self, operation: int, key: str, place: str, element: Any, copy: Any) -> None:
+        """Give a copy of an element its place, as where a macro is called."""
+        copy.setUserData(key, place, self)
 
     def end_element_handler(self, name: str) -> None:
         """Remember where an element is closed, unless its own tag does that."""
@@ -208,16 +212,26 @@ class _Expansion:
         """Return a function of xacro that remembers its node; after an error, the innermost stays on top."""
 
         def work_on(node: Any, *rest: Any) -> Any:
+            depth = len(self.evaluated)
             self.evaluated.append(node)
             result = original(node, *rest)
-            self.evaluated.pop()
+            del self.evaluated[depth:]
             return result
 
         return work_on
 
+    def noting(self, original: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a function of xacro after which it works on a node, such as a condition, in a call for its parent."""
+
+        def begin(node: Any, *rest: Any) -> Any:
+            self.evaluated.append(node)
+            return original(node, *rest)
+
+        return begin
+
     def where(self) -> str:
         """Return the place of the innermost element that was evaluated and has one."""
-        places = (getattr(node, "place", "") or node.getAttribute(PLACE) for node in reversed(self.evaluated))
+        places = (node.getUserData(PLACE) or node.getAttribute(PLACE) for node in reversed(self.evaluated))
         return self.place or next((place for place in places if place), "")
 
 
@@ -228,6 +242,7 @@ def expand(request: dict[str, Any]) -> XacroAnswer:
     xacro.eval_all = expansion.remembering(xacro.eval_all)
     xacro.get_include_files = expansion.included
     xacro.process_include = expansion.remembering(xacro.process_include)
+    xacro.reqd_attrs = expansion.noting(xacro.reqd_attrs)
     xacro.handle_macro_call = expansion.remembering(xacro.handle_macro_call)
     substitution_args._eval_find = expansion.find
     try:
@@ -249,7 +264,7 @@ def _reason(error: BaseException) -> str:
         if isinstance(one, MemoryError | RecursionError):
             return TOO_MUCH
         one = one.__cause__ or one.__context__
-    words = _CLASS.sub("", str(error)) or type(error).__name__
+    words = _NOISE.sub("", str(error)) or type(error).__name__
     half = len(words) // 2
     return words[:half] if words[:half] == words[half + 1 :] else words  # xacro says some things twice
 
