@@ -102,8 +102,11 @@ def _argument(view: View, skill: Skill, argument: WrittenArgument) -> Iterator[F
             return
         finding = wrong_argument.misspelt(argument.span, message, name, arguments, "its arguments", taken=taken)
         if skill.main and skill.main not in taken and "" not in taken and not nearest(name, arguments):
-            value = plain(argument.value.text, 60) if isinstance(argument.value, ScalarNode) else "..."
-            finding = replace(finding, help=clauses(finding.help, f"write '{skill.name}: {value}'"))
+            value = argument.value
+            if not isinstance(value, ScalarNode):
+                finding = replace(finding, help=clauses(finding.help, f"write '{skill.name}: ...'"))
+            elif not any(check_written(view, value, skill.arguments[skill.main], wrong_argument)):
+                finding = replace(finding, help=clauses(finding.help, f"write '{skill.name}: {plain(value.text, 60)}'"))
         yield finding
     elif isinstance(argument.value, ScalarNode):
         if argument.value.plain and not argument.value.text:
