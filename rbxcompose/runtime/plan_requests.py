@@ -82,7 +82,7 @@ class AdoptSaved(Command):
 
 @dataclass(frozen=True, slots=True)
 class RevertPlan(Command):
-    """Apply the plan from before the last change; answered when everything new is active.
+    """Apply the plan from before the last change that was not taken back; answered when everything new is active.
 
     With `generation`, only if that change was made to the plan of this generation.
     """

@@ -104,7 +104,7 @@ def test_only_what_has_changed_restarts(robot: Changing) -> None:
     robot.do("apply", "robots/turtlebot", "--yes")
     assert robot.ps().keys() == before.keys()
     assert "lamp added" in robot.do("apply", NAME, "--undo", "--yes")
-    assert "no such change" in robot.do("apply", NAME, "--undo", "0", "--yes", code=1)
+    assert "no such change" in robot.do("apply", NAME, "--undo", "7", "--yes", code=1)
     assert robot.ps().keys() == after.keys()
     robot.do("apply", NAME, "--undo", "--yes")
     assert robot.ps().keys() == before.keys()

@@ -6,7 +6,7 @@ import json
 import os
 from dataclasses import dataclass, replace
 from selectors import DefaultSelector
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 
@@ -21,7 +21,7 @@ from rbxcompose.missions.execution.requests import ListMissions, PauseMission
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import HostReport
 from rbxcompose.runtime.folder import RobotState, RunOptions
-from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
+from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison, RevertPlan
 from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import BringDown, NoteInLog, ReleaseRobot, RobotStatus, StopRobot
 from rbxcompose.runtime.supervision.changes import Fate
@@ -32,6 +32,7 @@ from rbxcompose.runtime.supervision.supervisor import SettingLine
 from rbxcompose.sdk import Component, Config, component
 from rbxcompose.sdk.robot_events import RobotHeld
 from rbxcompose.testing.bench import Bench, instance
+from tests.missions.simulated import program_of
 
 PLAN = Plan("toys", "toys.yaml", (Instance("patrol", "mission", MissionConfig(), "mission"),))
 
@@ -256,6 +257,37 @@ def test_a_change_that_a_component_refuses_touches_nothing() -> None:
     desk.handler.consultations.receive("mission", say.Considered(2, [], ["it runs"]))
     assert desk.replies == [(1, "it runs", True)]
     assert [type(message) for _, message in desk.sent] == [say.Consider, say.Consider]
+
+
+def test_a_mission_that_runs_and_would_be_gone_is_to_be_cancelled_and_not_to_be_paused() -> None:
+    desk = Desk()
+    desk.conductor._is_running = True
+    desk.conductor.members["mission"].runs = {"patrol": "mission look runs"}
+    other = MissionConfig(programs={"look": program_of("do: {wait: 1 s}")})
+    text = dump(replace(PLAN, instances=(replace(PLAN.instances[0], config=other),)))
+    assert desk.compare(text, say.Considered(1, [], ["cancel it first"])).why_not == "cancel it first"
+    desk.handler.handle(as_data(ApplyPlan(text, 0)), 1)
+    desk.handler.consultations.receive("mission", say.Considered(2, [], ["cancel it first"]))
+    assert desk.replies == [(1, "cancel it first", True)]
+    found = desk.compare(text, say.Considered(3, [], []))
+    assert found.why_not.startswith("mission look runs, and 'patrol' would restart")
+
+
+def test_changes_are_taken_back_one_after_the_other() -> None:
+    desk = Desk()
+    desk.conductor._is_running = True
+    whens: tuple[Literal["never", "always"], ...] = ("never", "always")
+    texts = [dump(replace(PLAN, instances=(replace(PLAN.instances[0], restart=Restart(when=one)),))) for one in whens]
+    steps = [ApplyPlan(texts[0], 0), ApplyPlan(texts[1], 1), RevertPlan(1), RevertPlan()]
+    shown = []
+    for number, request in enumerate(steps, 1):
+        desk.handler.handle(as_data(request), number)
+        desk.handler.consultations.receive("mission", say.Considered(number, [], []))
+        desk.conductor.receive("mission", say.Reconfigured({}))
+        shown.append(desk.conductor.plan.instances[0].restart.when)
+    assert [is_refused for _, _, is_refused in desk.replies] == [False] * 4
+    assert shown == ["never", "always", "never", PLAN.instances[0].restart.when]
+    assert desk.ask(RevertPlan()) == ("there is no such change to take back", True)
 
 
 def test_a_process_that_ends_has_nothing_to_say_about_a_change() -> None:

@@ -342,16 +342,20 @@ class Conductor:
         groups = () if self.is_going_down else self.plan.groups
         return [name for name in groups if self.members[name].is_configured]
 
-    def why_not(self, changes: Changes) -> str:
-        """Return why changes cannot be made now, or nothing if they can."""
+    def hindrance(self, changes: Changes) -> str:
+        """Return why changes are not even to be considered now, or nothing if they are."""
         if self._options.is_stepped:
             return "it runs on a stepped clock, where a change would make two runs differ"
         if self.phase is not Phase.RUNNING:
             return "it is not up yet" if self.phase is Phase.STARTING else "it is going down"
         if self._changing:
             return "it is already being changed"
-        if changes.impossible:
-            return changes.impossible[0]
+        return changes.impossible[0] if changes.impossible else ""
+
+    def why_not(self, changes: Changes) -> str:
+        """Return why changes cannot be made now, or nothing if they can."""
+        if hindrance := self.hindrance(changes):
+            return hindrance
         moves = [text for member in self.members.values() for text in member.moves]
         runs = {name: text for member in self.members.values() for name, text in member.runs.items()}
         return changes.unsafe(moves, runs)

@@ -1,5 +1,6 @@
 """Carries out the requests from the control socket, or passes them on to the component that takes them."""
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
@@ -25,6 +26,7 @@ OWN = requests(
     RobotStatus, DescribeRobot, StopRobot, ReleaseRobot, NoteInLog, ComparePlan, ApplyPlan, RevertPlan, AdoptSaved,
     BringDown,
 )  # fmt: skip
+MOST_BACK = 20  # changes that can be taken back
 
 
 class Supervised(Protocol):
@@ -60,7 +62,7 @@ class RequestHandler:
         """On a stepped clock the process group logs what came from outside, at its own time."""
         self._supervisor, self._settings, self._is_stepped = supervisor, settings, is_stepped
         self.consultations = Consultations(supervisor.send)
-        self._before: tuple[Plan, ChosenLayers, int] | None = None  # what the last change can be reverted to
+        self._before = deque[tuple[Plan, ChosenLayers, int]](maxlen=MOST_BACK)  # to which changes can be reverted
 
     def handle(self, data: object, number: int) -> None:
         """Carry out a request; it is answered now or later."""
@@ -164,13 +166,14 @@ class RequestHandler:
     def _compare(self, plan: str, number: int) -> None:
         """Report what another plan would change, and what prevents it now; change nothing."""
         found, conductor = self._changes(_loaded(plan)), self._supervisor.conductor
-        why_not = "" if found.is_empty else conductor.why_not(found)
+        hindrance = "" if found.is_empty else conductor.hindrance(found)
 
         def considered(said: Sequence[str], refused: str) -> None:
-            compared = PlanComparison.of(found, conductor.generation, why_not or refused, tuple(said))
+            why_not = refused or ("" if found.is_empty else conductor.why_not(found))
+            compared = PlanComparison.of(found, conductor.generation, why_not, tuple(said))
             self._supervisor.answer(number, to_data(compared))
 
-        self.consultations.ask(found, () if why_not else conductor.reached, considered)
+        self.consultations.ask(found, () if hindrance else conductor.reached, considered)
 
     def _apply(self, request: ApplyPlan, number: int) -> None:
         found, conductor = self._changes(_loaded(request.plan)), self._supervisor.conductor
@@ -194,25 +197,27 @@ class RequestHandler:
         conductor.change(found, lambda text, is_refused: answer(number, text))
 
     def _revert(self, request: RevertPlan, number: int) -> None:
-        if self._before is None or request.generation not in (None, self._before[2]):
+        if not self._before or request.generation not in (None, self._before[-1][2]):
             raise Refused("there is no such change to take back")
-        plan, layers, _ = self._before
-        self._change(self._changes(plan), layers, number)
+        plan, layers, _ = self._before[-1]
+        self._change(self._changes(plan), layers, number, is_back=True)
 
-    def _change(self, found: Changes, layers: ChosenLayers, number: int) -> None:
+    def _change(self, found: Changes, layers: ChosenLayers, number: int, *, is_back: bool = False) -> None:
         conductor = self._supervisor.conductor
-        if why_not := conductor.why_not(found):
-            raise Refused(why_not)
+        if hindrance := conductor.hindrance(found):
+            raise Refused(hindrance)
 
         def considered(said: Sequence[str], refused: str) -> None:
             try:
-                self._carry_out_change(found, layers, number, refused)
+                self._carry_out_change(found, layers, number, refused, is_back=is_back)
             except Refused as refusal:
                 self._supervisor.refuse(number, str(refusal))
 
         self.consultations.ask(found, conductor.reached, considered)
 
-    def _carry_out_change(self, found: Changes, layers: ChosenLayers, number: int, refused: str) -> None:
+    def _carry_out_change(
+        self, found: Changes, layers: ChosenLayers, number: int, refused: str, *, is_back: bool
+    ) -> None:
         conductor = self._supervisor.conductor
         if found.before is not conductor.plan:
             raise Refused("it was changed by someone else meanwhile: look at the difference again")
@@ -221,10 +226,14 @@ class RequestHandler:
         if self._settings.is_busy:
             raise Refused("settings of the robot are just being changed: try again")
         self._settings.hold()
-        self._before = conductor.plan, conductor.layers, conductor.generation
+        before = conductor.plan, conductor.layers, conductor.generation
 
         def applied(text: str, is_refused: bool) -> None:
             self._settings.go_on()
+            if conductor.generation != before[2] and is_back:
+                self._before.pop()
+            elif conductor.generation != before[2]:
+                self._before.append(before)
             if not is_refused:
                 conductor.layers = layers
             self._supervisor.log(Level.ERROR if is_refused else Level.OK, f"apply: {text}")

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--host", metavar="NAME", help="of a system: only what this host runs, which is this machine")
     parser.add_argument("--robot", metavar="NAME", help="of a system: only this robot")
     parser.add_argument("--partial", action="store_true", help="of a system: change the hosts that can, without others")
-    undo = "take back the last change, or that of this generation, as --json shows it"
+    undo = "take back the last change, then the one before it; only that of generation N, as --json shows it"
     parser.add_argument("--undo", nargs="?", type=int, const=_LAST, metavar="N", help=undo)
     parser.add_argument("-y", "--yes", action="store_true", help="do not ask")
     parser.add_argument("--dry-run", action="store_true", help="show the difference and what prevents it")
