@@ -233,13 +233,14 @@ def test_arguments_of_numbers_are_expressions() -> None:
         ("wait: 1 s / $battery", "division by zero"),
         ("repeat: $count_of_people\n  do: a", "'repeat' must be a whole number, not 2.5"),
         ("set:\n    x: $x / $battery", "division by zero"),
-        ("wait: -1 s", "a duration must be a number, at least 0, not -1"),
+        ("wait: 0 s - 1 s", "a duration must be a number, at least 0, not -1"),
         ("log: $door", "'$door' has not arrived yet"),
         ("go_to: $nowhere", "there is no place 'nowhere'"),
+        ("for: one\n  in: $none + [5]\n  do: {go_to: $one}", "5 is no place"),
     ],
 )
 def test_a_node_without_a_value_is_a_reported_failure(node: str, report: str) -> None:
-    simulated = simulate(f"data: {{x: 1, nowhere: nowhere}}\ndo:\n  {node}")
+    simulated = simulate(f"data: {{x: 1, nowhere: nowhere, none: []}}\ndo:\n  {node}")
     simulated.set("battery", 0.0)
     simulated.set("count_of_people", 2.5)
     assert simulated.advance(10) == "failure"

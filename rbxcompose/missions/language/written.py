@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from rbxcompose.base.expressions.evaluate import evaluate
 from rbxcompose.base.expressions.text import parse_template
 from rbxcompose.base.expressions.types import Type, TypeKind
-from rbxcompose.base.expressions.values import Value, is_named_pose
+from rbxcompose.base.expressions.values import Value, is_located, is_named_pose
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import UnitError, parse_quantity
 from rbxcompose.manifest.tree import Key, ScalarNode, SequenceNode, TreeNode, children
@@ -39,6 +39,8 @@ def place(task: Task, value: Value) -> Value:
     found = task.engine.robot.places.get(value, value) if isinstance(value, str) else value
     if isinstance(found, str):
         raise NodeFailed(f"there is no place '{found}'")
+    if not is_located(found):
+        raise NodeFailed(f"{task.run.show('', found)} is no place")
     return found
 
 
