@@ -37,6 +37,9 @@ def number_in(tree: syntax.ExpressionNode, constants: Constants) -> float | None
     match tree:
         case syntax.Number(value=value):
             return value
+        case syntax.Minus(operand=operand):
+            inside = number_in(operand, constants)
+            return None if inside is None else -inside
         case syntax.Variable(name=name):
             found = constants.get(name)
             return float(found) if isinstance(found, int | float) and not isinstance(found, bool) else None

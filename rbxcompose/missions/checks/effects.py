@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from itertools import pairwise
 
-from rbxcompose.base.expressions.tree import Expression, Junction, Minus, Not, Number
+from rbxcompose.base.expressions.tree import Junction, Not
 from rbxcompose.base.expressions.types import FLAG
 from rbxcompose.base.findings import Finding, Related, Severity, Span
 from rbxcompose.base.rules import OWN
@@ -209,21 +209,11 @@ def pointless_number(mission: Examined) -> Iterator[Finding]:
     """A number of rounds or attempts, or a duration, leaves nothing to be done."""
     for node in mission.program.nodes:
         modifiers = (number for modifier in node.modifiers.values() for number in modifier.numbers)
-        for what, expression, least in (*node.step.numbers, *modifiers):
-            value = _written(expression)
-            if value is not None and value < least:
+        for what, expression, least, effect in (*node.step.numbers, *modifiers):
+            value = number_of(expression, {}) if expression and expression.text else None  # a name may be on purpose
+            if expression and value is not None and 0 <= value < least:
                 yield pointless_number.at(
                     place_in_text(node, expression),
-                    f"{what} must be above zero to have an effect",
+                    f"{what} {effect or 'must be above zero to have an effect'}",
                     help="write a larger number, or leave it out",
                 )
-
-
-def _written(expression: Expression | None) -> float | None:
-    """Return a literal number; one that has a name may have been chosen on purpose."""
-    match expression.tree if expression and expression.text else None:
-        case Number(value=value):
-            return value
-        case Minus(operand=Number(value=value)):
-            return -value
-    return None

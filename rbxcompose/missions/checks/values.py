@@ -8,13 +8,15 @@ from rbxcompose.base.expressions.tree import Number, Word, walk
 from rbxcompose.base.expressions.types import COUNT, PLACE, TEXT, UNKNOWN, Type, TypeKind, choice_of, quantity_of
 from rbxcompose.base.findings import Finding, Related, Span, clauses, nearest, suggest
 from rbxcompose.base.printable import plain
-from rbxcompose.base.units import NUMBER, QUOTIENT, Dimension, example
+from rbxcompose.base.units import NUMBER, QUOTIENT, TIME, Dimension, example
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.effects import assignments, called, published
 from rbxcompose.missions.analysis.examined import Ending, Examined
+from rbxcompose.missions.analysis.facts import Constants, constants_of, number_of
 from rbxcompose.missions.analysis.scope_types import View, findings_of
 from rbxcompose.missions.codes import UNKNOWN_NAME, WRONG_INPUT, WRONG_TYPE
+from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.language.asked import Asked, Assignment, WrittenArgument, inner_span
 from rbxcompose.missions.language.literals import WrongValue, check_written, typed
 from rbxcompose.missions.language.written import help_with_place, is_pose, nodes_of
@@ -303,13 +305,15 @@ LISTED = (TypeKind.LIST, TypeKind.MAP, TypeKind.UNKNOWN)
 @mission_check(WRONG_TYPE)
 def wrong_type(mission: Examined) -> Iterator[Finding]:
     """Yield the expressions that have the wrong type, or name something that does not exist."""
+    known = constants_of(mission.program, {})
     for view in mission.views:
         is_placed = _goes_to_places(view)
         for asked in view.node.asked:
             if not asked.is_assigned:
                 is_word = asked.wanted == UNKNOWN and isinstance(asked.expression.tree, Word)
                 wanted = PLACE if is_placed and is_word else asked.wanted
-                yield from view.typed(asked.expression, wanted, asked.scalar, WRONG_TYPE)
+                found = list(view.typed(asked.expression, wanted, asked.scalar, WRONG_TYPE))
+                yield from found or _negative(asked, known)
         for assignment in assignments(view.node):
             yield from _assigned(view, assignment)
         yield from _not_listed(view)
@@ -318,6 +322,16 @@ def wrong_type(mission: Examined) -> Iterator[Finding]:
     whole = [*(interrupt.when for interrupt in mission.program.interrupts), *mission.program.outputs.values()]
     for asked in whole:
         yield from findings_of(asked.expression, asked.wanted, asked.scalar, mission.scope, WRONG_TYPE)
+
+
+def _negative(asked: Asked, known: Constants) -> Iterator[Finding]:
+    """Yield a finding if a duration or a count is surely negative: the step would always fail."""
+    value = number_of(asked.expression, known) if asked.wanted in (COUNT, quantity_of(TIME)) else None
+    if value is not None and value < 0:
+        message = f"this must be at least 0; it is {show(asked.wanted, value)}"
+        yield WRONG_TYPE.at(
+            asked.scalar.span, message, help="" if asked.expression.names else "write it without the sign"
+        )
 
 
 def _goes_to_places(view: View) -> bool:

@@ -37,6 +37,7 @@ class Field:
     choices: tuple[str, ...] = ()
     least: float | None = None  # the least number that makes sense
     counted: str = ""  # what findings call the number
+    effect: str = ""  # what they say that a smaller number does, if not nothing
     keys: Mapping[str, Field] = dataclasses.field(default_factory=dict)  # of a record
     attribute: str = ""
     names: str = ""  # the kind of existing things whose names it takes
@@ -97,7 +98,7 @@ class Declared:
     def numbers(self) -> tuple[Counted, ...]:
         """Return its numbers, each with the least value that makes sense."""
         return tuple(
-            Counted(field.counted or f"'{field.key}'", getattr(self, field.attribute), field.least)
+            Counted(field.counted or f"'{field.key}'", getattr(self, field.attribute), field.least, field.effect)
             for field in self.fields.values()
             if field.least is not None
         )

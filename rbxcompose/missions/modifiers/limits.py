@@ -102,7 +102,9 @@ class Timeout(Cutting):
           timeout: 30 s
     """
 
-    value: sdk.Expression = sdk.duration(least=SHORTEST, counted="a timeout")
+    value: sdk.Expression = sdk.duration(
+        least=SHORTEST, counted="a timeout", effect="of zero lets the step fail at once"
+    )
 
     clause = sdk.says("for at most {value}")
 

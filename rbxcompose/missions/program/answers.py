@@ -144,11 +144,12 @@ class Advice(NamedTuple):
 
 
 class Counted(NamedTuple):
-    """A number in a node: what it is called, its expression, and the least value that makes sense."""
+    """A number in a node: what it is called, its expression, the least value that makes sense, what less does."""
 
     what: str
     expression: Expression | None
     least: float
+    effect: str = ""
 
 
 class NodeFlow(Enum):
