@@ -29,14 +29,14 @@ def _open(state: MissionNode, leads_to: Next | None, ends: Outcomes) -> Iterator
             message = f"the state '{state.name}' needs 'next': where it leads to"
             listed = " or ".join(f"'{word}'" for word in ends.words)
             yield open_outcome.at(state.span, message, help=f"it can end with {listed}")
-    elif "" in leads_to.to:
+    elif "" in leads_to.spans:
         if ends.counting_as(FAILS):
             message = f"the state '{state.name}' can fail, so one word after 'next' is not enough"
             yield open_outcome.at(leads_to.spans[""], message, help=ONE_WORD)
     else:
         meant = {OUTCOMES.get(key.lower()) for key in leads_to.keys.keys() - ends.words.keys()}  # told there
         for word, counts_as in ends.words.items():
-            if word not in meant and word not in leads_to.to and counts_as not in leads_to.to:
+            if word not in meant and leads_to.key_for(word, counts_as) is None:
                 message = f"the state '{state.name}' can end with '{word}', which leads nowhere"
                 yield open_outcome.at(state.span, message, help=f"write '{word}: ...' under 'next'")
 

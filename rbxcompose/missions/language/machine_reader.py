@@ -9,7 +9,7 @@ from rbxcompose.missions.engine.resume_points import HISTORIES
 from rbxcompose.missions.language.grammar import is_reported
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.value_reader import WORDS
-from rbxcompose.missions.program.machines import ENDS, MACHINE_KEYS, MachineStates, Next
+from rbxcompose.missions.program.machines import ENDS, FINISHED, MACHINE_KEYS, MachineStates, Next
 from rbxcompose.missions.program.outcomes import FAILURE, NAMES, SUCCESS
 
 BODIES = ("do", "machine")
@@ -90,7 +90,8 @@ def _next(reader: NodeReader) -> Next | None:
     if value is None:
         return None
     if is_reported(value):
-        return Next(dict(zip(RESULTS, ENDS, strict=True)))  # so that there are no further findings on its transitions
+        # So that there are no further findings on its transitions.
+        return Next({**dict(zip(RESULTS, ENDS, strict=True)), "": FINISHED})
     if isinstance(value, ScalarNode) and value.text:
         return Next({"": value.text}, {"": value.span})
     if not isinstance(value, MappingNode) or not value.entries:

@@ -17,6 +17,8 @@ from rbxcompose.missions.program.outcomes import FAILURE, NAMES, SKIPPED, SUCCES
 
 ALL, ANY = "all", "any"
 OTHERWISE, HALTED = "otherwise", "halted"
+CONDITIONAL = frozenset(("if", "then", "else", "when", "check", "choose", "cases"))
+"""Words of conditions, which are no outcomes."""
 RESULTS = (NAMES[SUCCESS], NAMES[FAILURE], NAMES[SKIPPED], HALTED)
 
 
@@ -117,7 +119,9 @@ def read_outcomes(reader: NodeReader, key: str) -> tuple[OutcomeRule, ...]:
             message = "'otherwise' comes last" if is_otherwise else f"the last outcome must be '{OTHERWISE}'"
             help_text = f"add a line such as 'lost: {OTHERWISE}'"
             reader.add(codes.WRONG_SHAPE.at(entry.value.span, message, help=help_text))
-        reader.check_name(entry.key)
+        if reader.check_name(entry.key) and name in CONDITIONAL:
+            message = f"'{name}' belongs to conditions, so no outcome is named so"
+            reader.add(codes.WRONG_SHAPE.at(entry.key.span, message, help="choose another name, such as 'other'"))
         asked = None if is_otherwise else reader.asked_later(value, name)
         read.append(OutcomeRule(name, asked.expression if asked else None, asked))
     return tuple(read)

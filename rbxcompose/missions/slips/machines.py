@@ -6,10 +6,11 @@ from dataclasses import replace
 
 from rbxcompose.base.findings import Edit, Finding, Fix, nearest
 from rbxcompose.base.slips import Repair
-from rbxcompose.manifest.tree import Entry, Key, MappingNode, ScalarNode, TreeNode, children, with_children
+from rbxcompose.manifest.tree import Entry, Key, MappingNode, ScalarNode, TreeNode, all_nodes, children, with_children
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, placeholder
 from rbxcompose.missions.language.value_reader import NAME, invalid_name, valid_name
+from rbxcompose.missions.program.branches import CONDITIONAL
 from rbxcompose.missions.program.machines import ENDS, MACHINE_KEYS
 from rbxcompose.missions.slips import slip
 
@@ -138,19 +139,21 @@ def _ways(machine: MappingNode, states: MappingNode) -> Iterator[ScalarNode]:
     yield from (lead for lead in leads if isinstance(lead, ScalarNode))
 
 
-_ASKING = ("if", "then", "else", "when", "check", "choose", "cases")
-
-
-@slip(Takes.NEXT)
+@slip(Takes.STATE)
 def asking_next(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise words that begin a condition."""
+    """Recognise words that begin a condition, unless they are outcomes of this state: these are refused there."""
+    to = node.get("next") if isinstance(node, MappingNode) else None
     asking = (
-        [entry.key for word, entry in node.entries.items() if word in _ASKING] if isinstance(node, MappingNode) else []
+        [entry.key for word, entry in to.entries.items() if word in CONDITIONAL] if isinstance(to, MappingNode) else []
     )
     if not asking:
+        return None
+    below = [one.get("outcomes") for one in all_nodes(node) if isinstance(one, MappingNode)]
+    if any(key in outcomes for outcomes in below if isinstance(outcomes, MappingNode) for key in CONDITIONAL):
         return None
     help_text = (
         "let a 'check' be the last step of this state, and write below 'next' where 'success' and 'failure' lead"
     )
     message = f"'next' takes no conditions: there is no '{asking[0].text}' in it"
-    return Repair(placeholder(node.span), (codes.WRONG_SHAPE.at(asking[0].span, message, help=help_text),))
+    repaired = with_children(node, lambda key, value: placeholder(value.span) if key == "next" else value)
+    return Repair(repaired, (codes.WRONG_SHAPE.at(asking[0].span, message, help=help_text),))
