@@ -21,8 +21,11 @@ from rbxcompose.base.expressions.types import (
     Type,
     accepts,
     choice_of,
+    common,
     list_of,
+    list_with,
     map_of,
+    map_with,
     quantity_of,
 )
 
@@ -53,6 +56,9 @@ class Names:
         "rooms": list_of(PLACE),
         "times": list_of(TIME),
         "chores": map_of(list_of(TEXT)),
+        "mixed": list_with([LENGTH, TIME]),
+        "stop": map_with({"to": TEXT, "stay": TIME}),
+        "stops": list_with([map_with({"to": TEXT, "stay": TIME}), map_with({"to": TEXT, "far": LENGTH})]),
         "anything": UNKNOWN,
     }
     named = {"dock": PLACE, "kitchen": PLACE, "args.speed": SPEED}
@@ -107,6 +113,16 @@ def problems(text: str) -> list[ExpressionProblem]:
         ("'a' + $name", TEXT),
         ("$rooms + [dock]", list_of(PLACE)),
         ("[]", list_of(UNKNOWN)),
+        ("$mixed[1]", TIME),
+        ("$mixed[$round]", common([LENGTH, TIME])),
+        ("$stop.stay", TIME),
+        ("$stop[dock]", UNKNOWN),  # it may get entries
+        ("$stop[$name]", common([TEXT, TIME])),
+        ("$stops[$round].to", TEXT),
+        ("$stops[$round].far", LENGTH),
+        ("[2, 2.5]", list_of(NUMBER)),
+        ("['hall', dock]", list_of(PLACE)),
+        ("$times + [5 m]", list_of(common([TIME, LENGTH]))),
         ("$battery < $low and not $ok", FLAG),
         ("$count == 1 or $ok", FLAG),
     ],
@@ -137,6 +153,7 @@ def test_an_expression_has_a_type_before_it_has_a_value(text: str, expected: Typ
         "$here in [dock, kitchen]",
         "$name in $chores",
         "$wait in $times",
+        "$mixed[1] < 5 s",
         "5 s in $times",
         "$anything == 5 s",
         "age($scan) > 5",
@@ -177,6 +194,10 @@ def test_a_sound_condition_has_no_problems(text: str) -> None:
         ("$work == dock", "$work == dock", "a choice is compared with a place", ""),
         ("$name < 'a'", "$name", "this must be a number; it is a text", ""),
         ("$ok + 1 < 2", "$ok", "this must be a number; it is a flag", ""),
+        ("$mixed[0] > $mixed[1]", "$mixed[0] > $mixed[1]", "a length is compared with a time", ""),
+        ("$mixed[$round] > 1 m", "$mixed[$round]", "this must be one quantity; it is a length or a time", ""),
+        ("$mixed[$round] == 1 m", "$mixed[$round] == 1 m", "a length or a time is compared with a length", ""),
+        ("$mixed[5 m] == 1 m", "5 m", "an item of a list is found by a number; this is a length", ""),
         ("5 s in $rooms", "5 s in $rooms", "a time is compared with a place", ""),
         ("$ok in $chores", "$ok", "a map holds names; this is a flag", ""),
         ("1 in $n", "$n", "'in' needs a list or a map; this is a number", ""),
@@ -231,6 +252,15 @@ def test_all_mistakes_are_told_by_place() -> None:
         ("red", choice_of("red", "green"), None),
         ("$colour", choice_of("red"), "this must be one of red; it is one of red, green"),
         ("[dock, $here]", list_of(PLACE), None),
+        ("[2.5]", list_of(COUNT), None),  # '[0]' does not say that they stay whole
+        ("[dock]", list_of(TEXT), None),
+        ("[5 s, 1 m]", list_of(common([TIME, LENGTH])), None),
+        ("[5 s, 1 m]", list_of(TIME), "this must be a list, each a time; it is a list, each a time or a length"),
+        (
+            "$stop",
+            map_with({"stay": TEXT}),
+            "this must be a map, each a text; it is a map with to: a text, stay: a time",
+        ),
         ("[5 s]", list_of(PLACE), "this must be a list, each a place; it is a list, each a time"),
     ],
 )

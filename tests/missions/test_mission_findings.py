@@ -257,6 +257,36 @@ def test_each_docs_page_shows_what_is_found_and_how_it_is_right(code: str) -> No
             assert (code in {finding.code for finding in report}) == is_found
 
 
+ODD = (
+    "do: {machine: {start: one, states: {one: {do: {parallel: {work: a, other: b}, "
+    "outcomes: {odd: $work == failure, else: otherwise}}, next: {odd: finished, else: failed}}}}}"
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "message"),
+    [
+        ("data: {stop: {stay: 5 m, to: dock}}\ndo: {wait: $stop.stay}", "RBX4106", "a time; it is a length"),
+        ("do: {for: x, in: [5 m, 3 s], do: {wait: $x}}", "RBX4106", "a time; it is a length or a time"),
+        ("data: {l: [5 m, 3 s]}\ndo: {for: x, in: $l, do: {wait: $x}}", "RBX4106", "it is a length or a time"),
+        ("data: {l: [5 m]}\ndo: {set: {l: '[3 s]'}}", "RBX4106", "each a length; it is a list, each a time"),
+        ("data: {l: [[5 m], 3]}\ndo: {for: x, in: '$l[$battery / 1 %]', do: a}", "RBX4106", "it is a list or a count"),
+        ("do: {for: place, in: [dock, 5], do: {go_to: $place}}", "RBX4105", "a pose; it is a place or a count"),
+        ("inputs: {l: {type: map, default: {pl: 7}}}\ndo: {go_to: $l.pl}", "RBX4105", "a pose; it is a count"),
+        ("do: {wait: -5 s}", "RBX4106", "at least 0; it is -5 s"),
+        ("data: {pause: -5 s}\ndo: {wait: $pause}", "RBX4106", "at least 0; it is -5 s"),
+        ("do: {a: , timeout: -1 s}", "RBX4106", "at least 0; it is -1 s"),
+        ("do: {a: , attempts: -2}", "RBX4106", "at least 0; it is -2"),
+        (ODD, "RBX4110", "'else' belongs to conditions"),
+        (ODD.replace("else: otherwise", "rest: otherwise"), "RBX4110", "there is no 'else' in it"),
+    ],
+)
+def test_a_mistake_is_one_finding(text: str, code: str, message: str) -> None:
+    (found,) = mission_findings(text)
+    assert found.code == code
+    assert message in found.message
+
+
 def test_every_kind_says_what_it_does() -> None:
     for kind in kinds().values():
         assert (kind.__doc__ or "").strip()

@@ -19,8 +19,11 @@ from rbxcompose.base.expressions.types import (
     TypeKind,
     accepts,
     are_comparable,
+    common,
     list_of,
+    list_with,
     quantity_of,
+    wider,
 )
 from rbxcompose.base.findings import DID_YOU_MEAN, clauses, suggest, surely_meant
 
@@ -150,8 +153,7 @@ class _Checker:
             case tree.Word():
                 return self.word(node, expected)
             case tree.Items(items=nodes):
-                types = {self.type_of(item, expected.entry) for item in nodes}
-                return list_of(types.pop() if len(types) == 1 else UNKNOWN)
+                return list_with([self.type_of(item, expected.entry) for item in nodes])
             case tree.FieldAccess() | tree.Index():
                 return self.part(node)
             case tree.FunctionCall():
@@ -233,16 +235,20 @@ class _Checker:
             if whole.names and node.name not in whole.names:
                 return self.wrong(node, f"there is no entry '{node.name}'", f"entries: {', '.join(whole.names)}")
             if whole.kind in (TypeKind.MAP, TypeKind.UNKNOWN):
-                return whole.entry
+                return whole.part(node.name)
             return self.wrong(node, f"{whole.phrase} has no fields")
         key = self.type_of(node.index, TEXT if whole.kind is TypeKind.MAP else UNKNOWN)
         match whole.kind:
             case TypeKind.UNKNOWN:
                 return UNKNOWN
             case TypeKind.MAP if key.kind in _NAMES:
+                match node.index:
+                    case tree.Word(name=name) | tree.Text(value=name):
+                        return whole.part(name)
                 return whole.entry
             case TypeKind.LIST if key == UNKNOWN or key.measure in (units.NUMBER, units.QUOTIENT):
-                return whole.entry
+                number = node.index.value if isinstance(node.index, tree.Number) else 0.5
+                return whole.parts.get(f"{number:.0f}", whole.entry) if number.is_integer() else whole.entry
             case TypeKind.MAP:
                 return self.wrong(node.index, f"an entry of a map is found by a name; this is {key.phrase}")
             case TypeKind.LIST:
@@ -298,7 +304,7 @@ class _Checker:
         if not dimension or not other:
             return UNKNOWN
         if dimension.is_comparable(other):
-            return _wider(left.type, right.type)
+            return wider(left.type, right.type)
         for bare, measured in ((left, right), (right, left)):
             if is_bare(bare.node) and measured.type.dimension:
                 if fix := missing_unit(bare.node, measured.type.dimension):
@@ -315,7 +321,8 @@ class _Checker:
         if typed.type != UNKNOWN and not typed.type.measure:
             name = typed.node.name if isinstance(typed.node, tree.Variable) and typed.type.kind is TypeKind.MAP else ""
             fix = f"read an entry of it: '${name}.NAME'" if name else ""
-            self.wrong(typed.node, f"this must be a number; it is {typed.type.phrase}", fix)
+            wanted = "one quantity" if typed.type.members else "a number"
+            self.wrong(typed.node, f"this must be {wanted}; it is {typed.type.phrase}", fix)
         return typed.type.measure is not None
 
     def measured(self, node: tree.ExpressionNode) -> Type:
@@ -329,7 +336,7 @@ class _Checker:
         if node.operator == "+" and kinds <= {TypeKind.TEXT, TypeKind.CHOICE}:
             return TEXT
         if node.operator == "+" and kinds == {TypeKind.LIST}:
-            return left.type if left.type == right.type else list_of(UNKNOWN)
+            return list_of(common((left.type.entry, right.type.entry)))
         if node.operator == "+" and TypeKind.UNKNOWN in kinds:
             return UNKNOWN
         # Check both, so that both are reported.
@@ -400,13 +407,6 @@ _RESULTS = {
     "distance": quantity_of(units.LENGTH),
     "round": COUNT,
 }
-
-
-def _wider(type_: Type, other: Type) -> Type:
-    if type_ == other:
-        return type_
-    vague = (COUNT, quantity_of(units.QUOTIENT))
-    return next((found for found in (type_, other) if found not in vague), quantity_of(units.NUMBER))
 
 
 def _product(operator: str, left: Type, right: Type) -> Type:

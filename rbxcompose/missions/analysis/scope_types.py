@@ -75,11 +75,17 @@ def _named_twice(program: Program, robot: RobotNames) -> set[str]:
 
 def base_names(program: Program, robot: RobotNames) -> dict[str, Type]:
     """Return the names in scope throughout a mission, with their types."""
+    data = {name: datum.type for name, datum in program.data.items()}
+    shortened = {node.step.effects.shortened for node in program.nodes}
+    for name in data.keys() & shortened:
+        data[name] = replace(data[name], parts={})  # its items move up
+    for name in data.keys() & program.saved:
+        data[name] = map_of(UNKNOWN) if data[name].kind is TypeKind.MAP else data[name]  # a result has other entries
     return {
         **robot.values,
         POSE_NAME: POSE,
         **{name: input_.type for name, input_ in program.inputs.items()},
-        **{name: datum.type for name, datum in program.data.items()},
+        **data,
         **dict.fromkeys(_named_twice(program, robot), UNKNOWN),  # that is told, and not what follows from it
         **{name: map_of(UNKNOWN, _entries(program, robot, name)) for name in program.saved - program.data.keys()},
     }

@@ -221,7 +221,7 @@ def _measured(view: View, shape: TemplateShape, wanted: Dimension | None) -> Ite
     if wanted is None or not isinstance(shape, WrittenValue) or shape.expression is None:
         return
     given, _ = check(shape.expression, view.scope)
-    if given.dimension not in (None, NUMBER, QUOTIENT, wanted):
+    if any(each.dimension not in (None, NUMBER, QUOTIENT, wanted) for each in given.each):
         message = f"this must be {wanted.phrase}; it is {given.phrase}"
         yield wrong_field.at(shape.scalar.span, message, help=f"write {wanted.phrase}, such as '{example(wanted)}'")
 
@@ -245,7 +245,8 @@ def _check_written(view: View, shape: WrittenValue, base: str, ros_type: str) ->
         given, _ = check(shape.expression, view.scope)
         if not found and "/" in base and given.kind in (*NUMBERS, TypeKind.FLAG, TypeKind.TEXT, TypeKind.CHOICE):
             yield _no_message(shape, base)
-        if not found and given.kind not in (*FITTING.get(base, NUMBERS), TypeKind.UNKNOWN) and "/" not in base:
+        fitting = (*FITTING.get(base, NUMBERS), TypeKind.UNKNOWN)
+        if not found and any(each.kind not in fitting for each in given.each) and "/" not in base:
             yield wrong_field.at(shape.scalar.span, f"this must be of the type {ros_type}; it is {given.phrase}")
 
 
@@ -287,6 +288,12 @@ def _given(view: View, name: str, program: Program) -> Iterator[Finding]:
             yield WRONG_INPUT.misspelt(argument.span, message, argument.name, inputs, "its inputs")
         elif isinstance(argument.value, ScalarNode):
             yield from check_written(view, argument.value, inputs[argument.name].type, WRONG_INPUT)
+        elif (wanted := inputs[argument.name].type) != UNKNOWN:
+            try:
+                typed(argument.value, wanted)
+            except WrongValue as error:
+                message = f"the input '{argument.name}' {error.message}"
+                yield WRONG_INPUT.at(argument.value.span, message, label=error.label, help=error.help)
 
 
 def _missing_input(view: View, mission: str, program: Program) -> Iterator[Finding]:
@@ -350,15 +357,17 @@ def _goes_to_places(view: View) -> bool:
 def _assigned(view: View, assignment: Assignment) -> Iterator[Finding]:
     """Yield a finding if a value does not fit its datum.
 
-    A count accepts any number, also within a list or a map: `sum: 0` under `data` does not say that it stays whole. And
-    a text accepts a place: `room: dock` is both a text and the name of a place.
+    A count accepts any number: `sum: 0` under `data` does not say that it stays whole. And a text accepts a place:
+    `room: dock` is both a text and the name of a place. So do entries of lists and maps, by `accepts`.
     """
     asked, data = assignment.asked, view.program.data
     datum = data.get(assignment.name)
-    wanted = _with_numbers(datum.type if datum else UNKNOWN)
+    wanted = datum.type if datum else UNKNOWN
     found, problems = check(asked.expression, view.scope)
     if wanted == TEXT and found == PLACE:
         wanted = PLACE
+    if wanted == COUNT:
+        wanted = quantity_of(NUMBER)
     for finding in view.typed(asked.expression, wanted, asked.scalar, WRONG_TYPE):
         if datum is None or finding.help or problems or finding.code != WRONG_TYPE.code:
             yield finding
@@ -367,19 +376,12 @@ def _assigned(view: View, assignment: Assignment) -> Iterator[Finding]:
         yield replace(finding, help=help_text, related=(*finding.related, Related(datum.span, "its first value")))
 
 
-def _with_numbers(wanted: Type) -> Type:
-    """Return a type with any number in place of counts."""
-    if wanted == COUNT:
-        return quantity_of(NUMBER)
-    return replace(wanted, of=_with_numbers(wanted.of)) if wanted.of else wanted
-
-
 def _not_listed(view: View) -> Iterator[Finding]:
     """Yield a finding if a loop iterates over something that is neither a list nor a map."""
     items = view.node.step.items
     if items is not None and not isinstance(items, tuple) and view.node.asked:
         found, _ = check(items, view.scope)
-        if found.kind not in LISTED:
+        if any(each.kind not in LISTED for each in found.each):
             message = f"'in' must be a list or a map; it is {found.phrase}"
             times = f"to do it {items.text} times, write 'repeat: {items.text}' instead of 'for' and 'in'"
             help_text = times if found == COUNT else "write a list: '[...]'"

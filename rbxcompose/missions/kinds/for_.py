@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from rbxcompose.base.expressions.check import StaticScope, check
 from rbxcompose.base.expressions.tree import FieldAccess, Index, Variable
-from rbxcompose.base.expressions.types import TEXT
+from rbxcompose.base.expressions.types import TEXT, common
 from rbxcompose.base.expressions.values import NOT_ARRIVED, Located, is_located
 from rbxcompose.missions import sdk
 from rbxcompose.missions.engine.instant_actions import without
@@ -182,8 +182,7 @@ class ForStep(sdk.Loop):
         if not node.item:
             return {}
         if isinstance(self.items, tuple):
-            types = {check(item, scope)[0] for item in self.items}
-            return {node.item: types.pop() if len(types) == 1 else sdk.UNKNOWN}
+            return {node.item: common(check(item, scope)[0] for item in self.items)}
         found, _ = check(self.items, scope)
         return {node.item: TEXT if found.kind is sdk.TypeKind.MAP else found.entry}
 

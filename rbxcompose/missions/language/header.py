@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from rbxcompose.base.expressions.types import TYPES, UNKNOWN, Type, choice_of
+from rbxcompose.base.expressions.types import TYPES, UNKNOWN, Type, TypeKind, choice_of
 from rbxcompose.base.findings import Report
 from rbxcompose.manifest.arguments import CHOICE, unknown_type
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
@@ -70,6 +70,8 @@ def _input(name: str, entry: Entry, report: Report) -> Input:
     if (wanted := _type(name, value, entry, report)) is None:
         return Input(name, UNKNOWN, place, is_sound=False)
     default, least, most = (_value(value.get(key), wanted, f"'{key}'", report) for key in ("default", "min", "max"))
+    if default and wanted.kind in (TypeKind.LIST, TypeKind.MAP):
+        wanted = default.type
     is_sound = value.entries.keys() <= {*INPUT_KEYS} and (default is not None or "default" not in value)
     read = Input(name, wanted, place, default, _number(least), _number(most), is_sound)
     if least and read.least is not None and read.most is not None and read.least > read.most:

@@ -1,10 +1,21 @@
 """Literal values in a manifest, and whether the value of a typed argument or input can be of that type."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from rbxcompose.base.expressions.text import TextSlot, parse_template, refuse_foreign
 from rbxcompose.base.expressions.tree import ExpressionError
-from rbxcompose.base.expressions.types import COUNT, FLAG, TEXT, UNKNOWN, Type, TypeKind, list_of, map_of, quantity_of
+from rbxcompose.base.expressions.types import (
+    COUNT,
+    FLAG,
+    TEXT,
+    UNKNOWN,
+    Type,
+    TypeKind,
+    accepts,
+    list_with,
+    map_with,
+    quantity_of,
+)
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import DID_YOU_MEAN, Finding, FindingKind, surely_meant
 from rbxcompose.base.units import NUMBER, Quantity, UnitError, parse_quantity, to_si
@@ -46,12 +57,11 @@ def literal(node: TreeNode) -> Datum:
     match node:
         case MappingNode(entries=entries):
             values = {name: literal(entry.value) for name, entry in entries.items()}
-            return Datum(
-                {name: datum.value for name, datum in values.items()}, map_of(_common(values.values())), node.span
-            )
+            found = map_with({name: datum.type for name, datum in values.items()})
+            return Datum({name: datum.value for name, datum in values.items()}, found, node.span)
         case SequenceNode(items=items):
             read = [literal(item) for item in items]
-            return Datum([datum.value for datum in read], list_of(_common(read)), node.span)
+            return Datum([datum.value for datum in read], list_with([datum.type for datum in read]), node.span)
         case ScalarNode():
             value = node.filled if node.filled is not None else _measured(node)
             return Datum(*_typed(value), node.span)
@@ -65,8 +75,10 @@ def typed(node: TreeNode, wanted: Type) -> Datum:
     """
     if wanted.kind in (TypeKind.LIST, TypeKind.MAP):
         found = literal(node)
-        if found.type.kind is not wanted.kind:
-            raise WrongValue(f"must be {wanted.phrase}", label=f"this is {found.type.phrase}")
+        if not accepts(wanted, found.type):
+            is_other = found.type.kind is not wanted.kind
+            said = (wanted.phrase, found.type.phrase) if is_other else (wanted.detail, found.type.detail)
+            raise WrongValue(f"must be {said[0]}", label=f"this is {said[1]}")
         return found
     if not isinstance(node, ScalarNode):
         raise WrongValue(f"must be {wanted.phrase}", label=describe([] if isinstance(node, SequenceNode) else {}))
@@ -121,8 +133,3 @@ def _typed(value: object) -> tuple[Value, Type]:
             return value, quantity_of(NUMBER)
         case _:
             return str(value), TEXT
-
-
-def _common(read: Iterable[Datum]) -> Type:
-    types = {datum.type for datum in read}
-    return types.pop() if len(types) == 1 else UNKNOWN
