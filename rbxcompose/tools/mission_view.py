@@ -6,13 +6,10 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from rbxcompose.base.expressions.text import show_value
-from rbxcompose.base.expressions.values import NOT_ARRIVED
 from rbxcompose.base.printable import fitted, plain
 from rbxcompose.commands.console import emit, has_colour
 from rbxcompose.commands.lookup import answer_of
 from rbxcompose.commands.terminal import LiveScreen, is_terminal
-from rbxcompose.missions.engine.snapshot import from_plain
 from rbxcompose.missions.execution.requests import LookAtMission, ShowPicture
 from rbxcompose.missions.view.picture import MissionPicture, picture_from_data
 from rbxcompose.missions.view.replica import ACTIVE, joined, status_list
@@ -30,18 +27,12 @@ def lines_of(picture: MissionPicture, seen: Mapping[str, Any], width: int, *, co
     at = f" at {plain(stops)}" if stops else ""
     lines = [fitted(f"mission {plain(seen['mission'])}: {seen['state']}{at}", width)]
     lines += mission_lines(picture, statuses, width=width, colour=colour)
-    if seen["data"]:
-        values = ", ".join(f"{name} {_value(from_plain(data))}" for name, data in seen["data"].items())
+    if seen["shown"]:
+        values = ", ".join(f"{name} {text or '(empty)'}" for name, text in seen["shown"].items())
         lines.append(fitted(f"data: {plain(values, 400)}", width))
     for one in seen["transitions"][-MOST:]:
         lines.append(fitted(f"{one['time']:9.2f}  {one['state']} -> {one['to']}  ({one['outcome']})", width))
     return lines
-
-
-def _value(value: Any) -> str:
-    if value is NOT_ARRIVED:
-        return "(nothing yet)"
-    return show_value("", value) or "(empty)"
 
 
 def follow(folder: RobotFolder, name: str, period: float) -> int:

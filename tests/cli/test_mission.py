@@ -12,7 +12,7 @@ import pytest
 
 from rbxcompose.base.requests import Request, as_data, from_data, to_data
 from rbxcompose.commands import main as command
-from rbxcompose.missions.execution.requests import CancelMission, LookAtAll
+from rbxcompose.missions.execution.requests import CancelMission, LookAtMission, ShowPicture
 from rbxcompose.missions.view.picture import picture_from_data
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.sdk.bound import Outcome
@@ -121,8 +121,8 @@ def test_a_mission_that_runs_is_drawn_with_how_its_nodes_stand(
 
 
 def test_the_tree_of_watch_is_coloured_by_status(robot: Robot, golden: Golden) -> None:
-    whole = robot.mission.handle(LookAtAll("test"))
-    lines = lines_of(picture_from_data(whole["picture"]), whole, 60, colour=True)
+    picture = picture_from_data(robot.mission.handle(ShowPicture("test")))
+    lines = lines_of(picture, robot.mission.handle(LookAtMission("test")), 60, colour=True)
     golden.check("mission_colours.txt", "".join(f"{line}\n" for line in lines).replace("\x1b", "ESC"))
 
 

@@ -272,6 +272,28 @@ def test_in_texts_a_name_of_a_place_has_no_underscores_wherever_it_comes_from() 
     assert "2 Left are corner 1: corner 2, far_away" in simulated.told
 
 
+def test_in_texts_entries_of_lists_and_maps_and_items_of_loops_have_their_units() -> None:
+    text = """
+    data:
+      limits: [50 %, 20 s, 90 deg]
+      kitchen: {time: 5 min, level: 20 %, near: [1 m]}
+      stops: [{to: far_away, stay: 5 s}, {to: dock}]
+    do:
+      - log: $limits; $kitchen; $kitchen.level
+      - {for: one, in: $stops, do: {log: $one.to $one}}
+      - {for: one, in: [1 m, 2 m], do: {log: $one}}
+    """
+    simulated = simulate(text)
+    assert simulated.advance(10) == "success"
+    assert simulated.told[:5] == [
+        "0 50 %, 20 s, 90 deg; time: 300 s, level: 20 %, near: 1 m; 20 %",
+        "0 far_away to: far_away, stay: 5 s",
+        "0 dock to: dock",
+        "0 1 m",
+        "0 2 m",
+    ]
+
+
 def test_the_story_shows_a_step_as_it_was_written_and_what_an_expression_gives() -> None:
     lengths = {name: quantity_of(LENGTH) for name in "xyz"}
     reach = Skill("reach", {**lengths, "any_orientation": FLAG}, "z")

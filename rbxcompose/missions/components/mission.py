@@ -618,8 +618,9 @@ class Mission(Component[MissionConfig]):
 
     @answers(requests.LookAtMission)
     def look_at(self, request: requests.LookAtMission) -> requests.Seen:
-        """Return the updates of a mission."""
-        return self.missions.seen(request.mission, request.since)
+        """Return the updates of a mission, and all of its data as text under `shown`."""
+        missions, name = self.missions, request.mission
+        return {**missions.seen(name, request.since), "shown": missions.shown(name)}
 
     @answers(requests.LookAtAll)
     def look_at_all(self, request: requests.LookAtAll) -> requests.Seen:

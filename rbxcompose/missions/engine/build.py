@@ -3,11 +3,13 @@
 from collections.abc import Iterator
 from typing import Any
 
+from rbxcompose.base.expressions.types import UNKNOWN, Type
+from rbxcompose.missions.analysis.scope_types import NodeScope
 from rbxcompose.missions.engine.engine_base import EngineBase
 from rbxcompose.missions.engine.events import BranchEnded, NodeEnded, NodeStarted
 from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.run import Run, since_scope
-from rbxcompose.missions.engine.scopes import ItemScope, MissionScope, SinceScope
+from rbxcompose.missions.engine.scopes import ItemScope, MissionScope, SinceScope, item_types
 from rbxcompose.missions.engine.task import MovedChildren, Site, Task
 from rbxcompose.missions.engine.world import Observer
 from rbxcompose.missions.modifiers.registry import Decorator, decorator_of
@@ -180,7 +182,7 @@ class Builder:
         view = since_scope(scope, node.asked, self.robot, run.program)
         since = view if view.is_needed else None
         own: MissionScope = since or scope
-        item = ItemScope(own, node.item) if node.item else None
+        item = ItemScope(own, node.item, self._type_of_item(node, run, own)) if node.item else None
         inner = self.run(node.inner) if node.inner else None
         children = () if node.inner else tuple(self._below(node, run, item or own))
         site = Site(self.engine, run, node, own, children, item, inner)
@@ -193,6 +195,10 @@ class Builder:
         names = node.step.branches.names if node.step.branches else ()
         for child, branch in zip(node.children, names or ("",) * len(node.children), strict=True):
             yield self.build(child, run, scope, branch)
+
+    def _type_of_item(self, node: MissionNode, run: Run, scope: MissionScope) -> Type:
+        names = {**run.types, **item_types(scope)}
+        return node.step.shows(node, NodeScope(names, self.robot.places)).get(node.item, UNKNOWN)
 
     def _inside(self, site: Site, run: Run) -> Task:
         task = task_of(site)

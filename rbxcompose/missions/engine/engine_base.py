@@ -1,18 +1,20 @@
 """The engine and its runs as tasks see them: time, statuses, data, what wakes them, who observes them."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections import ChainMap
+from collections.abc import Collection, Iterable, Mapping
+from functools import reduce
 from random import Random
 from typing import Protocol
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.text import Template, fill
-from rbxcompose.base.expressions.types import Type
+from rbxcompose.base.expressions.text import Show, Template, fill
+from rbxcompose.base.expressions.types import UNKNOWN, Type
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.engine import value_text
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.resume_points import ResumableTask, ResumePoints
-from rbxcompose.missions.engine.scopes import MissionScope, RunScope
+from rbxcompose.missions.engine.scopes import MissionScope, RunScope, item_types
 from rbxcompose.missions.engine.world import Settings, Watched, World
 from rbxcompose.missions.program.outcomes import IDLE, NAMES, SKIPPED, SUCCESS, Result
 from rbxcompose.missions.program.program import NOTHING, Program, RobotNames, Target
@@ -154,7 +156,7 @@ class RunBase(ABC):
         self.begun = 0
         self.ending: int | None = None  # the status with which an `end` node ends it
         self.message = ""  # of that node
-        self._types: dict[str, Type] = {
+        self.types: dict[str, Type] = {
             **robot.values,
             **{name: input_.type for name, input_ in program.inputs.items()},
             **{name: datum.type for name, datum in program.data.items()},
@@ -162,16 +164,25 @@ class RunBase(ABC):
 
     def show(self, name: str, value: Value) -> str:
         """Return the value of a name as text for people."""
-        return value_text.show_briefly(self._types.get(name), value)
+        return value_text.show_briefly(self.types.get(name), value)
 
     def filled(self, template: Template, scope: MissionScope) -> str:
         """Return a text for people with its values filled in; names of places lose their underscores."""
-        places = self.engine.robot.places
-        return fill(template, scope, lambda name, value: self.show(name, value_text.spoken(value, places)))
+        return fill(template, scope, self._shown(scope, self.engine.robot.places))
 
     def written(self, template: Template, scope: MissionScope) -> str:
         """Return a text for programs with its values filled in; texts among these stay as they are."""
-        return fill(template, scope, self.show)
+        return fill(template, scope, self._shown(scope))
+
+    def _shown(self, scope: MissionScope, places: Collection[str] = ()) -> Show:
+        types = ChainMap(item_types(scope), self.types)
+
+        def show(path: str, value: Value) -> str:
+            name, *fields = path.split(".")
+            found = reduce(Type.part, fields, types.get(name, UNKNOWN))
+            return value_text.show(found, value, briefly=True, places=places)
+
+        return show
 
     @abstractmethod
     def begin(self, inputs: Mapping[str, Value]) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from rbxcompose.base.config import Place
+from rbxcompose.base.expressions.types import Type
 from rbxcompose.base.expressions.values import NotArrived, Value
 
 
@@ -109,16 +110,23 @@ class Inner:
 
 
 class ItemScope(Inner):
-    """The scope of a loop's body, which adds the item."""
+    """The scope of a loop's body, which adds the item; `type` is what is known of it before the mission runs."""
 
-    def __init__(self, outer: MissionScope, name: str) -> None:
+    def __init__(self, outer: MissionScope, name: str, type: Type) -> None:
         super().__init__(outer)
         self.name = name
+        self.type = type
         self.item: Value = None
 
     def variable(self, name: str, /) -> Value | NotArrived:
         """Return the item, or look the name up in the outer scope."""
         return self.item if name == self.name else self.outer.variable(name)
+
+
+def item_types(scope: MissionScope) -> dict[str, Type]:
+    """Return the types of the items in a scope, by name."""
+    outer = item_types(scope.outer) if isinstance(scope, Inner) else {}
+    return {**outer, scope.name: scope.type} if isinstance(scope, ItemScope) else outer
 
 
 class SinceScope(Inner):

@@ -11,31 +11,36 @@ from rbxcompose.base.units import format_number, format_quantity
 DIGITS = 3  # that people want to read of something measured
 
 
-def show(type: Type | None, value: Value) -> str:
-    """Return a value as text: '48.8889 %', 'living room', '2'."""
-    dimension = (type or UNKNOWN).dimension
-    if dimension and isinstance(value, int | float) and is_number(value):
-        return format_quantity(value, dimension)
-    return show_value("", value)
+def show(type: Type | None, value: Value, *, briefly: bool = False, places: Collection[str] = ()) -> str:
+    """Return a value as text: '48.8889 %', '2'; of lists and maps, each entry by its own type.
 
+    If `briefly`, numbers have three digits, or more if there are more before the point: '48.9 %'. Names of `places`
+    are written as people say them: 'living room'.
+    """
+    known = type or UNKNOWN
 
-def spoken(value: Value, places: Collection[str]) -> Value:
-    """Return a value with the names of places written as people say them: 'living room'."""
-    match value:
-        case str():
-            return value.replace("_", " ") if value in places else value
-        case list() | tuple():
-            return [spoken(item, places) for item in value]
-        case Mapping():
-            return {str(spoken(name, places)): spoken(entry, places) for name, entry in value.items()}
-    return value
+    def within(inner: Type, entry: Value) -> str:
+        return show(inner, entry, briefly=briefly, places=places)
+
+    if isinstance(value, Mapping):
+        return ", ".join(f"{within(UNKNOWN, name)}: {within(known.part(name), entry)}" for name, entry in value.items())
+    if isinstance(value, list | tuple):
+        parts = known.parts if len(known.parts) == len(value) else {}  # else it is no more what it was
+        return ", ".join(within(parts.get(str(index), known.entry), item) for index, item in enumerate(value))
+    if isinstance(value, str) and value in places:
+        return value.replace("_", " ")
+    if not isinstance(value, int | float) or not is_number(value):
+        return show_value("", value)
+    text = format_quantity(value, known.dimension) if known.dimension else format_number(value)
+    return _brief(text) if briefly else text
 
 
 def show_briefly(type: Type | None, value: Value) -> str:
-    """Return a value as text, a number with three digits, or more if there are more before the point: '48.9 %'."""
-    text = show(type, value)
-    if not isinstance(value, int | float) or not is_number(value):
-        return text
+    """Return a value as text, with numbers of three digits: '48.9 %'."""
+    return show(type, value, briefly=True)
+
+
+def _brief(text: str) -> str:
     number, space, unit = text.partition(" ")
     written = float(number)
     if not math.isfinite(written):  # a number may become infinite in its unit

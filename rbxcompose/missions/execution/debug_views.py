@@ -41,7 +41,8 @@ def written(value: Value, wanted: Type, *, within: bool = False) -> str | None:
         return value.name or None
     of = wanted.of or UNKNOWN
     if isinstance(value, list | tuple):
-        items = [written(item, of, within=True) for item in value]
+        parts = wanted.parts if len(wanted.parts) == len(value) else {}
+        items = [written(item, parts.get(f"{index}", of), within=True) for index, item in enumerate(value)]
         return None if None in items else f"[{', '.join(filter(None, items))}]"
     if isinstance(value, Mapping):
         entries = {name: written(entry, wanted.parts.get(name, of), within=True) for name, entry in value.items()}

@@ -6,19 +6,18 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import combinations
 from typing import Any, NamedTuple
 
-from rbxcompose.base.expressions.text import show_value
 from rbxcompose.base.expressions.types import FLAG
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Query, Refused
-from rbxcompose.base.units import format_quantity
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.exchange import Exchanged
 from rbxcompose.missions.engine.inputs import NoSuchState, bind_texts, start_at
 from rbxcompose.missions.engine.interventions import NotPossible
 from rbxcompose.missions.engine.logbook import LogRecord
 from rbxcompose.missions.engine.snapshot import from_plain
+from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.engine.world import PLAIN, Observer, Settings
 from rbxcompose.missions.execution.breakpoints import Breakpoints
 from rbxcompose.missions.execution.errands import Equipment
@@ -34,7 +33,7 @@ from rbxcompose.missions.execution.requests import (
 )
 from rbxcompose.missions.execution.snapshots import differences, identity_of
 from rbxcompose.missions.program.linker import link
-from rbxcompose.missions.program.machines import Datum, Input
+from rbxcompose.missions.program.machines import Input
 from rbxcompose.missions.program.outcomes import IDLE, NAMES
 from rbxcompose.missions.program.program import Program
 from rbxcompose.missions.view.picture import picture_of, picture_to_data
@@ -202,6 +201,15 @@ class RunningMissions:
         """
         return self._begun(name).seen(since)
 
+    def shown(self, name: str) -> dict[str, str]:
+        """Return the data of a mission as text for people.
+
+        Raises:
+            Refused: if it has not been running.
+        """
+        main = self._begun(name).engine.main
+        return {name: main.show(name, value) for name, value in main.data.items()}
+
     def picture(self, name: str) -> PictureData:
         """Return the picture of a mission, as data; of one that has not been running, as it would run.
 
@@ -356,11 +364,5 @@ def _picture(engine: Engine) -> PictureData:
 def _listed_input(given: Input) -> ListedInput:
     choices = ("false", "true") if given.type == FLAG else given.type.choices
     return ListedInput(
-        given.name, given.type.detail, choices, None if given.default is None else _written(given.default)
+        given.name, given.type.detail, choices, None if given.default is None else show(given.type, given.default.value)
     )
-
-
-def _written(datum: Datum) -> str:
-    if datum.type.dimension is not None and isinstance(datum.value, int | float):
-        return format_quantity(datum.value, datum.type.dimension)
-    return show_value("", datum.value)
