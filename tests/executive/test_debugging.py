@@ -19,6 +19,7 @@ from rbxcompose.missions.execution.requests import (
     ListData,
     ListMissions,
     ListOutcomes,
+    LookAtMission,
     PauseMission,
     ResumeMission,
     RunMission,
@@ -207,7 +208,10 @@ def test_a_replay_says_what_a_changed_mission_cannot_repeat() -> None:
         (ForceNode("away", "lost"), "away at mission.yaml:10 cannot end in 'lost'; it may end in: success, failure"),
         (SetMissionData({"rounds": "many"}), "'rounds' must be a whole number"),
         (SetMissionData({"round": "1"}), "the mission has no data 'round'; did you mean 'rounds'"),
-        (SetMissionData({"mode": "fast", "corners": "[1, 2]"}), "'corners' must be a list"),
+        (
+            SetMissionData({"mode": "fast", "corners": "[1, 2]"}),
+            "'corners' must be a list, each a text; this is a list, each a count",
+        ),
         (JumpMission("hom"), "there is no state 'hom'; did you mean 'home'"),
     ],
 )
@@ -281,3 +285,22 @@ def test_what_is_listed_of_the_data_can_be_written_back() -> None:
     }
     robot.mission.handle(SetMissionData(given))
     assert robot.mission.missions.runs["test"].engine.data == before
+    shown = robot.mission.handle(LookAtMission("test"))["shown"]
+    assert (shown["left"], shown["seen"]) == ("25 %", "hall: 2 m, kitchen: 0.3 m")
+
+
+def test_data_keep_their_types_within_lists_and_maps_and_places_stay_places() -> None:
+    robot = Robot(
+        "data: {seen: {hall: 2 m}, stops: [dock], goal: corner, said: [a]}\n"
+        "do: [{for: stop, in: $stops, do: {go_to: $stop}}, {go_to: $goal}]"
+    )
+    robot.start()
+    for name, text, reason in (
+        ("seen", "{hall: 5 s}", "'seen' must be a map, each a length; this is a map, each a time"),
+        ("stops", "[3]", "'stops' must be a list, each a text; this is a list, each a count"),
+        ("stops", "[dock, nowhere]", "there is no place 'nowhere'"),
+        ("goal", "nowhere", "there is no place 'nowhere'"),
+    ):
+        with pytest.raises(Refused, match=reason):
+            robot.mission.handle(SetMissionData({name: text}))
+    robot.mission.handle(SetMissionData({"seen": "{bath: 1 cm}", "stops": "[corner]", "said": "[nowhere]"}))

@@ -18,10 +18,10 @@ from rbxcompose.manifest.files import files_named
 from rbxcompose.manifest.reader import read_file
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, at
 from rbxcompose.missions.analysis.bounds import Bounds, Known, truth
-from rbxcompose.missions.analysis.facts import Constants, place_in_text, shortened
+from rbxcompose.missions.analysis.facts import place_in_text, places_taken, shortened, texts_in
 from rbxcompose.missions.analysis.travel_times import too_short
 from rbxcompose.missions.language.asked import expression_of, inner_span
-from rbxcompose.missions.program.program import END, Interrupt, MissionNode, Program
+from rbxcompose.missions.program.program import END, Interrupt, Program
 
 
 @check("RBX4123", Severity.WARNING, closed=(MISSIONS,))
@@ -84,18 +84,22 @@ def _expressions(program: Program) -> Iterator[tuple[ScalarNode, syntax.Expressi
                     continue  # reported where missions are read
 
 
+_PLACED = (TypeKind.PLACE, TypeKind.POSE)  # these are looked up where inputs are bound
+
+
 @check("RBX4131", closed=("places",))
 def place_in_data(robot: Robot) -> Iterator[Finding]:
     """The data or inputs of a mission name a place that the robot does not know."""
     places = robot.manifest.places
     for mission in robot.missions.values():
         program, known = mission.program, {**shortened(mission.program), **constants(mission)}
-        names = program.data.keys() | mission.given.keys()
+        defaults = {name for name, one in program.inputs.items() if one.type.kind not in _PLACED}
+        names = program.data.keys() | mission.given.keys() | defaults
         wrong = {name: _without(value, places) for name, value in known.items() if name in names}
-        for node, name in _goals(robot, program):
-            for text, datum in _texts(program, node, name, wrong):
+        for node, name, datum in places_taken(program, robot.names.skills):
+            for text in wrong.get(datum, ()):
                 yield place_in_data.at(
-                    _place_of(program, datum, text) if datum in program.data else mission.given[datum],
+                    mission.given[datum] if datum in mission.given else _place_of(program, datum, text),
                     f"there is no place '{text}', which '{node.skill}' gets from '${name}'",
                     help=suggest(text, places, "places of this robot"),
                     related=[Related(node.span, "used here")],
@@ -103,57 +107,24 @@ def place_in_data(robot: Robot) -> Iterator[Finding]:
                 )
 
 
-def _without(value: Value, places: Collection[str]) -> Value:
+def _without(value: Value, places: Collection[str]) -> list[str]:
     """Return the texts of a datum that are no places: a list is read once, however many loops are over it."""
-    if isinstance(value, list | tuple | dict):
-        return [text for text in value if isinstance(text, str) and text not in places]
-    return value if isinstance(value, str) and value not in places else None
+    return [text for text in texts_in(value) if text not in places]
 
 
 def _place_of(program: Program, datum: str, text: str) -> Span:
-    """Return the place of a text in a datum, or that of the datum's name if the text is not found."""
-    match at(program.root, ("data", datum)):
+    """Return the place of a text in a datum or a default, or that of its name if the text is not found."""
+    declared = program.data.get(datum) or program.inputs[datum]
+    path = ("data", datum) if datum in program.data else ("inputs", datum, "default")
+    match at(program.root, path):
         case MappingNode(entries=entries) if text in entries:
             return entries[text].key.span
         case SequenceNode(items=items):
             spans = (item.span for item in items if isinstance(item, ScalarNode) and item.text == text)
-            return next(spans, program.data[datum].span)
+            return next(spans, declared.span)
         case ScalarNode(span=span):
             return span
-    return program.data[datum].span
-
-
-def _goals(robot: Robot, program: Program) -> Iterator[tuple[MissionNode, str]]:
-    """Yield each node whose skill takes a pose from a plain `$name`, with that name."""
-    for node in program.nodes:
-        skill = robot.skills[node.skill].skill if node.skill in robot.skills else None
-        for argument in node.step.arguments if skill else ():
-            wanted = skill.arguments.get(argument.name or skill.main) if skill else None
-            if wanted is None or wanted.kind is not TypeKind.POSE or not isinstance(argument.value, ScalarNode):
-                continue
-            try:
-                tree = expression_of(argument.value).tree
-            except syntax.ExpressionError:
-                continue
-            if isinstance(tree, syntax.Variable):
-                yield node, tree.name
-
-
-def _texts(program: Program, node: MissionNode, name: str, known: Constants) -> Iterator[tuple[str, str]]:
-    """Yield the texts that `$name` can be at a node, each with the datum that contains it."""
-    above = node
-    while above.parent is not None:
-        above = program.nodes[above.parent]
-        if above.item == name:
-            items = above.step.items or ()
-            listed = items.tree.name if not isinstance(items, tuple) and isinstance(items.tree, syntax.Variable) else ""
-            found = known.get(listed)
-            texts = found if isinstance(found, list | tuple | dict) else ()
-            yield from ((text, listed) for text in texts if isinstance(text, str))
-            return
-    found = known.get(name)
-    if isinstance(found, str):
-        yield found, name
+    return declared.span
 
 
 _ITS_OWN = ("new", "age")  # their answers depend on when the interrupt acted last

@@ -1,16 +1,17 @@
 """What a mission will do, as far as its text shows: constants, steps that cannot fail, steps that never end."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from rbxcompose.base.config import Place
 from rbxcompose.base.expressions import tree as syntax
+from rbxcompose.base.expressions.types import TypeKind
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.effects import replaced, written
 from rbxcompose.missions.language.asked import expression_of
 from rbxcompose.missions.program.answers import Skipped
-from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
+from rbxcompose.missions.program.program import MissionNode, Program, RobotNames, Skill
 
 Constants = Mapping[str, Value]  # values of `$names` that never change
 
@@ -89,6 +90,46 @@ def _known_places(listed: Iterable[Value], places: Mapping[str, Place]) -> list[
         if found[-1] is None:
             break
     return found
+
+
+def places_taken(program: Program, skills: Mapping[str, Skill]) -> Iterator[tuple[MissionNode, str, str]]:
+    """Yield each node whose skill gets a place from a plain `$name`, that name, and the datum or input that has it.
+
+    The item of a loop comes from what the loop iterates over. Missions that a mission uses are left out.
+    """
+    for node in program.nodes:
+        skill = skills.get(node.skill)
+        for argument in node.step.arguments if skill else ():
+            wanted = skill.arguments.get(argument.name or skill.main) if skill else None
+            if wanted is None or wanted.kind is not TypeKind.POSE or not isinstance(argument.value, ScalarNode):
+                continue
+            try:
+                tree = expression_of(argument.value).tree
+            except syntax.ExpressionError:
+                continue
+            if isinstance(tree, syntax.Variable) and (source := _source(program, node, tree.name)):
+                yield node, tree.name, source
+
+
+def _source(program: Program, node: MissionNode, name: str) -> str:
+    """Return the datum or the input that `$name` comes from at a node; empty if that is not known."""
+    found, above = name, node.parent
+    while above is not None:
+        around = program.nodes[above]
+        if around.inner is not None:
+            return ""
+        if around.item == found == name:
+            items = around.step.items
+            tree = items.tree if isinstance(items, syntax.Expression) else None
+            found = tree.name if isinstance(tree, syntax.Variable) else ""
+        above = around.parent
+    return found
+
+
+def texts_in(value: Value) -> list[str]:
+    """Return the texts that a datum has: itself, its items, or the names of its entries."""
+    listed = value if isinstance(value, list | tuple | Mapping) else (value,)
+    return [text for text in listed if isinstance(text, str)]
 
 
 def never_skipped(program: Program, node: MissionNode) -> bool:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from rbxcompose.base.expressions.types import TypeKind
 from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.requests import Refused
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import NOWHERE, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions.analysis.examined import Ending
+from rbxcompose.missions.analysis.facts import places_taken, texts_in
 from rbxcompose.missions.engine.addresses import ARROW, NodeAddress, find, is_line, is_number
 from rbxcompose.missions.engine.debugger import named
 from rbxcompose.missions.engine.interventions import ChangeData, ForceResult, JumpToState, NotPossible, SetBreakpoints
@@ -22,8 +22,6 @@ from rbxcompose.missions.program.counterparts import Pairing
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.outcomes import SUCCEEDS
 from rbxcompose.missions.program.program import MissionNode, Program
-
-_PLACED = (TypeKind.PLACE, TypeKind.POSE)
 
 
 class Breakpoints:
@@ -217,6 +215,7 @@ def changed(run: MissionRun, given: Mapping[str, str]) -> list[ChangeData]:
         NotPossible: if there is no such data, or a value does not have its type.
     """
     data, places = run.engine.program.data, run.engine.robot.places
+    placed = {source for *_, source in places_taken(run.engine.program, run.engine.robot.skills)}
     made = []
     for name, text in given.items():
         if name not in data:
@@ -226,19 +225,11 @@ def changed(run: MissionRun, given: Mapping[str, str]) -> list[ChangeData]:
             found = typed(_node(name, text), wanted)
         except WrongValue as error:
             raise NotPossible(clauses(f"'{name}' {error.message}", error.label, error.help)) from error
-        if wanted.kind in _PLACED and found.value not in places:
-            raise NotPossible(clauses(f"there is no place '{text}'", suggest(text, places, "places of this robot")))
-        if wanted.kind is TypeKind.LIST and found.value and _differ(found.type.entry.kind, wanted.entry.kind):
-            raise NotPossible(f"'{name}' must be {wanted.phrase}; this is {found.type.phrase}")
+        for word in texts_in(found.value) if name in placed else ():
+            if word not in places:
+                raise NotPossible(clauses(f"there is no place '{word}'", suggest(word, places, "places of this robot")))
         made.append(ChangeData(name, found.value))
     return made
-
-
-def _differ(kind: TypeKind, wanted: TypeKind) -> bool:
-    """Return whether one is a text or a flag and the other a number."""
-    return (
-        kind is not wanted and not {kind, wanted}.isdisjoint((TypeKind.TEXT, TypeKind.FLAG)) and wanted not in _PLACED
-    )
 
 
 def _node(name: str, text: str) -> TreeNode:
