@@ -8,7 +8,8 @@ from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import Finding
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.engine.inputs import bind_inputs
-from tests.missions.simulated import PLACES, program_of, tree
+from rbxcompose.testing import compile_mission
+from tests.missions.simulated import PLACES, program_of, robot_with, tree
 
 MISSION = """
 inputs:
@@ -17,6 +18,7 @@ inputs:
   home: {type: place, default: dock}
   mode: {type: choice, choices: [slow, fast], default: slow}
   words: {type: text, default: hello}
+  stays: {type: list, default: [5 s]}
 do: a
 """
 
@@ -32,7 +34,7 @@ def bound(text: str) -> tuple[dict[str, Value], list[Finding]]:
 def test_what_is_not_given_has_its_default_and_places_are_places() -> None:
     values, findings = bound("\n  pause: 2 s\n  words: 7")
     assert findings == []
-    assert values == {"rounds": 2.0, "pause": 2.0, "home": PLACES["dock"], "mode": "slow", "words": "7"}
+    assert values == {"rounds": 2.0, "pause": 2.0, "home": PLACES["dock"], "mode": "slow", "words": "7", "stays": [5.0]}
 
 
 @pytest.mark.parametrize(
@@ -45,6 +47,7 @@ def test_what_is_not_given_has_its_default_and_places_are_places() -> None:
         ("pause: 2 m", "the input 'pause' must be a time, such as '5 s'", "if these are minutes, write '2 min'"),
         ("pause: 2 s\n  mode: fats", "the input 'mode' is not one of the choices: 'fats'", "did you mean 'fast'?"),
         ("pause: 2 s\n  home: dok", "there is no place 'dok'", "did you mean 'dock'?"),
+        ("pause: 2 s\n  stays: [5 m]", "the input 'stays' must be a list, each a time", ""),
         ("pause: 2 s\n  round: 3", "the mission '' has no input 'round'", "did you mean 'rounds'?"),
         ("rounds: 3", "the input 'pause' of the mission '' needs a value", "write it under 'with': 'pause: ...'"),
     ],
@@ -52,3 +55,9 @@ def test_what_is_not_given_has_its_default_and_places_are_places() -> None:
 def test_each_mistake_is_a_finding(given: str, message: str, help_text: str) -> None:
     _, findings = bound(f"\n  {given}")
     assert [(finding.message, finding.help) for finding in findings] == [(message, help_text)]
+
+
+def test_a_mission_that_uses_it_is_held_to_the_types_of_its_defaults() -> None:
+    robot = robot_with({"used": MISSION})
+    (found,) = compile_mission("do: {use: used, with: {pause: 2 s, stays: [5 m]}}", robot)[1]
+    assert (found.code, found.label) == ("RBX4113", "this is a list, each a length")
