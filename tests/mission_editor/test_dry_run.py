@@ -84,6 +84,11 @@ def test_a_mission_with_errors_does_not_run(editor: MissionEditor) -> None:
         ask(editor, "try", text=FETCH.replace("table ", "tabel "))
 
 
+def test_a_mission_whose_input_has_no_value_does_not_run(editor: MissionEditor) -> None:
+    with pytest.raises(Refused, match="the input 'where' of the mission 'fetch' needs a value; a 'default' would do"):
+        ask(editor, "try", text=f"{FETCH}\ninputs: {{where: {{type: place}}}}\n")
+
+
 def test_a_robot_that_starts_programs_is_not_tried(editor: MissionEditor, project: Path) -> None:
     robot = project / "robots/fetcher/robot.yaml"
     robot.write_text(f"{ROBOT}components:\n  other: {{type: program, command: [sleep, '1']}}\n", encoding="utf-8")

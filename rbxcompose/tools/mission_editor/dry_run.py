@@ -18,6 +18,7 @@ from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Refused
 from rbxcompose.compiler.compile import Compilation, robot_for_mission
 from rbxcompose.manifest.files import shown_name
+from rbxcompose.missions.engine.inputs import bind_texts
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING
 from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
@@ -94,7 +95,9 @@ def tried(made: Compilation, mission: str) -> tuple[TrialRecord, _Watching, Prog
     program, names = robot.missions[mission].program, robot.names
     linked, seen = link(program, names.missions), _Watching()
     where = Span(program.file, 1, 1, 1, 1)
-    inputs: Any = robot.missions[mission].inputs
+    inputs, missing = bind_texts(program, {}, robot.missions[mission].inputs, names.places)
+    if missing:
+        raise Refused(f"it cannot run yet: {missing[0].message}; a 'default' would do")
     trial = Trial(
         "dry run", "", program.file, where, mission, program, linked, robot, plan, inputs, {}, (),
         Expectations(until=LONGEST), is_complete=False,
