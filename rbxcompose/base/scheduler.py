@@ -14,7 +14,7 @@ from itertools import count
 from rbxcompose.base.dataclass import dataclass
 
 Callback = Callable[[], None]
-OnError = Callable[[str, Exception], None]
+OnError = Callable[[str, BaseException], None]
 Observe = Callable[[str, Callback], None]  # runs the callback and may time it
 
 MOST_AT_ONCE = 100_000  # events at one instant before we call it an endless loop
@@ -32,7 +32,7 @@ class ScheduledCallback:
         self.callback = None
 
 
-def _raise(owner: str, error: Exception) -> None:
+def _raise(owner: str, error: BaseException) -> None:
     raise error
 
 
@@ -119,7 +119,7 @@ class Scheduler:
             return
         try:
             self.observe(owner, callback)
-        except Exception as error:  # an error in one component must not stop its neighbours
+        except (Exception, SystemExit) as error:  # an error in one component must not stop its neighbours
             self.on_error(owner, error)
 
 

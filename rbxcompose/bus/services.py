@@ -156,7 +156,7 @@ class Server(Generic[Q, R]):
                 self._handle(request)
             except Refused as refusal:
                 request.fail(str(refusal))
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 request.fail(f"{type(error).__name__}: {error}")
                 raise
 

@@ -55,7 +55,7 @@ class Window:
             message = self._message(self._answer())
         except Refused as refusal:
             question.fail(str(refusal))
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             question.fail(f"{type(error).__name__}: {error}")
             raise
         else:

@@ -24,7 +24,7 @@ class Alone:
     """A process without others, on a stepped clock."""
 
     def __init__(self) -> None:
-        self.errors: list[tuple[str, Exception]] = []
+        self.errors: list[tuple[str, BaseException]] = []
         self.log: list[tuple[str, str]] = []
         self.clock = SteppedClock()
         self.scheduler = Scheduler(on_error=lambda owner, error: self.errors.append((owner, error)))
@@ -41,7 +41,7 @@ class Connected:
 
     def __init__(self, port: int, is_woken: threading.Event) -> None:
         self.log: list[tuple[str, str]] = []
-        self.errors: list[tuple[str, Exception]] = []
+        self.errors: list[tuple[str, BaseException]] = []
         self.clock = MonotonicClock()
         self.scheduler = Scheduler(on_error=lambda owner, error: self.errors.append((owner, error)))
         self._woken: deque[tuple[str, Callable[[], None]]] = deque()

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import math
 
+import pytest
+
 from rbxcompose.base.requests import Refused
 from rbxcompose.bus.services import LOST, ServedRequest, Server
 from rbxcompose.msgs.example_interfaces import AddTwoInts
@@ -45,16 +47,19 @@ def test_without_a_server_the_caller_is_told_at_once(alone: Alone) -> None:
     assert replies == [Reply(None, "no server of /add is known")]
 
 
-def test_a_server_that_raises_gives_the_error_to_the_caller_and_to_the_process(alone: Alone) -> None:
+@pytest.mark.parametrize("error", [ValueError("too many"), SystemExit("too many")])
+def test_a_server_that_raises_gives_the_error_to_the_caller_and_to_the_process(
+    alone: Alone, error: BaseException
+) -> None:
     def fail(request: AddTwoInts.Request) -> AddTwoInts.Response:
-        raise ValueError("too many")
+        raise error
 
     alone.bus.serve("server", "add", AddTwoInts, fail)
     call = alone.bus.client("client", "add", AddTwoInts)
     replies: Replies = []
     call(AddTwoInts.Request(), replies.append)
     alone.settle()
-    assert replies == [Reply(None, "ValueError: too many")]
+    assert replies == [Reply(None, f"{type(error).__name__}: too many")]
     assert [owner for owner, _ in alone.errors] == ["server"]
 
 

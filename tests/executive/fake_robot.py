@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
@@ -44,6 +45,12 @@ def toy_count(room: Place, least: int = 1) -> str | dict[str, int]:
 def toy_raise() -> None:
     """Raise."""
     raise ZeroDivisionError("no such thing")
+
+
+@skill("toy_exit")
+def toy_exit() -> None:
+    """Exit, as a library does that was made for commands."""
+    sys.exit(7)
 
 
 @skill("toy_slow", claims="arm", pausable=True)
@@ -202,7 +209,7 @@ class Robot:
                 ),
                 **{
                     python_skill.skill.name: python_skill
-                    for python_skill in python_skills(["say", "toy_count", "toy_raise", "toy_slow"])
+                    for python_skill in python_skills(["say", "toy_count", "toy_raise", "toy_exit", "toy_slow"])
                 },
             },
             topics={name: topics[name] for name in published},

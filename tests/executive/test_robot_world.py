@@ -169,9 +169,10 @@ def test_a_function_may_end_with_an_outcome_of_its_own() -> None:
     assert end_of(robot) == "mission.yaml:2: nobody"
 
 
-def test_what_python_raises_is_a_failure_that_is_told() -> None:
-    robot = started("do:\n  fallback:\n    - toy_raise\n    - log: went on")
-    assert "0 mission.yaml:3: ZeroDivisionError: no such thing" in robot.lines
+@pytest.mark.parametrize(("name", "told"), [("raise", "ZeroDivisionError: no such thing"), ("exit", "SystemExit: 7")])
+def test_what_python_raises_is_a_failure_that_is_told(name: str, told: str) -> None:
+    robot = started(f"do:\n  fallback:\n    - toy_{name}\n    - log: went on")
+    assert f"0 mission.yaml:3: {told}" in robot.lines
     assert end_of(robot) == "success"
 
 

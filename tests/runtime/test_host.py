@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import pytest
 
 from rbxcompose.base.config import Restart
 from rbxcompose.base.levels import Level
-from rbxcompose.base.requests import as_data
+from rbxcompose.base.requests import Query, answers, as_data
 from rbxcompose.missions.execution.requests import PauseMission
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
@@ -24,10 +24,19 @@ class ToyConfig(Config):
     """Name of the method that raises."""
     times: int = 1
     """How often it does."""
+    error: str = "ValueError"
+    """What it raises; a library that calls sys.exit raises SystemExit."""
 
 
 BROKEN: dict[str, int] = {}  # how often each test's component has raised
 HELD: set[str] = set()  # components that hold what only one can hold at a time
+
+
+@dataclass(frozen=True, slots=True)
+class ToyLevel(Query[float]):
+    """Asks for the number of its steps."""
+
+    about = "toy_for_host"
 
 
 @component("toy_for_host")
@@ -64,10 +73,15 @@ class Toy(Component[ToyConfig]):
         self.break_in("on_add")
         self.steps += int(message.data)
 
+    @answers(ToyLevel)
+    def level(self, request: ToyLevel) -> float:
+        self.break_in("level")
+        return float(self.steps)
+
     def break_in(self, method: str) -> None:
         if method == self.config.breaks_in and BROKEN.get(self.name, 0) < self.config.times:
             BROKEN[self.name] = BROKEN.get(self.name, 0) + 1
-            raise ValueError("planted")
+            raise {"ValueError": ValueError, "SystemExit": SystemExit}[self.config.error]("planted")
 
 
 @pytest.fixture(autouse=True)
@@ -76,16 +90,17 @@ def _fresh() -> None:
     HELD.clear()
 
 
-def bench(breaks_in: str, times: int = 1) -> Bench:
+def bench(breaks_in: str, times: int = 1, error: str = "ValueError") -> Bench:
     return Bench(
-        instance("broken", "toy_for_host", {"breaks_in": breaks_in, "times": times}),
+        instance("broken", "toy_for_host", {"breaks_in": breaks_in, "times": times, "error": error}),
         instance("healthy", "toy_for_host"),
     )
 
 
+@pytest.mark.parametrize("error", ["ValueError", "SystemExit"])
 @pytest.mark.parametrize("method", ["configure", "activate", "step"])
-def test_a_component_that_raises_is_restarted_and_the_others_go_on(method: str) -> None:
-    robot = bench(method)
+def test_a_component_that_raises_is_restarted_and_the_others_go_on(method: str, error: str) -> None:
+    robot = bench(method, error=error)
     robot.advance(2.0)
     assert robot.host.states() == {"broken": ("active", 1), "healthy": ("active", 0)}
     assert robot.component("healthy").steps == 20  # type: ignore[attr-defined]
@@ -158,6 +173,15 @@ def test_a_message_that_breaks_its_handler_restarts_only_that_component() -> Non
     robot.advance(1.0)
     assert robot.host.states() == {"broken": ("active", 1), "healthy": ("active", 0)}
     assert robot.component("healthy").steps == 15  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("error", ["ValueError", "SystemExit"])
+def test_a_request_that_breaks_its_handler_restarts_only_that_component(error: str) -> None:
+    robot = bench("level", error=error)
+    with pytest.raises(Refused, match=f"'broken' has failed: {error}: planted"):
+        robot.host.ask("broken", ToyLevel())
+    robot.advance(1.0)
+    assert robot.host.states() == {"broken": ("active", 1), "healthy": ("active", 0)}
 
 
 def test_the_lifecycle_runs_in_order_and_again_in_reverse() -> None:

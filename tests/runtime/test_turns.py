@@ -40,7 +40,7 @@ class Process:
         self.timers: set[float] = set()  # [s], those that have not run yet
         self.errors: list[str] = []
 
-    def _failed(self, owner: str, error: Exception) -> None:
+    def _failed(self, owner: str, error: BaseException) -> None:
         assert not self.is_resting, "the scheduler's own thread handles errors"
         self.errors.append(f"{owner}: {error}")
 
@@ -187,11 +187,11 @@ def test_an_error_in_a_lent_turn_is_handled_by_the_own_thread_before_the_next_me
 
 def test_what_ends_the_process_ends_it_in_the_own_thread(process: Process) -> None:
     def leave() -> None:
-        raise SystemExit(3)
+        raise KeyboardInterrupt
 
     process.rest()
     process.bring("a", leave)
-    with pytest.raises(SystemExit):
+    with pytest.raises(KeyboardInterrupt):
         process.resume()
 
 

@@ -63,7 +63,7 @@ class Planner(Component[NoConfig]):
     blocking = True
     gate: ClassVar[Gate]
     released: ClassVar[list[str]]  # the thread of each end
-    raises: ClassVar[bool]
+    raises: ClassVar[type[BaseException] | None]
     work = In(Float32, "work", qos=Qos.EVENT)
     done = Out(Float32, "done", qos=Qos.EVENT)
     plan = Serves(Trigger, "plan")
@@ -85,7 +85,7 @@ class Planner(Component[NoConfig]):
         self.info(f"works on {message.data:g}")
         self.gate.hold()
         if self.raises:
-            raise ValueError("planted")
+            raise self.raises("planted")
         self.done(message)
 
     def on_plan(self, request: Trigger.Request) -> Trigger.Response:
@@ -197,7 +197,7 @@ class Process:
 
 @pytest.fixture
 def process() -> Iterator[Process]:
-    Planner.gate, Planner.raises, Planner.released = Gate(), False, []
+    Planner.gate, Planner.raises, Planner.released = Gate(), None, []
     made = Process()
     yield made
     made.close()
@@ -248,7 +248,7 @@ def test_a_request_is_answered_when_it_has_returned_and_its_own_is_answered_in_i
 
 def test_a_refusal_reaches_who_asked(process: Process) -> None:
     replies: list[Reply[Trigger.Response]] = []
-    Planner.raises = True
+    Planner.raises = ValueError
     process.bus.client("test", "plan", Trigger)(Trigger.Request(), replies.append)
     process.until(lambda: replies)
     assert replies == [Reply(None, "not now")]
@@ -273,14 +273,15 @@ def test_goals_are_refused_meanwhile_only_where_it_has_a_say_in_them(process: Pr
     Planner.gate.opened.set()
 
 
-def test_a_fault_in_its_thread_restarts_it_alone(process: Process) -> None:
-    Planner.raises = True
+@pytest.mark.parametrize("raised", [ValueError, SystemExit])
+def test_a_fault_in_its_thread_restarts_it_alone(process: Process, raised: type[BaseException]) -> None:
+    Planner.raises = raised
     Planner.gate.opened.set()
     process.send("work", 1.0)
     process.until(lambda: process.host.states() == {"planner": ("active", 1), "wheels": ("active", 0)})
     error = next(record for record in process.records if record.level is Level.ERROR)
     assert error.source == "planner"
-    assert error.text.startswith("on_work raised ValueError: planted (test_worker.py:")
+    assert error.text.startswith(f"on_work raised {raised.__name__}: planted (test_worker.py:")
     assert Planner.released == ["planner"]  # what it held, without delaying the others
 
 
@@ -310,7 +311,7 @@ def test_a_call_that_takes_long_is_told_and_one_that_never_returns_is_a_fault(pr
 
 
 def test_a_component_that_says_so_may_be_configured_for_longer() -> None:
-    clock, gate, failures, returned = Late(), Gate(), list[Exception](), threading.Event()
+    clock, gate, failures, returned = Late(), Gate(), list[BaseException](), threading.Event()
     worker = Worker("arm", clock, lambda owner, call: returned.set(), failures.append, configures_within=100.0)
     worker.submit(CONFIGURE, gate.hold)
     clock.ahead = LONGEST + 1.0
@@ -374,7 +375,7 @@ def test_one_that_does_not_return_is_left_behind_when_the_robot_goes_down(proces
 
 
 def test_on_a_stepped_clock_it_runs_inline() -> None:
-    Planner.gate, Planner.raises, Planner.released = Gate(), False, []
+    Planner.gate, Planner.raises, Planner.released = Gate(), None, []
     Planner.gate.opened.set()
     bench = Bench(replace(instance("planner", "toy_planner")))
     done = bench.collect("done", Float32)

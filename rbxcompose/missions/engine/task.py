@@ -88,7 +88,7 @@ class Task(ABC):
             self.engine.reasons.pop(self.number, None)  # of an earlier run
         try:
             status = self.begin()
-        except Exception as error:  # whatever a leaf does wrong ends its node, not the engine
+        except (Exception, SystemExit) as error:  # whatever a leaf does wrong ends its node, not the engine
             status = self._broken(error)
         self.statuses[self.number] = status
         return status
@@ -97,7 +97,7 @@ class Task(ABC):
         """Continue, and return the status; only for a task that runs."""
         try:
             status = self.proceed()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             status = self._broken(error)
         self.statuses[self.number] = status
         return status
@@ -213,13 +213,13 @@ class Task(ABC):
         self.halt_below()
         engine.because = engine.outcome = ""
 
-    def report(self, error: Exception) -> None:
+    def report(self, error: BaseException) -> None:
         """Report why this task cannot continue."""
         message = words(error)
         self.engine.reasons[self.number] = message
         self.engine.say(Reported(self.place, message))
 
-    def _broken(self, error: Exception) -> int:
+    def _broken(self, error: BaseException) -> int:
         self.halt_below()
         self.engine.places.forget(self.number, self.end)
         self.engine.outcome = ""

@@ -69,7 +69,7 @@ class PythonErrand(Errand):
         try:
             returned = self._timed(lambda: activity.step(now))
             result = None if returned is None else result_of(returned)
-        except Exception as error:  # whatever a plug-in raises is its own failure, and reported as such
+        except (Exception, SystemExit) as error:  # whatever a plug-in raises is its own failure, and reported as such
             result = _raised(error)
         if result is not None:
             self.end(result)
@@ -77,7 +77,7 @@ class PythonErrand(Errand):
     def _safely(self, call: Callable[[], None]) -> None:
         try:
             self._timed(call)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             self._shell.warn(f"{self._declared.name}: {_raised(error).message}")
             self.end(_raised(error))
 
@@ -110,7 +110,7 @@ def result_of(returned: Returned) -> Result:
     raise TypeError(f"a skill returns True, False, an outcome or a map, and not {returned!r}")
 
 
-def _raised(error: Exception) -> Result:
+def _raised(error: BaseException) -> Result:
     return Result(False, f"{type(error).__name__}: {error}")
 
 

@@ -178,7 +178,7 @@ class RobotWorld:
         self._errands[leaf] = errand
         try:
             errand.begin()
-        except Exception:
+        except (Exception, SystemExit):
             self._errands.pop(leaf, None)
             raise
 

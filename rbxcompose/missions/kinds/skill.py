@@ -46,7 +46,7 @@ class SkillTask(sdk.Leaf):
         self.is_asked = True
         try:
             self.engine.world.start(self.number, self.skill.name, self.arguments)
-        except Exception:
+        except (Exception, SystemExit):
             self.is_asked = False
             raise
         return sdk.RUNNING

@@ -32,7 +32,7 @@ class NodeFailed(Exception):  # noqa: N818 - it ends a node, as a failure would;
     """Raised by a task whose node cannot continue; the text is the reason that is reported."""
 
 
-def words(error: Exception) -> str:
+def words(error: BaseException) -> str:
     """Return an error in words for the robot's story."""
     if isinstance(error, EvaluationError | NotArrivedError | NodeFailed):
         return str(error)

@@ -187,7 +187,7 @@ class Turns:
     def _do_for(self, owner: str, callback: Callable[[], None]) -> None:
         try:
             callback()
-        except Exception as error:  # the failure of the component alone, as if it had done it itself
+        except (Exception, SystemExit) as error:  # the failure of the component alone, as if it had done it itself
             self._scheduler.on_error(owner, error)
 
     def _take(self, owner: str, callback: Callable[[], None], now: float) -> None:

@@ -255,7 +255,13 @@ class Host:
         """
         if isinstance(request, Command):
             self._on_order("command", instance, as_data(request))
-        return self._idle(instance).handle(request)
+        try:
+            return self._idle(instance).handle(request)
+        except Refused:
+            raise
+        except (Exception, SystemExit) as error:
+            self._fails_soon(instance, error)
+            raise Refused(f"'{instance}' has failed: {type(error).__name__}: {error}") from error
 
     def _is_active(self, name: str) -> bool:
         return name in self.hosted and self.hosted[name].state is Lifecycle.ACTIVE
@@ -337,7 +343,7 @@ class Host:
             except Refused as refusal:
                 refused[instance.name] = f"'{instance.name}' refuses: {refusal}"
                 continue
-            except Exception as error:  # as in a step: the failure of the component alone
+            except (Exception, SystemExit) as error:  # as in a step: the failure of the component alone
                 self.failed(instance.name, error)
             hosted.instance, hosted.config = instance, config
         return refused
@@ -428,7 +434,7 @@ class Host:
 
     # Mistakes
 
-    def failed(self, name: str, error: Exception) -> None:
+    def failed(self, name: str, error: BaseException) -> None:
         """Handle an exception of a component: report it, and restart the component unless it fails too often."""
         if name not in self.hosted:
             raise error
@@ -446,7 +452,7 @@ class Host:
         elif not self.is_braking:
             self._give_up(name, text)
 
-    def _fails_soon(self, name: str, error: Exception) -> None:
+    def _fails_soon(self, name: str, error: BaseException) -> None:
         """Handle an exception of a component after who asked for the call has got an answer."""
         self.scheduler.post(self.owner, lambda: self.failed(name, error))
 
@@ -470,7 +476,7 @@ class Host:
     def _guarded(self, name: str, action: Callable[[], None]) -> None:
         try:
             self._working(name, action)
-        except Exception as error:  # whatever a plug-in raises is its own failure, and reported as such
+        except (Exception, SystemExit) as error:  # whatever a plug-in raises is its own failure, and reported as such
             self.failed(name, error)
 
     def _each_active(self, method: str, *arguments: object) -> None:

@@ -315,7 +315,7 @@ def _answer(request: ServedRequest[Any, Any], answer: Callable[[Any], Any], send
         response = answer(request.message)
     except Refused as refusal:
         send(partial(request.fail, str(refusal)))
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         send(partial(request.fail, f"{type(error).__name__}: {error}"))
         raise
     else:

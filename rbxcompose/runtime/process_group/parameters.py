@@ -62,7 +62,7 @@ class LiveChanges:
     """Prepares changes, carries them out and takes them back; nothing is told of a change before its end."""
 
     hosted: Mapping[str, Hosted]
-    failed: Callable[[str, Exception], None]
+    failed: Callable[[str, BaseException], None]
     on_change: OnChange
     history: Callable[[str], ParameterHistory]
     _prepared: dict[int, Sequence[PreparedChange]] = field(default_factory=dict)  # by number of the change
@@ -152,7 +152,7 @@ class LiveChanges:
             hosted.reconfigure(config)
         except Refused as refusal:
             return str(refusal)
-        except Exception as error:  # as in a step: the failure of the component alone
+        except (Exception, SystemExit) as error:  # as in a step: the failure of the component alone
             self.failed(name, error)
             return f"'{name}' has failed: {type(error).__name__}: {error}"
         return ""
@@ -188,7 +188,7 @@ class Parameters:
         clock: Clock,
         namespace: str,
         hosted: Mapping[str, Hosted],
-        failed: Callable[[str, Exception], None],
+        failed: Callable[[str, BaseException], None],
         deciders: Deciders,
     ) -> None:
         self._bus, self._clock, self._namespace, self._deciders = bus, clock, namespace, deciders

@@ -46,7 +46,7 @@ class Worker:
         owner: str,
         clock: Clock,
         post: Post,
-        failed: Callable[[Exception], None],
+        failed: Callable[[BaseException], None],
         configures_within: float = LONGEST,
     ) -> None:
         """Take `post`, with which any thread can run a callback in the scheduler's thread for `owner`.
@@ -122,16 +122,16 @@ class Worker:
 
     def _run(self) -> None:
         while (call := self._calls.get()) is not None:
-            error: Exception | None = None
+            error: BaseException | None = None
             try:
                 call()
-            except Exception as raised:  # whatever a component raises is its own failure, and reported as such
+            except BaseException as raised:  # whatever a component raises is its own failure, and reported as such
                 error = raised
             self.post(self._owner, lambda error=error: self._returned(error))  # type: ignore[misc]
         if self._last is not None:
             self._last()
 
-    def _returned(self, error: Exception | None) -> None:
+    def _returned(self, error: BaseException | None) -> None:
         self._label = ""
         if self.is_closed:
             return
