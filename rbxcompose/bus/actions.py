@@ -17,6 +17,7 @@ from rbxcompose.bus.services import Client, ServedRequest, Server, Services
 from rbxcompose.bus.topics import Publisher, Subscription, Topics
 from rbxcompose.bus.transport import EXPIRED
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalInfo, GoalStatus, GoalStatusArray
+from rbxcompose.msgs.fields import require_type
 from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.types import Action, Message
 from rbxcompose.msgs.unique_identifier_msgs import UUID
@@ -119,12 +120,15 @@ class ActionServer(Generic[G, R, F]):
 
     def publish_feedback(self, goal: Goal[G, R], message: F) -> None:
         """Publish feedback on a goal that has not ended."""
+        require_type(message, self._action.Feedback, self._name)
         if goal is self._goals.current:
             self._feedback(self._action.FeedbackMessage(goal_id=UUID(goal.id), feedback=message))
 
     def end(self, goal: Goal[G, R], state: GoalState, result: R | None, reason: str = "") -> None:
         """End a goal that has not ended and answer all requests for its result."""
-        if not self._goals.end(goal, state, self._action.Result() if result is None else result, self._now):
+        result = self._action.Result() if result is None else result
+        require_type(result, self._action.Result, self._name)
+        if not self._goals.end(goal, state, result, self._now):
             return
         self.current = None
         if reason:
@@ -295,7 +299,7 @@ class ActionClient(Generic[G, R, F]):
         self, topics: Topics, services: Services, node: Participant, name: str, action: type[Action[G, R, F]]
     ) -> None:
         names = ActionNames.of(name)
-        self._action = action
+        self._name, self._action = name, action
         self._ids = count(1)
         self._listeners: dict[bytes, Callable[[F], None]] = {}  # feedback callbacks, by goal
         self._feedback = Subscription(
@@ -319,6 +323,7 @@ class ActionClient(Generic[G, R, F]):
         self, goal: G, then: Callable[[Ended[R]], None], feedback: Callable[[F], None] | None = None, /
     ) -> SentGoal[R]:
         """Send `goal`; `then` receives its end exactly once."""
+        require_type(goal, self._action.Goal, self._name)
         # Unique among all clients, yet the same in every run on a stepped clock.
         id_ = xxhash.xxh3_128_digest(self._send.gid + next(self._ids).to_bytes(8, "little"))
         sent: SentGoal[R] = SentGoal(self, id_, then)

@@ -18,6 +18,7 @@ from rbxcompose.bus.tokens import EntityKind, gid, session_of
 from rbxcompose.bus.transport import LONGEST_WAIT, Closable, Question, TransportReply
 from rbxcompose.bus.wire import SERVICE_QOS
 from rbxcompose.msgs.cdr import CdrLimitError, decode, encode
+from rbxcompose.msgs.fields import require_type
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.sdk.bound import Reply
 from rbxcompose.sdk.ports import ORDINARY, MessageLimits
@@ -49,6 +50,7 @@ class ServedRequest(Generic[Q, R]):
         self.client = client  # GID
         self.sequence = sequence  # among the requests of its client
         self.witness: WhenAnswered[R] | None = None  # receives the answer first
+        self.require: Callable[[R], None] = lambda response: None  # raises TypeError for what its server may not answer
         self._answer: WhenAnswered[R] | None = answer
 
     @property
@@ -57,7 +59,12 @@ class ServedRequest(Generic[Q, R]):
         return self._answer is not None
 
     def reply(self, response: R) -> None:
-        """Answer the request."""
+        """Answer the request.
+
+        Raises:
+            TypeError: if `response` has not the type of the service.
+        """
+        self.require(response)
         self._end(Reply(response))
 
     def fail(self, error: str) -> None:
@@ -98,6 +105,7 @@ class Server(Generic[Q, R]):
         self.malformed = 0  # requests that could not be read
         self._services, self._process, self._owner, self._service = services, node.process, node.owner, service
         self._handle, self._client_left = handle, client_left
+        self._require: Callable[[R], None] = partial(require_type, wanted=service.Response, name=self.route[0])
         self._open: list[ServedRequest[Q, R]] = []
         post, transport = self._process.scheduler.post, self._process.transport
         self._inbox: Inbox[ServedRequest[Q, R] | Question] = Inbox(node.owner, LONGEST_QUEUE, self._take, post)
@@ -150,6 +158,7 @@ class Server(Generic[Q, R]):
         if request is not None:
             self._open = [earlier for earlier in self._open if earlier.is_open]
             self._open.append(request)
+            request.require = self._require
             if self._services.witness is not None:
                 request.witness = partial(self._report, self._services.witness, request)
             try:
@@ -235,7 +244,12 @@ class Client(Generic[Q, R]):
         self._watchers.append(changed)
 
     def __call__(self, request: Q, then: WhenAnswered[R], /, *, timeout: float = 5.0) -> None:
-        """Send `request`; `then` receives the reply, or an error after `timeout` [s] or if there is no server."""
+        """Send `request`; `then` receives the reply, or an error after `timeout` [s] or if there is no server.
+
+        Raises:
+            TypeError: if `request` has not the type of the service.
+        """
+        require_type(request, self._service.Request, self.route[0])
         sequence = next(self._sequence)
         waiting = self._waiting[sequence] = _Waiting(then, frozenset(self._servers))
         if math.isfinite(timeout):

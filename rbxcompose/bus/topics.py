@@ -17,7 +17,7 @@ from rbxcompose.bus.tokens import EndpointToken, EntityKind, gid, parse_token, s
 from rbxcompose.bus.transport import Arrival, Closable
 from rbxcompose.bus.wire import expects_speech, most_per_second, queue_depth, ros_qos
 from rbxcompose.msgs.cdr import CdrError, CdrLengthError, CdrLimitError, decode, encode
-from rbxcompose.msgs.fields import NotFiniteError, require_finite
+from rbxcompose.msgs.fields import NotFiniteError, require_finite, require_type
 from rbxcompose.msgs.types import Message
 from rbxcompose.sdk.ports import MessageLimits, Qos, limits_of
 
@@ -55,7 +55,7 @@ class Publisher(Generic[M]):
         endpoint = node.endpoint(EntityKind.PUBLISHER, topic, message, ros_qos(qos))
         self.route, self.gid = endpoint.route, endpoint.gid
         self.kept: Delivery[M] | None = None  # the last message of a latched topic
-        self._topics, self._process, self._qos = topics, node.process, qos
+        self._topics, self._process, self._qos, self._message = topics, node.process, qos, message
         self._sequence = count(1)
         self._remote = node.process.transport.publisher(endpoint.key, qos)
         self._token = node.announce(endpoint)
@@ -72,7 +72,13 @@ class Publisher(Generic[M]):
         return self._remote.has_match or self._qos is Qos.LATCHED or bool(self._topics.subscriptions.at(self.route))
 
     def __call__(self, message: M) -> None:
-        """Publish `message`."""
+        """Publish `message`.
+
+        Raises:
+            TypeError: if it has not the type of the topic.
+        """
+        if type(message) is not self._message:  # a call for each message would cost more than the rest
+            require_type(message, self._message, self.route[0])
         number, here = next(self._sequence), self._topics.subscriptions.at(self.route)
         has_match, is_latched = self._remote.has_match, self._qos is Qos.LATCHED
         if not (here or has_match or is_latched):

@@ -123,6 +123,17 @@ def require_finite(message: Message) -> None:
         raise NotFiniteError(f"a number in {message.TYPE} is not finite")
 
 
+def require_type(message: object, wanted: type[Message], name: str) -> None:
+    """Do nothing if `message` has the type that `name` takes; another class of the same type will do.
+
+    Raises:
+        TypeError: if it has not.
+    """
+    given = getattr(type(message), "TYPE", type(message).__name__)
+    if given != wanted.TYPE:
+        raise TypeError(f"'{name}' takes {wanted.TYPE}, not {given}")
+
+
 _tests: dict[type[Message], Tests] = {}
 
 

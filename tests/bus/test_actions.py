@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from rbxcompose.bus.actions import ActionServer
@@ -184,6 +186,21 @@ def test_feedback_goes_to_the_client_of_the_goal_only(alone: Alone) -> None:
     server.current.feedback(Feedback())
     alone.settle()
     assert heard == ["second"]
+
+
+def test_a_goal_feedback_and_result_have_the_types_of_the_action(alone: Alone) -> None:
+    server = served(alone)
+    send: Any = alone.bus.action_client("mission", "go_to", NavigateToPose)
+    with pytest.raises(TypeError, match=r"'go_to' takes nav2_msgs/action/NavigateToPose_Goal, not .*_Result"):
+        send(Result(), lambda end: None)
+    send(TO_DOCK, lambda end: None)
+    alone.settle()
+    goal: Any = server.current
+    with pytest.raises(TypeError, match=r"'go_to' takes nav2_msgs/action/NavigateToPose_Feedback, not .*_Goal"):
+        goal.feedback(TO_DOCK)
+    with pytest.raises(TypeError, match=r"'go_to' takes nav2_msgs/action/NavigateToPose_Result, not .*_Goal"):
+        goal.succeeded(TO_DOCK)
+    assert server.current is goal
 
 
 def test_the_states_of_goals_are_published_and_latched(alone: Alone) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 
@@ -61,6 +62,20 @@ def test_a_server_that_raises_gives_the_error_to_the_caller_and_to_the_process(
     alone.settle()
     assert replies == [Reply(None, f"{type(error).__name__}: too many")]
     assert [owner for owner, _ in alone.errors] == ["server"]
+
+
+def test_a_request_or_an_answer_of_another_type_is_the_mistake_of_who_sends_it(alone: Alone) -> None:
+    wrong: Any = AddTwoInts.Request()
+    alone.bus.serve("server", "add", AddTwoInts, lambda request: wrong)
+    call: Any = alone.bus.client("client", "add", AddTwoInts)
+    with pytest.raises(TypeError, match="'/add' takes example_interfaces/srv/AddTwoInts_Request, not NoneType"):
+        call(None, print)
+    replies: Replies = []
+    call(AddTwoInts.Request(), replies.append)
+    alone.settle()
+    told = "'/add' takes example_interfaces/srv/AddTwoInts_Response, not example_interfaces/srv/AddTwoInts_Request"
+    assert replies == [Reply(None, f"TypeError: {told}")]
+    assert [(owner, str(error)) for owner, error in alone.errors] == [("server", told)]
 
 
 def test_a_server_may_refuse_without_being_at_fault(alone: Alone) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 
@@ -67,6 +68,19 @@ def test_names_are_relative_and_types_must_agree(alone: Alone) -> None:
     alone.bus.publisher("b", "x/t", Float32, Qos.STATE)(Float32(data=1.0))
     alone.settle()
     assert got == [Float32(data=1.0)]
+
+
+@pytest.mark.parametrize("is_heard", [True, False])
+def test_a_message_of_another_type_is_the_publishers_mistake_whoever_listens(alone: Alone, is_heard: bool) -> None:
+    got: list[object] = []
+    if is_heard:
+        alone.bus.subscribe("sink", "value", Float32, Qos.STATE, got.append)
+    publish: Any = alone.bus.publisher("source", "value", Float32, Qos.STATE)
+    for wrong, name in ((String(data="x"), "std_msgs/msg/String"), (Float32, "type"), (1.0, "float")):
+        with pytest.raises(TypeError, match=f"^'/value' takes std_msgs/msg/Float32, not {name}$"):
+            publish(wrong)
+    alone.settle()
+    assert got == []
 
 
 def test_who_subscribes_late_gets_the_last_message_of_each_latched_publisher(alone: Alone) -> None:
