@@ -9,17 +9,33 @@ from rbxcompose.base.requests import OutsideError
 
 
 class RestartPolicy:
-    """Counts failures and backs off: `after_failure` returns the pause before the next try."""
+    """Counts failures and backs off: `after_failure` returns the pause before the next try.
+
+    The time from the `begin` of a try until it is `ready`, or has failed, does not count: failures of what hangs would
+    otherwise never be close enough together.
+    """
 
     def __init__(self, restart: Restart = DEFAULT) -> None:
         self.restarts = 0
         self._restart = restart
-        self._failures: deque[float] = deque(maxlen=restart.max)
+        self._failures: deque[float] = deque(maxlen=restart.max)  # [s], without the time of all tries before
+        self._began: float | None = None  # [s], of a try that is not ready
+        self._tried = 0.0  # [s] in all tries
 
     @property
     def is_allowed(self) -> bool:
         """Return whether the component may ever be restarted, however few failures there were."""
         return self._restart.when != "never"
+
+    def begin(self, now: float) -> None:
+        """Note that a try begins."""
+        self._began = now
+
+    def ready(self, now: float) -> None:
+        """Note that the try, if one was under way, is over."""
+        if self._began is not None:
+            self._tried += now - self._began
+            self._began = None
 
     def after_failure(self, now: float) -> float | None:
         """Return the pause before the next try [s], or None if there is none.
@@ -27,6 +43,8 @@ class RestartPolicy:
         The pause stays short enough for `max` failures to fit into `within`: otherwise none would be the last.
         """
         limits = self._restart
+        self.ready(now)
+        now -= self._tried
         self._failures.append(now)
         recent = sum(1 for time in self._failures if now - time <= limits.within)
         if not self.is_allowed or (limits.when == "on_failure" and recent >= limits.max):

@@ -277,10 +277,23 @@ def test_five_deaths_within_a_minute_fail_the_robot() -> None:
     assert (stage.conductor.is_going_down, stage.conductor.exit_code) == (True, 4)
 
 
+def test_five_deaths_of_a_process_that_is_never_configured_fail_the_robot_however_long_each_takes() -> None:
+    stage = Stage()
+    stage.configure("router", "world", "mission")
+    for _ in range(5):
+        assert not stage.conductor.is_going_down
+        stage.pass_time(31.0)
+        stage.exit("robot", "hung for 30 s in configure of 'mux' and ended itself")
+    assert (stage.conductor.is_going_down, stage.conductor.exit_code) == (True, 4)
+    assert "in configure of 'mux' and ended itself, too often" in stage.conductor.reason
+
+
 def test_deaths_far_apart_do_not_fail_the_robot() -> None:
     stage = Stage().start()
     for _ in range(8):
         stage.exit("mission")
+        stage.pass_time(1.0)
+        stage.configure("mission")
         stage.pass_time(30.0)
     assert not stage.conductor.is_going_down
 

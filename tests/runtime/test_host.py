@@ -212,6 +212,13 @@ def test_a_request_that_a_component_does_not_take_is_refused() -> None:
         robot.host.request("healthy", as_data(pause))
 
 
+def test_which_call_of_which_component_runs_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, places = bench(""), list[str]()
+    monkeypatch.setattr(robot.component("healthy"), "brake", lambda: places.append(robot.host.place))
+    robot.host.brake()
+    assert (places, robot.host.place) == (["brake of 'healthy'"], "")
+
+
 def test_nothing_of_a_component_is_left_on_the_bus_after_shutdown() -> None:
     robot = bench("")
     ends = len(robot.bus)

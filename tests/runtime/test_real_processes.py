@@ -206,7 +206,7 @@ def test_down_ends_a_robot_whose_supervisor_is_stopped(robot: Robot) -> None:
 
 def test_a_process_that_hangs_ends_itself_and_says_where(robot: Robot) -> None:
     process = robot.up(hangs_at=0.3)
-    eventually(lambda: robot.has_logged("hung and ended itself"))
+    eventually(lambda: robot.has_logged("process 'other' hung for 2 s in step of 'second' and ended itself"))
     hang = next(record for record in read_log(robot.folder.path / NAME) if "hung" in record.text)
     assert "in step" in hang.detail
     process.send_signal(signal.SIGINT)

@@ -40,6 +40,14 @@ def test_failures_that_lie_back_do_not_count() -> None:
     assert [policy.after_failure(61.0 * number) for number in range(20)] == [0.1] * 20
 
 
+def test_only_the_time_in_which_it_was_ready_counts() -> None:
+    policy = RestartPolicy(Restart(max=2))
+    for _ in range(20):
+        policy.begin(1000.0 * policy.restarts)
+        policy.ready(1000.0 * policy.restarts + 900.0)
+        assert policy.after_failure(1000.0 * policy.restarts + 961.0) == 0.1
+
+
 def test_never_means_no_try_at_all() -> None:
     assert RestartPolicy(restart("never")).after_failure(0.0) is None
 
@@ -49,12 +57,18 @@ def test_always_means_that_there_is_no_last_try() -> None:
     assert None not in [policy.after_failure(0.01 * number) for number in range(50)]
 
 
-@given(RESTARTS)
-def test_what_fails_at_each_try_is_given_up_at_the_failure_that_was_set(limits: Restart) -> None:
+@given(RESTARTS, st.floats(0.0, 1e4))
+def test_what_fails_at_each_try_is_given_up_at_the_failure_that_was_set_however_long_a_try_takes(
+    limits: Restart, takes: float
+) -> None:
     policy = RestartPolicy(limits)
-    now, failures = 0.0, 1
-    while (pause := policy.after_failure(now)) is not None:
+    now, failures = 0.0, 0
+    pause: float | None = 0.0
+    while pause is not None:
         now += pause
+        policy.begin(now)
+        now += takes
+        pause = policy.after_failure(now)
         failures += 1
         assert failures <= limits.max
     assert failures == limits.max

@@ -15,12 +15,12 @@ class EndedError(Exception):
     """Raised instead of the end of the process."""
 
 
-def periods(monkeypatch: pytest.MonkeyPatch, share: float, fed: int = 0) -> int:
-    """Return after how many wake-ups it ends a process that waits for a processor for a `share` of the time.
+def watched(monkeypatch: pytest.MonkeyPatch, share: float, fed: int = 0, place: str = "") -> tuple[int, bytes]:
+    """Return after how many wake-ups it ends a process that waits for a processor for a `share` of the time, and how.
 
-    Its loop feeds it in the first `fed` of them.
+    Its loop feeds it in the first `fed` of them, and is at a `place` now.
     """
-    dog, slept, looked = Watchdog(), count(1), count()
+    dog, slept, looked, told = Watchdog(lambda: place), count(1), count(), list[bytes]()
     dog._thread = object()  # type: ignore[assignment]
 
     def sleep(seconds: float) -> None:
@@ -36,11 +36,20 @@ def periods(monkeypatch: pytest.MonkeyPatch, share: float, fed: int = 0) -> int:
     monkeypatch.setattr(sys.stderr, "flush", lambda: None)
     # In its module alone: other threads of the tests sleep and write, too.
     monkeypatch.setattr(f"{MODULE}.time", SimpleNamespace(sleep=sleep))
-    system = SimpleNamespace(getpid=lambda: 0, write=lambda descriptor, text: len(text), _exit=end)
+    system = SimpleNamespace(getpid=lambda: 0, write=lambda descriptor, text: told.append(text), _exit=end)
     monkeypatch.setattr(f"{MODULE}.os", system)
     with pytest.raises(EndedError):
         dog._watch()
-    return next(slept) - 1
+    return next(slept) - 1, b"".join(told)
+
+
+def periods(monkeypatch: pytest.MonkeyPatch, share: float, fed: int = 0) -> int:
+    return watched(monkeypatch, share, fed)[0]
+
+
+@pytest.mark.parametrize(("place", "told"), [("", b"2 s\n"), ("step of 'lidar'", b"2 s in step of 'lidar'\n")])
+def test_it_says_where_the_process_hangs(monkeypatch: pytest.MonkeyPatch, place: str, told: bytes) -> None:
+    assert watched(monkeypatch, 0.0, place=place)[1] == b"the loop did not run for " + told
 
 
 def test_it_ends_a_process_whose_loop_does_not_run(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -84,13 +84,15 @@ class CallbackInbox:
 HANG = 2.0  # [s] without an iteration of the loop after which the process ends itself
 PERIOD = 0.25  # [s] between two wake-ups
 MARK = "the loop did not run for "
-"""First line of the dump of all threads."""
+"""Begins the first line of the dump of all threads; how long, and where that was, follows."""
 
 
 class Watchdog:
     """Ends the process with exit code 1 unless it is fed in time. It cannot detect a hang that holds Python's lock."""
 
-    def __init__(self) -> None:
+    def __init__(self, place: Callable[[], str] = str) -> None:
+        """Take `place`, which returns in words what runs, such as `step of 'lidar'`, or nothing."""
+        self._place = place
         self._seconds = self._left = HANG  # [s] that it was given, and of them until the end
         self._is_fed = True
         self._thread: threading.Thread | None = None
@@ -115,7 +117,8 @@ class Watchdog:
             before, waits = waits, waits_of(os.getpid())
             self._left -= PERIOD - min(PERIOD, longest_wait(before, waits) if before else 0.0)
         sys.stderr.flush()
-        os.write(2, f"{MARK}{self._seconds:g} s\n".encode())
+        place = f" in {place}" if (place := self._place()) else ""
+        os.write(2, f"{MARK}{self._seconds:g} s{place}\n".encode())
         faulthandler.dump_traceback(file=2)
         os._exit(1)
 

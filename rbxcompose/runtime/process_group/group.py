@@ -200,7 +200,7 @@ class ProcessGroup:
         self._scheduler = Scheduler()
         self._inbox = CallbackInbox()
         self._turns = Turns(self._scheduler, self._clock, self._inbox)
-        self._watchdog = Watchdog()
+        self._watchdog = Watchdog(lambda: self._host.place if self._host is not None else "")
         self._bus: Bus | None = None
         self._lifeline: Lifeline | None = None
         self._taping: Taping | None = None

@@ -162,7 +162,7 @@ class Host:
     def configure(self) -> None:
         """Configure all components; one that raises is restarted later, the others continue."""
         for name in self.hosted:
-            self._guarded(name, self.hosted[name].configure)
+            self._configure(name)
         self.statuses.publish()
 
     def activate(self, names: Sequence[str]) -> None:
@@ -300,7 +300,7 @@ class Host:
         for instance in instances:
             self.hosted[instance.name] = Hosted(self, instance)
             self._policies[instance.name] = RestartPolicy(instance.restart)
-            self._guarded(instance.name, self.hosted[instance.name].configure)
+            self._configure(instance.name)
             old, made = self._retired.pop(instance.name, None), self.hosted[instance.name].component
             if made is not None and type(old) is type(made):
                 self._guarded(
@@ -392,11 +392,23 @@ class Host:
         self._rosout.publish(source, level, text)
         self._log(Record(self.clock.now(), level, source, text, detail))
 
+    def _configure(self, name: str) -> None:
+        self._policies[name].begin(self.clock.now())
+        self._guarded(name, self.hosted[name].configure)
+
     def changed(self, name: str) -> None:
         """Report a new state to the supervisor."""
+        if self.hosted[name].state is Lifecycle.INACTIVE:
+            self._policies[name].ready(self.clock.now())
         self.notify(States({name: self.states()[name]}))
 
     # Who works
+
+    @property
+    def place(self) -> str:
+        """Return in words which call of which component the scheduler's thread is in; empty if in none."""
+        name = self.at_work
+        return f"{self.doing or 'a callback'} of '{name}'" if name in self.hosted else ""
 
     def worker(self, name: str, configures_within: float) -> Worker | None:
         """Return a thread for a component that may block, or None if all must run in one thread: on a stepped clock."""
@@ -469,7 +481,7 @@ class Host:
         if self.is_braking or self.hosted.get(name) is not hosted:
             return  # another one may have taken its place
         self.log(name, Level.WARN, "restarted")
-        self._guarded(name, hosted.configure)
+        self._configure(name)
         if name in self._wanted and hosted.state is Lifecycle.INACTIVE:
             self._guarded(name, hosted.activate)
 

@@ -191,6 +191,7 @@ class Conductor:
 
     def _configured(self, member: Member, endpoint: str | None) -> None:
         member.is_configured = True
+        member.policy.ready(self._scheduler.now)
         if member.is_stopped is not self.is_stopped:  # that changed after it was forked
             self.latch.notify(member)
         self.blocked.notify(self.plan, member)

@@ -112,6 +112,7 @@ class Member:
     def forked(self, now: float) -> None:
         """Reset the state for a newly forked process."""
         self.is_there, self.last_word = True, now
+        self.policy.begin(now)
         self.is_configured = self.is_started = self.is_at_rest = self.is_reported_lost = False
         self.moves, self.runs, self.killed_for = (), {}, ""
         self.requested.clear()

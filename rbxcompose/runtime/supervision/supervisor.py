@@ -384,7 +384,8 @@ class Supervisor:
         if child.descriptor is not None:
             os.close(child.descriptor)
         printed = self._printed(name)
-        how = "hung and ended itself" if MARK in printed else how
+        _, is_hang, where = printed.rpartition(MARK)
+        how = f"hung for {where.splitlines()[0]} and ended itself" if is_hang else how
         if printed and self.conductor.is_going_down:
             self.log(Level.OK, f"process '{name}' {how}; what it had printed is in the log file", printed)
         self.conductor.exited(name, how, printed)
