@@ -13,7 +13,7 @@ from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.supervision.changes import changes
 from tests.runtime.stage import Stage, placed, robot
-from tests.runtime.test_giving_up import with_never
+from tests.runtime.test_giving_up import NEVER, with_never
 
 DRIVER = "'base' moves"
 
@@ -168,6 +168,15 @@ def test_a_new_component_that_fails_is_told_and_the_robot_goes_on_without() -> N
     assert stage.done == [("only in part: 'lamp' failed too often: no; 'rbxcompose ps' shows what runs", True)]
     assert not stage.conductor.is_going_down
     assert stage.conductor.states["lamp"][0] == "failed"
+
+
+def test_a_new_component_that_fails_and_is_never_restarted_is_told() -> None:
+    stage = Changed().apply(replace(robot(), instances=(*robot().instances, replace(lamp(), restart=NEVER))))
+    stage.configure("robot")
+    stage.speak("robot", say.States({"lamp": ("failed", 0)}))
+    told = "'lamp' has failed and is never restarted, the log says why"
+    assert stage.done == [(f"only in part: {told}; 'rbxcompose ps' shows what runs", True)]
+    assert not stage.conductor.is_going_down
 
 
 def test_a_failure_of_what_was_there_before_ends_the_robot_also_during_a_change() -> None:

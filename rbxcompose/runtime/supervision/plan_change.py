@@ -134,6 +134,9 @@ class Changing:
         if self.is_over or not self._has_switched or self._setting:
             return
         if all(states[name][0] in ("active", "failed") for name in self.changes.starting):
+            for name in sorted(self.changes.starting):
+                if states[name][0] == "failed":
+                    self.failures.setdefault(name, f"'{name}' has failed and is never restarted, the log says why")
             self._end("; ".join(self.failures.values()))
 
     def time_is_up(self, states: Mapping[str, tuple[str, int]]) -> None:
