@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import yaml
 
+from rbxcompose import __version__
 from rbxcompose.commands.main import main
 from rbxcompose.compiler.systems.bundle import files_of
 from rbxcompose.compiler.systems.certificates import folder_of
@@ -20,6 +21,7 @@ from rbxcompose.runtime.supervision.supervisor import ALIVE, READY, ServiceManag
 from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.exporting import compose, kubernetes, systemd
 from rbxcompose.tools.exporting.exported_share import CERTIFICATES, CONFIGURATION, FILE, ExportedShare, shares
+from tests.third_party.places import put, see
 
 PATH = "systems/patrol_two_hosts.yaml"
 WITH_DEVICE = ExportedShare("lab", "arm", "bench", ("up", "{file}", "--host", "bench"), ("/dev/ttyUSB0",), 1.0)
@@ -182,6 +184,24 @@ def test_files_go_to_a_new_folder_only(repository: Path, tmp_path: Path, capsys:
     assert main(["export", "k8s", "robots/turtlebot/robot.yaml", "--out", str(tmp_path / "other")]) == 1
     assert main(["export", "k8s", PATH, "--host", "dest", "--out", str(tmp_path / "other")]) == 1
     assert "did you mean 'desk'" in capsys.readouterr().err
+
+
+def test_the_image_has_the_extras_and_the_packages_that_the_robots_need(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    odd = (
+        "from rbxcompose.sdk import Component, Config, component\n@component('odd')\nclass Odd(Component[Config]): pass"
+    )
+    put(tmp_path / "site", "odd-package", {"component.odd": "odd_module"}, {"odd_module.py": odd})
+    see(tmp_path / "site", monkeypatch)
+    cpu = "components:\n  cpu: {type: cpu_monitor}\n"
+    for name, components in {"one": f"{cpu}  odd: {{type: odd}}", "two": cpu}.items():
+        (tmp_path / f"{name}.yaml").write_text(f"rbx: 1\nkind: Robot\nname: {name}\n{components}\n")
+    robots = "robots: {one: {robot: one.yaml}, two: {robot: two.yaml}}"
+    (tmp_path / "all.yaml").write_text(f"rbx: 1\nkind: System\nname: all\nhosts: {{here: {{}}}}\n{robots}\n")
+    assert main(["export", "compose", str(tmp_path / "all.yaml"), "--out", str(tmp_path / "image")]) == 0
+    wanted = f'pip install --no-cache-dir "rbxcompose[monitors]=={__version__}" "odd-package==1.0" &&'
+    assert wanted in (tmp_path / "image/Dockerfile").read_text()
 
 
 def test_a_service_manager_hears_that_all_is_up_and_that_the_supervisor_lives(tmp_path: Path) -> None:

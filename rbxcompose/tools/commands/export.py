@@ -25,6 +25,7 @@ from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.bundle import files_of
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.compiler.systems.reader import compile_system
+from rbxcompose.tools.commands.needs import requirements
 from rbxcompose.tools.exporting import compose, kubernetes, ros2, systemd
 from rbxcompose.tools.exporting.exported_share import shares
 from rbxcompose.tools.exporting.foxglove import foxglove_layout
@@ -139,7 +140,8 @@ def _made(system: System, arguments: argparse.Namespace) -> dict[str, bytes]:
             made = {systemd.unit_name(item): systemd.unit(item, **words) for item in found}
         case "compose":
             text = compose.compose_file(found, system=system.name, file=file)
-            made = {"Dockerfile": compose.dockerfile(__version__), "compose.yaml": text}
+            needed = requirements([placed.robot for placed in system.robots.values()], __version__)
+            made = {"Dockerfile": compose.dockerfile(needed), "compose.yaml": text}
             return {**_encoded(made), **{f"project/{name}": data for name, data in files.items()}}
         case _:
             made = kubernetes.manifests(found, system=system.name, file=file, files=files, image=arguments.image)

@@ -7,7 +7,7 @@ pip install "$(rbxcompose needs PATH --pip)" installs them. Exit codes: 0 fine, 
 import argparse
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.util import find_spec
 
 from rbxcompose.base.dataclass import dataclass
@@ -16,6 +16,7 @@ from rbxcompose.commands.console import FINDINGS, emit, table, write_report
 from rbxcompose.commands.options import add_json_option
 from rbxcompose.commands.targets import add_layer_options, compiled, targets
 from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.sdk import registry, skills
 from rbxcompose.sdk.capabilities import NeedsExtra
 
 GROUP = "run"
@@ -73,6 +74,21 @@ def needed(robots: Iterable[Robot]) -> list[NeededExtra]:
         NeededExtra(name, tuple(by[name]), tuple(each for each in modules[name] if find_spec(each) is None))
         for name in sorted(by)
     ]
+
+
+def requirements(robots: Sequence[Robot], version: str) -> list[str]:
+    """Return what pip must install: rbxcompose with the extras of robots, and packages of their types and skills."""
+    extras = ",".join(item.name for item in needed(robots))
+    types = {component.type_name for robot in robots for component in robot.components.values()}
+    used = ((registry.PLUGINS, types), (skills.PLUGINS, {name for robot in robots for name in robot.skills}))
+    entries = [
+        entry
+        for plugins, names in used
+        for name in names - plugins.shipped.keys()
+        for entry in plugins.third_party.get(name, ())
+    ]
+    foreign = {f"{entry.dist.name}=={entry.dist.version}" for entry in entries if entry.dist}
+    return [f"rbxcompose{f'[{extras}]' if extras else ''}=={version}", *sorted(foreign)]
 
 
 def _robots(arguments: argparse.Namespace, report: Report, sources: dict[str, str]) -> Iterator[Robot]:

@@ -13,7 +13,7 @@ from rbxcompose.tools.exporting import exported_share
 
 PROJECT = "/robot"  # the folder of the manifests in the image
 _DOCKERFILE = """FROM python:3.11-slim
-RUN pip install --no-cache-dir rbxcompose=={version} && useradd --create-home robot
+RUN pip install --no-cache-dir {requirements} && useradd --create-home robot
 COPY project {project}
 USER robot
 WORKDIR {project}
@@ -22,9 +22,10 @@ ENTRYPOINT ["rbxcompose"]
 """
 
 
-def dockerfile(version: str) -> str:
-    """Return the Dockerfile; the system's files are in the folder `project` beside it."""
-    return _DOCKERFILE.format(version=version, project=PROJECT, configuration=exported_share.CONFIGURATION)
+def dockerfile(requirements: Iterable[str]) -> str:
+    """Return the Dockerfile; pip installs the requirements, the folder `project` beside it has the system's files."""
+    words = " ".join(f'"{requirement}"' for requirement in requirements)  # a shell reads it
+    return _DOCKERFILE.format(requirements=words, project=PROJECT, configuration=exported_share.CONFIGURATION)
 
 
 def compose_file(shares: Iterable[exported_share.ExportedShare], *, system: str, file: str) -> str:
