@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from rbxcompose.base.levels import Level
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseWithCovariance, Quaternion, TransformStamped, Twist
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.sdk import ComponentNoted
 from rbxcompose.testing import Bench
 from rbxcompose.testing.manifests import check_text
 from tests.programs.foreign import PATROL, patrol
@@ -56,6 +59,16 @@ def robot(tmp_path: Path) -> Driven:
 def test_where_time_is_stepped_a_program_does_not_run_and_says_so(robot: Driven) -> None:
     words = "base: does not run: robot time is stepped, and programs of others keep real time"
     assert robot.bench.texts().count(words) == 1
+
+
+def test_a_program_that_a_signal_suspends_is_not_called_healthy_and_ps_notes_it(robot: Driven) -> None:
+    program: Any = robot.bench.component("base")
+    for is_suspended, level in ((True, Level.WARN), (True, Level.WARN), (False, Level.OK)):
+        program._tell_suspension(is_suspended=is_suspended)
+        assert program.state.level is level
+    notes = [event for event in robot.bench.events if isinstance(event, ComponentNoted)]
+    assert notes == [ComponentNoted("base", "is suspended by a signal"), ComponentNoted("base", "")]
+    assert robot.bench.texts()[-2:] == ["base: is suspended by a signal", "base: is no longer suspended"]
 
 
 def test_when_its_odometry_stays_away_the_goal_is_given_up_and_no_command_is_left_standing(robot: Driven) -> None:

@@ -27,6 +27,7 @@ from rbxcompose.domains.programs.child import (
     StartOrder,
     WrittenLine,
 )
+from rbxcompose.domains.programs.components.program import is_suspended
 from rbxcompose.runtime.processes import Process
 
 MOST = 20.0  # [s] that any of these may take on a busy machine
@@ -174,11 +175,12 @@ def test_who_is_suspended_is_killed_after_its_time(run: Run) -> None:
     child = run(*shell("echo ready; exec sleep 100"), patience=0.2)
     until(child, lambda events: child.pid is not None and has_said("ready")(events))
     assert child.pid is not None
-    stopped = Process.of(child.pid)
-    stopped.send_signal(signal.SIGSTOP)
-    eventually(lambda: stopped.is_stopped)
+    assert not is_suspended(child.pid)
+    Process.of(child.pid).send_signal(signal.SIGSTOP)
+    eventually(lambda: is_suspended(child.pid))
     child.ask_to_end()
     assert without_start(to_its_end(child)) == [Deaf(), KILLED]
+    assert not is_suspended(child.pid)
 
 
 def test_a_kill_is_told_as_such(run: Run) -> None:
@@ -279,6 +281,7 @@ def test_nothing_is_left_when_its_keeper_is(run: Run, mark: Mark, where: str) ->
 
 HOST = """
 import os, signal, sys, time
+from rbxcompose.domains.programs.components.program import is_suspended
 from rbxcompose.domains.programs.child import Child, StartOrder
 script = "setsid sh -c 'setsid sleep 100 &'; trap '' TERM; echo ready; sleep 100 & wait; sleep 100"
 child = Child(StartOrder(("sh", "-c", script), ".", dict(os.environ), signal.SIGTERM, 20.0))

@@ -49,8 +49,8 @@ from rbxcompose.domains.programs.output import OutputLog
 from rbxcompose.domains.programs.watch import DeclaredKey, EndKind, KeyOnBus, ProgramWatch
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalStatusArray
 from rbxcompose.runtime.folder import RobotFolder
-from rbxcompose.runtime.processes import describe_exit
-from rbxcompose.sdk import Capability, Component, component
+from rbxcompose.runtime.processes import Process, describe_exit
+from rbxcompose.sdk import Capability, Component, ComponentNoted, component
 from rbxcompose.sdk.capabilities import RunsProgram, Setting
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Qos, Serves, ServesAction
 from rbxcompose.sdk.updater import FrequencyTask, TaskStatus
@@ -260,6 +260,7 @@ class Runner(Component[R]):
         self.looked = -LOOKS
         self.link: SessionLink | None = None
         self.linked = 0.0
+        self.suspended = ""  # in words, if it is
         self.tokens: dict[str, Closable] = {}
         self.heard: dict[str, Closable] = {}
         self.session = self.endpoint = ""
@@ -324,6 +325,7 @@ class Runner(Component[R]):
             self._mind_memory(self.child)
             if self.joins_bus and self.guest is not None:
                 self._compare(self.guest)
+            self._tell_suspension(is_suspended=is_suspended(self.child.pid))
 
     @contextmanager
     def _leaving_nothing(self) -> Iterator[None]:
@@ -534,6 +536,18 @@ class Runner(Component[R]):
         if (used := child.memory / _MEGABYTE) > most:
             raise OutsideError(f"uses {used:.0f} MB, and may use {most:g}")
 
+    def _tell_suspension(self, *, is_suspended: bool) -> None:
+        """Report a program that a signal suspends, also beside its name in `ps`; once it runs again, no longer."""
+        text = "is suspended by a signal" if is_suspended else ""
+        if text:
+            self.state = TaskStatus(Level.WARN, text)
+        elif self.suspended:
+            self.state = TaskStatus(Level.OK, "runs")
+        if text != self.suspended:
+            self.suspended = text
+            self.warn(text or "is no longer suspended")
+            self.context.notify(ComponentNoted(self.name, text))
+
     def _compare(self, guest: Guest) -> None:
         """Find what its session has, name it to the others, and report what does not fit."""
         tokens = map(parse_token, guest.tokens(f"{SPACE}/{guest.domain}/{self.session}/**"))
@@ -605,6 +619,8 @@ class Runner(Component[R]):
     def _release(self) -> None:
         """End what is left of it, and leave the bus."""
         self.is_over = True
+        if self.suspended:
+            self.context.notify(ComponentNoted(self.name, ""))
         if self.child is not None:
             self.child.close()
             self.child = None
@@ -618,6 +634,14 @@ class Runner(Component[R]):
         if self.guest is not None:
             self.guest.__exit__(None, None, None)
             self.guest = None
+
+
+def is_suspended(pid: int | None) -> bool:
+    """Return whether a signal keeps this process, if there is one, from running."""
+    try:
+        return pid is not None and Process.of(pid).is_stopped
+    except ProcessLookupError:
+        return False
 
 
 def _key_of(token: EndpointToken) -> KeyOnBus:
