@@ -12,7 +12,7 @@ from rbxcompose.domains.arms.teleoperation import STATUS, STREAM, TIMEOUT, ArmSe
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion, Twist, TwistStamped, Vector3
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
-from rbxcompose.sdk.ports import Qos
+from rbxcompose.sdk.ports import Out, Qos
 from tests.motion.test_arm_task import KINEMATICS, PLANNER
 
 AT = {"turn": 0.8, "lift": 0.0, "bend": 0.5}
@@ -57,7 +57,9 @@ def test_a_command_that_is_none_is_refused_and_moves_nothing(message: TwistStamp
 
 def test_the_status_is_there_for_who_listens_later() -> None:
     config: Any = SimpleNamespace(name="arm", stream="arm/joint_trajectory")
-    assert servo_ports(config)[STATUS].qos is Qos.LATCHED  # it is published at the start, and when it changes
+    status = servo_ports(config)[STATUS]
+    assert isinstance(status, Out)
+    assert status.qos is Qos.LATCHED  # it is published at the start, and when it changes
 
 
 def test_each_message_to_the_controller_ends_at_rest_and_the_last_command_counts_for_a_while() -> None:

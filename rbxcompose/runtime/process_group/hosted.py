@@ -248,6 +248,7 @@ class InstanceHome(Protocol):
     is_held: bool
     is_braking: bool
     is_restart: bool
+    begins: bool
     has_started: bool
     doing: str
 
