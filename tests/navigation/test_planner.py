@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.navigation import planner
-from rbxcompose.domains.navigation.costs import CostSettings, LayeredCosts
+from rbxcompose.domains.navigation.costs import CostSettings, CostZone, LayeredCosts
 from rbxcompose.domains.navigation.planner import NoPathError, plan
 from tests.navigation.houses import HOUSE, ONE_WALL, SIDE, room
 
@@ -52,6 +52,9 @@ def test_a_goal_that_cannot_be_reached_says_why_and_how_near() -> None:
     assert trouble.value.nearest == pytest.approx(1.3, abs=0.1)
     with pytest.raises(NoPathError, match="an obstacle is at the goal"):
         plan(costs, Pose2(), Pose2(1.1, 0.0), 0.1)
+    zone = CostZone("carpet", ((-2.0, -1.0), (-1.0, -1.0), (-1.0, 1.0), (-2.0, 1.0)))
+    with pytest.raises(NoPathError, match="the zone 'carpet' keeps the robot from the goal"):
+        plan(LayeredCosts(costs.grid, SETTINGS, [zone]), Pose2(), Pose2(-1.5, 0.0), 0.1)
     with pytest.raises(NoPathError, match="outside of the map") as outside:
         plan(costs, Pose2(), Pose2(9.0, 0.0), 0.1)
     assert outside.value.is_final

@@ -46,6 +46,23 @@ class GoToSettings:
     """A base that has hardly moved for this long is stuck [s]."""
 
 
+class ProgressWatch:
+    """Sees for how long a base has hardly moved."""
+
+    def __init__(self) -> None:
+        self.idle = 0.0
+        """[s]"""
+        self._mark: Pose2 | None = None  # where progress was last observed
+
+    def update(self, pose: Pose2, dt: float) -> None:
+        """Take a pose, `dt` [s] after the one before."""
+        mark = self._mark
+        if mark and mark.distance(pose) < PROGRESS and abs(wrap_angle(pose.heading - mark.heading)) < PROGRESS_TURN:
+            self.idle += dt
+        else:
+            self._mark, self.idle = pose, 0.0
+
+
 class GoToCore:
     """Where to go and what has been seen on the way; `settings` may be replaced while driving."""
 
@@ -56,20 +73,18 @@ class GoToCore:
         self._near = False
         self._aligned = False
         self._last: Pose2 | None = None
-        self._mark: Pose2 | None = None  # where progress was last observed
-        self._idle = 0.0  # time without progress [s]
+        self._progress = ProgressWatch()
 
     @property
     def stuck(self) -> bool:
         """Return whether the base has made no progress for `stuck_after`."""
-        return self._idle > self.settings.stuck_after
+        return self._progress.idle > self.settings.stuck_after
 
     def start(self, goal: Pose2) -> None:
         """Start to drive to `goal`; it replaces an earlier one."""
         self._goal = goal
         self._near = self._aligned = False
-        self._mark = None
-        self._idle = 0.0
+        self._progress = ProgressWatch()
         self.distance = math.inf
 
     def update(self, pose: Pose2, dt: float) -> tuple[Velocity2, bool]:
@@ -84,7 +99,7 @@ class GoToCore:
             raise RuntimeError("update was called before start")
         resting = self._last is None or _is_resting(self._last, pose, dt)
         self._last = pose
-        self._watch_progress(pose, dt)
+        self._progress.update(pose, dt)
         self.distance = pose.distance(self._goal)
         if not self._is_near(resting):
             return self._drive(pose, self._goal, dt), False
@@ -114,13 +129,6 @@ class GoToCore:
     def _turn(self, error: float, dt: float) -> Velocity2:
         rate = _braking_speed(abs(error), self.settings.turn_rate, self.settings.turn_deceleration, dt)
         return Velocity2(0.0, math.copysign(rate, error))
-
-    def _watch_progress(self, pose: Pose2, dt: float) -> None:
-        mark = self._mark
-        if mark and mark.distance(pose) < PROGRESS and abs(wrap_angle(pose.heading - mark.heading)) < PROGRESS_TURN:
-            self._idle += dt
-        else:
-            self._mark, self._idle = pose, 0.0
 
 
 def _braking_speed(left: float, most: float, deceleration: float, dt: float) -> float:

@@ -21,6 +21,7 @@ RECENT = 0.8  # [s]
 NEAR = 2.0  # [m] from the sensor: what moves farther away concerns nobody
 JITTER = 2  # [cells] by which marks of something that stands may change
 LEAST = 0.02  # [m^2] of what moves
+ROUNDING = 1e-4  # [m] of clearances
 TURNED = 1000 * math.tau  # [rad] that no angle of a scan reaches
 FAR = 1e6  # [cells] to an obstacle if there is none
 
@@ -119,6 +120,7 @@ class LayeredCosts:
     def __init__(self, grid: GridMap, settings: CostSettings, zones: Sequence[CostZone] = ()) -> None:
         self.grid, self.settings = grid, settings
         self._walls = grid.cells >= SOLID
+        self._zones: dict[str, NDArray[np.bool_]] = {}  # to keep out of
         self._unknown = grid.cells == UNKNOWN
         self.shares = np.ones(grid.cells.shape)
         """Of the speed, in each cell."""
@@ -127,7 +129,8 @@ class LayeredCosts:
             if zone.share > 0:
                 self.shares[inside] = np.minimum(self.shares[inside], zone.share)
             else:
-                self._walls = self._walls | inside
+                self._zones[zone.name] = inside | self._zones.get(zone.name, False)
+        self._lasting: NDArray[np.bool_] = np.any([self._walls, *self._zones.values()], 0)
         self._marks: NDArray[np.bool_] = np.zeros(grid.cells.shape, bool)
         self._free = np.zeros(grid.cells.shape, bool)  # passed by a ray since it was marked
         self._past = [(self._marks, self._free)] * 2  # what they were one to two `RECENT` ago, and up to one
@@ -206,7 +209,7 @@ class LayeredCosts:
         """Return whether the map or a zone always keeps the robot from a point of `map` [m]."""
         row, column = self.cell_of(x, y)
         rows, columns = self._walls.shape
-        return 0 <= row < rows and 0 <= column < columns and bool(self._walls[row, column])
+        return 0 <= row < rows and 0 <= column < columns and bool(self._lasting[row, column])
 
     def is_blocked(self, x: float, y: float) -> bool:
         """Return whether the robot must not be at a point of `map` [m]."""
@@ -227,6 +230,42 @@ class LayeredCosts:
 
         Ways keep off further, by up to the side of a cell: who follows one may be a little off.
         """
+        return self._clearance(poses, self._away)
+
+    def comes_nearer(self, pose: Pose2, poses: Sequence[Pose2] | Numbers, least: float) -> bool:
+        """Return whether less than `least` [m] is left to something at some poses, and less than at a pose before.
+
+        So a robot may leave what it is too near to. Each zone counts by itself, as all things do: a robot within a zone
+        must not touch a wall.
+        """
+        after = poses if isinstance(poses, np.ndarray) else rows_of(*poses)
+        if self.clearance(after) >= least:
+            return False
+        before = rows_of(pose)
+        return any(now < min(least, was - ROUNDING) for was, now in self._clearances(before, after).values())
+
+    def zone_at(self, x: float, y: float) -> str:
+        """Return the zone to keep out of that is nearest to a point of `map` [m]; nothing if something else is."""
+        near = self._clearances(rows_of(Pose2(x, y)))
+        return min(near, key=lambda name: near[name][0])
+
+    def _clearances(self, *parts: Numbers) -> dict[str, list[float]]:
+        """Return the clearances of some poses each from all things, which have no name, and from each zone to keep out
+        of; large ones if they are farther away than the robot extends."""
+        cells = self.grid.to_cells(np.concatenate(parts)[:, :2])
+        cells = np.clip(cells, 0, np.array(self.values.shape[::-1]) - 1)
+        reach = self.settings.reach / self.grid.resolution + 2
+        low, high = np.floor(np.maximum(cells.min(0) - reach, 0)).astype(int), np.ceil(cells.max(0) + reach).astype(int)
+        near = slice(low[1], high[1] + 1), slice(low[0], high[0] + 1)
+        solid = {"": self._walls[near] | self._marks[near]} | {name: zone[near] for name, zone in self._zones.items()}
+        return {
+            name: [self._clearance(poses, _distances(found) * self.grid.resolution, low) for poses in parts]
+            for name, found in solid.items()
+        }
+
+    def _clearance(self, poses: Numbers, distances: Numbers, first: NDArray[np.intp] | float = 0) -> float:
+        """Return the clearance of poses, given how far [m] cells are from something: those from the `first` one on, at
+        (column, row)."""
         from scipy.ndimage import map_coordinates
 
         if not len(poses):
@@ -234,8 +273,8 @@ class LayeredCosts:
         x, y, heading = poses.T[:, :, None]
         (along, aside, within), cos, sin = self._samples.T, np.cos(heading), np.sin(heading)
         points = np.stack((x + cos * along - sin * aside, y + sin * along + cos * aside), -1)
-        column, row = np.moveaxis(self.grid.to_cells(points), -1, 0) - 0.5
-        away = map_coordinates(self._away, (row, column), order=1, mode="nearest")
+        column, row = np.moveaxis(self.grid.to_cells(points) - first, -1, 0) - 0.5
+        away = map_coordinates(distances, (row, column), order=1, mode="nearest")
         # An obstacle is a square around its middle; edges of a robot meet its corners more often than a rim does.
         kept = 0.5 * self.grid.resolution + self.settings.radius
         if self.settings.outline is not None:
@@ -244,7 +283,7 @@ class LayeredCosts:
 
     def clear_at(self, *poses: Pose2) -> float:
         """Return how near to something the robot comes at some poses [m]."""
-        return self.clearance(np.array([(at.x, at.y, at.heading) for at in poses]).reshape(-1, 3))
+        return self.clearance(rows_of(*poses))
 
     def room_at(self, points: Numbers) -> float:
         """Return the radius of the largest circle for which there is room at each of some points (n, 2) of `map` [m].
@@ -266,7 +305,7 @@ class LayeredCosts:
     @property
     def solid(self) -> NDArray[np.bool_]:
         """Return which cells something is in."""
-        return self._walls | self._marks
+        return self._lasting | self._marks
 
     def cell_of(self, x: float, y: float) -> tuple[int, int]:
         """Return the row and the column of a point of `map` [m], which may be beside it."""
@@ -281,17 +320,15 @@ class LayeredCosts:
 
     def _inflate(self, rows: slice, columns: slice) -> None:
         """Compute the costs of a part of the map again; what is around it counts, too."""
-        from scipy.ndimage import distance_transform_edt
-
         settings, side = self.settings, self.grid.resolution
         margin = math.ceil(settings.inflation / side) + 1
         around = _wider(rows, margin, self.values.shape[0]), _wider(columns, margin, self.values.shape[1])
-        solid = self._walls[around] | self._marks[around]
+        solid = self._lasting[around] | self._marks[around]
         inner = tuple(
             slice(part.indices(size)[0] - wide.start, part.indices(size)[1] - wide.start)
             for part, wide, size in zip((rows, columns), around, self.values.shape, strict=True)
         )
-        middles = distance_transform_edt(~solid)[inner] if solid.any() else np.full(solid[inner].shape, FAR)
+        middles = _distances(solid)[inner]
         self._away[rows, columns] = middles * side
         away = (middles - 1) * side  # from any place of a cell to the edge of an obstacle
         found = DEAREST * np.exp(-settings.decay * (away - settings.radius))
@@ -300,6 +337,18 @@ class LayeredCosts:
         found[(found < INSCRIBED) & self._unknown[rows, columns] & ~self._marks[rows, columns]] = NO_INFORMATION
         found[solid[inner]] = LETHAL
         self.values[rows, columns] = found.astype(np.uint8)
+
+
+def rows_of(*poses: Pose2) -> Numbers:
+    """Return poses as an array (n, 3): [m], [m], [rad]."""
+    return np.array([(at.x, at.y, at.heading) for at in poses]).reshape(-1, 3)
+
+
+def _distances(solid: NDArray[np.bool_]) -> Numbers:
+    """Return how far the middle of each cell is from that of the nearest solid one [cells]."""
+    from scipy.ndimage import distance_transform_edt
+
+    return np.asarray(distance_transform_edt(~solid)) if solid.any() else np.full(solid.shape, FAR)
 
 
 def _samples(outline: PolygonFootprint | None, side: float) -> Numbers:

@@ -20,7 +20,6 @@ STRAIGHT = math.radians(2)  # bearing of what a robot that stands does not turn 
 FORESEEN = 0.2  # [m] of the arc that are examined at least
 SLACK = 0.01  # [m] to everything that a robot keeps, unless it is nearer already
 TURNING = 0.002  # [m] that are left to everything while one with corners turns on the spot, which is exact
-ROUNDING = 1e-4  # [m]
 CALM = 0.1  # turn rate of a robot that hardly turns [rad/s]
 NEARER = (1.0, 0.5, 0.25)  # shares of the look-ahead that are tried if the arc leads into something
 SLOWEST = 0.25  # share of the speed that costs and curves leave
@@ -236,9 +235,8 @@ class PathFollower:
         """
         if costs.settings.outline is None:
             return angle
-        near = min(TURNING, costs.clear_at(pose) - ROUNDING)
         for turn in (angle, angle - math.copysign(math.tau, angle)):
-            if costs.clearance(_swept(pose, turn, costs)) >= near:
+            if not costs.comes_nearer(pose, _swept(pose, turn, costs), TURNING):
                 return turn
         return None
 
@@ -299,8 +297,7 @@ class PathFollower:
         lasts = length / max(abs(velocity.linear), 1e-9)
         count = max(0, math.ceil(moved / costs.grid.resolution))
         times = lasts * np.arange(1, count + 1) / max(1, count)
-        near = min(SLACK, costs.clear_at(pose) - ROUNDING)
-        return costs.clearance(_arc(pose, velocity, times)) < near
+        return costs.comes_nearer(pose, _arc(pose, velocity, times), SLACK)
 
 
 def _near(wanted: float, now: float, change: float) -> float:

@@ -77,13 +77,19 @@ def plan(costs: LayeredCosts, start: Pose2, goal: Pose2, tolerance: float) -> Pl
         reached = _reached(weights, first)
         last, away = _nearest(reached, last, costs.grid.resolution)
         if away > tolerance:
-            words = "no way leads to the goal" if is_open else "an obstacle is at the goal"
+            words = "no way leads to the goal" if is_open else _at_goal(costs, goal)
             is_wall = costs.is_wall(goal.x, goal.y)
             raise NoPathError(words, away, is_final=is_wall, is_occupied=not (is_open or is_wall))
         cells = _search(weights, first, last)
         if cells is None:
             raise NoPathError("no way leads to the goal", away)
     return _smoothed(costs, weights, cells, start, goal)
+
+
+def _at_goal(costs: LayeredCosts, goal: Pose2) -> str:
+    """Return what is at a goal, in words."""
+    zone = costs.zone_at(goal.x, goal.y)
+    return f"the zone '{zone}' keeps the robot from the goal" if zone else "an obstacle is at the goal"
 
 
 def _plan_for(
@@ -102,7 +108,7 @@ def _plan_for(
     if (away := found.misses * costs.grid.resolution) > tolerance:
         words = "no way leads to the goal"
         if weights[last] < 0:
-            words = "an obstacle is at the goal"
+            words = _at_goal(costs, goal)
         elif costs.clear_at(goal) < 0:
             words = "with its heading, the robot does not fit at the goal"
         raise NoPathError(words, away, is_final=costs.is_wall(goal.x, goal.y))

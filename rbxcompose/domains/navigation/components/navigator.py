@@ -461,6 +461,8 @@ class Navigator(sdk.Component[NavigatorConfig]):
             wanted.feedback(told_of(wanted.request, self.manoeuvre))
             if state is ManoeuvreState.DONE:
                 wanted.succeeded(result_of(wanted.request, self.now - self.turned))
+            elif state is ManoeuvreState.STUCK:
+                self.end_manoeuvre(wanted, "the robot hardly moves: something may hold it", Spin.Result.TIMEOUT)
             elif state is ManoeuvreState.BLOCKED:
                 is_turn = isinstance(self.manoeuvre, SpinManoeuvre)
                 why = "there is no room to turn" if is_turn else "something is behind the robot"
