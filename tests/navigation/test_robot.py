@@ -387,6 +387,11 @@ def test_what_cuts_a_place_off_from_the_start_or_from_another_place_is_found(tmp
     text = Project(tmp_path).check(places + ROBOT).text
     assert "no way leads from where the robot starts to 'east': something is all around; it gets no nearer" in text
     assert "'west'" not in text
+    zone = "  costs: {zones: {carpet: {keep_out: [[-3 m, -3 m], [WIDE m, -3 m], [WIDE m, 3 m], [-3 m, 3 m]]}}}\n"
+    for wide in ("-1", "3"):  # around where it starts, and everywhere
+        text = Project(tmp_path).check(places + ROBOT + zone.replace("WIDE", wide)).text
+        for name in ("east", "west"):
+            assert f"to '{name}': zones to keep out of leave no way out of there" in text
     localised = ROBOT + "  localisation: {type: particles, anywhere: true}\n"
     text = Project(tmp_path).check(places + localised).text
     assert "no way leads from 'east' to 'west': something is all around" in text

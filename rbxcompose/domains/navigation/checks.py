@@ -52,9 +52,16 @@ def place_cut_off(robot: Robot) -> Iterator[Finding]:
     ground = ReachableAreas(found.grid, found.radius, things, zones, unknown_is_free=model.costs.unknown)
     origin, pose = _start(found, around, places)
     away, begin, area = ground.nearest((pose.x, pose.y))
-    if away > found.radius + 2 * found.grid.resolution:
-        return  # it does not stand on the map, or in something: not even a way out is known
+    if is_shut_in := away > (limit := found.radius + 2 * found.grid.resolution):
+        unzoned = ReachableAreas(found.grid, found.radius, things, unknown_is_free=model.costs.unknown)
+        if unzoned.nearest((pose.x, pose.y))[0] > limit:
+            return  # it does not stand on the map, or in something: not even a way out is known
     for name, place in places.items():
+        if is_shut_in:
+            if math.dist((pose.x, pose.y), (place.x, place.y)) > model.follower.tolerance:
+                words = f"no way leads from {origin} to '{name}': zones to keep out of leave no way out of there"
+                yield place_cut_off.at(_written(robot, name), words)
+            continue
         nearest, spot, _ = ground.nearest((place.x, place.y), area)
         if ground.area_at((place.x, place.y)) == area or nearest <= model.follower.tolerance:
             continue
