@@ -1,7 +1,7 @@
 """Fields of messages: their paths, what they measure, parallel arrays as maps, finite numbers."""
 
 from collections.abc import Callable, Collection, Mapping
-from math import isfinite
+from math import inf, isfinite
 from operator import attrgetter
 from typing import Any
 
@@ -91,6 +91,24 @@ class ArrayEntries:
     def arrays(self, given: Mapping[str, object]) -> dict[str, object]:
         """Return both fields with the entries that are given, in their order."""
         return {self.names: tuple(given), self.values: tuple(given.values())}
+
+
+@dataclass(frozen=True, slots=True)
+class NumberRange:
+    """What a number may be, in SI: at least `least`, or above it if the range `is_open`, and at most `greatest`."""
+
+    least: float = 0.0
+    greatest: float = inf
+    is_open: bool = False
+
+    def holds(self, value: float) -> bool:
+        """Return whether a number is within it."""
+        return value <= self.greatest and (value > self.least or (value == self.least and not self.is_open))
+
+    def phrase(self, show: Callable[[float], str]) -> str:
+        """Return it in words, as `show` writes numbers."""
+        words = f"{'above' if self.is_open else 'at least'} {show(self.least)}"
+        return words if self.greatest == inf else f"{words} and at most {show(self.greatest)}"
 
 
 Get = Callable[[Any], Any]

@@ -23,7 +23,7 @@ from rbxcompose.base.config import (
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Command, OutsideError, Query, Refused, answers
-from rbxcompose.msgs.fields import ArrayEntries
+from rbxcompose.msgs.fields import ArrayEntries, NumberRange
 from rbxcompose.sdk.bound import Ended, Later, Outcome, Reply, SentGoal, ServedGoal
 from rbxcompose.sdk.capabilities import (
     BoundsGoals,
@@ -104,6 +104,7 @@ __all__ = [
     "Name",
     "Navigates",
     "NeedsExtra",
+    "NumberRange",
     "OpensPort",
     "Out",
     "Outcome",

@@ -194,6 +194,8 @@ class BoundsGoals(Capability):
     """How fast it moves these joints, [rad/s or m/s]."""
     duration: Setting[str] | None = None
     """The argument that says how long a motion takes [s], if one that is too fast for its joints is refused."""
+    unless: Setting[str] | None = None
+    """The argument that says by how much a goal may be missed: with it, none is refused."""
 
 
 @dataclass(frozen=True, slots=True)

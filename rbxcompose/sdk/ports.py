@@ -5,7 +5,7 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Any, ClassVar, Generic, NamedTuple, Protocol, Self, TypeVar, overload
 
-from rbxcompose.msgs.fields import ArrayEntries, Measures
+from rbxcompose.msgs.fields import ArrayEntries, Measures, NumberRange
 from rbxcompose.msgs.types import Action, Message, Service
 from rbxcompose.sdk.bound import ActionCaller, ActionServer, Caller, Latest, Look, Sender
 
@@ -254,9 +254,10 @@ class ServesAction(Port[ActionServer[G, R, F]]):
     is the last word of the topic, and None means that missions do not have it. Its arguments are the fields of the
     goal, and the `entries` of two of its arrays. `measures` are the dimensions of numbers of the goal, so that missions
     write them with units: `{"opening": LENGTH}`; a map stands for those of a nested message, which becomes an argument
-    by it. `choices` are the words that texts of the goal may be; the first of
-    these texts is the main argument if there are `entries`, else that is the first argument. It must be given if it
-    measures something, unless it `may_lack`.
+    by it. `ranges` are what missions may write for numbers: `{"speed": NumberRange(0.0, 1.0, is_open=True)}` refuses 0,
+    though a goal with a field of 0 means that none is given. `choices` are the words that texts of the goal may be; the
+    first of these texts is the main argument if there are `entries`, else that is the first argument. It must be given
+    if it measures something, unless it `may_lack`.
     """
 
     kind = "serves_action"
@@ -274,6 +275,7 @@ class ServesAction(Port[ActionServer[G, R, F]]):
         entries: ArrayEntries | None = None,
         measures: Measures = MappingProxyType({}),
         choices: Mapping[str, Collection[str]] = MappingProxyType({}),
+        ranges: Mapping[str, NumberRange] = MappingProxyType({}),
         may_lack: bool = False,
         limits: MessageLimits = ORDINARY,
     ) -> None:
@@ -295,7 +297,7 @@ class ServesAction(Port[ActionServer[G, R, F]]):
             raise ValueError(f"{action.Goal.TYPE} has no number '{wrong[0]}'")
         if wrong := [name for name in choices if action.Goal.FIELDS.get(name) != "string"]:
             raise ValueError(f"{action.Goal.TYPE} has no text '{wrong[0]}'")
-        self.measures, self.choices, self.may_lack = measures, choices, may_lack
+        self.measures, self.choices, self.ranges, self.may_lack = measures, choices, ranges, may_lack
         self.interface, self.claims, self.restartable = action, claims, restartable
         self.pausable, self.outcomes, self.limits = pausable, outcomes, limits
 

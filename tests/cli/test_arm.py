@@ -116,6 +116,7 @@ def test_a_picture_tells_the_cells_that_the_tip_gets_to(capsys: pytest.CaptureFi
         (["trace", "{points: [{x: 2 m}]}"], "path_incomplete: only"),
         (["trace", "{points: [{x: 2 cm}], frame: torso}"], "unknown_goal: there is no link 'torso'"),
         (["trace", "{points: []}"], "unknown_goal: there are no points"),
+        (["trace", "{points: [{x: 2 cm}], speed: 0 m/s}"], "'speed' must be greater than 0 m/s"),
     ],
 )
 def test_what_cannot_be_says_why(words: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,6 +15,7 @@ from rbxcompose.base.geometry import Pose2, Transform3
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Command, Query
 from rbxcompose.compiler.model.skills import python_skills
+from rbxcompose.domains.arms.goals import RANGES, SHARES
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.analysis.effects import sent_by
@@ -25,7 +26,7 @@ from rbxcompose.missions.program.program import Program, Skill
 from rbxcompose.missions.sources import SkillSource, SkillWay, TopicSource, ValueSource
 from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
-from rbxcompose.msgs.rbxcompose_msgs import Recharge
+from rbxcompose.msgs.rbxcompose_msgs import MoveArm, Recharge
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.sdk import Activity, Ended, Outcome, Place, skill
 from rbxcompose.sdk.bound import Reply
@@ -201,6 +202,11 @@ class Robot:
                 "scan": SkillSource(
                     skill_of(Recharge, "scan", "head", pausable=True), "rbxcompose_msgs/action/Recharge", "scan"
                 ),
+                "reach": SkillSource(
+                    skill_of(MoveArm, "reach", measures=SHARES, ranges=RANGES),
+                    "rbxcompose_msgs/action/MoveArm",
+                    "reach",
+                ),
                 "switch": SkillSource(
                     Skill("switch", {"data": FLAG}, "data", results={"message": TEXT}),
                     "std_srvs/srv/SetBool",
@@ -215,7 +221,7 @@ class Robot:
             topics={name: topics[name] for name in published},
             services=dict.fromkeys(called, "std_srvs/srv/Trigger"),
         )
-        self.go_to, self.recharge, self.look = Server(), Server(), Look()
+        self.go_to, self.recharge, self.reach, self.look = Server(), Server(), Server(), Look()
         self.mission = Mission("mission", config, self)
         self.scan, self.pauses, self.switch, self.reset = Server(), Service(), Service(), Service()
         self.sent: list[Any] = []
@@ -223,6 +229,7 @@ class Robot:
         self.mission.bound = {
             "skill_go_to": self.go_to,
             "skill_recharge": self.recharge,
+            "skill_reach": self.reach,
             "pose": self.look,
             "skill_scan": self.scan,
             "pauses_scan": self.pauses,

@@ -71,6 +71,13 @@ def test_a_server_that_never_comes_is_a_failure_after_five_seconds() -> None:
     assert end_of(robot) == "mission.yaml:2: nothing serves reset"
 
 
+@pytest.mark.parametrize("speed", ["0 %", "130 %", "-10 %"])
+def test_a_computed_number_beyond_its_range_is_a_failure_and_no_goal_is_sent(speed: str) -> None:
+    robot = started(f"do:\n  reach:\n    pose: home\n    speed: $share * 1\ndata:\n  share: {speed}")
+    assert robot.reach.goals == []
+    assert end_of(robot).endswith(f"the speed must be above 0 % and at most 100 %, not {speed}")
+
+
 def test_a_service_can_be_a_skill() -> None:
     robot = started("do:\n  switch: true")
     assert robot.switch.asked[0][0] == SetBool.Request(data=True)

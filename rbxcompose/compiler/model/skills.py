@@ -50,6 +50,7 @@ def _actions(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
                 entries=port.entries,
                 measures=port.measures,
                 choices=port.choices,
+                ranges=port.ranges,
                 may_lack=port.may_lack,
             )
             yield SkillSource(skill, end.type_name, end.topic)

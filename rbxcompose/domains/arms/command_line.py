@@ -9,6 +9,7 @@ from time import perf_counter
 from typing import Any, TypeVar
 
 import numpy as np
+from pydantic import Field
 
 from rbxcompose.base.config import Angle, Config, Length, Ratio, Speed
 from rbxcompose.base.files import replace_file
@@ -77,13 +78,13 @@ class TraceModel(Config):
     """Whether the tip stays turned as it is."""
     any_orientation: bool = False
     """Whether only positions count."""
-    speed: Speed = 0.0
+    speed: Speed = Field(0.0, gt=0)
     """Of the tip."""
-    acceleration: Ratio = 0.0
+    acceleration: Ratio = Field(0.0, gt=0, le=1)
     """Share of the greatest ones."""
-    blend: Length = 0.0
+    blend: Length = Field(0.0, ge=0)
     """From there on before a corner, the tip cuts it."""
-    least: Ratio = 0.0
+    least: Ratio = Field(0.0, gt=0, le=1)
     """Share of the way that must be possible."""
 
     def message(self) -> dict[str, Any]:

@@ -17,13 +17,16 @@ from rbxcompose.domains.arms.motion.scene_messages import joint_trajectory
 from rbxcompose.domains.arms.motion.trace_planner import ANY_SPEED, TraceWish, WayPoint
 from rbxcompose.msgs import rbxcompose_msgs
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
-from rbxcompose.msgs.fields import Measures
+from rbxcompose.msgs.fields import Measures, NumberRange
 from rbxcompose.msgs.moveit_msgs import ExecuteTrajectory, MoveGroup
 
 POSE_MEASURES = {**dict.fromkeys(("x", "y", "z"), LENGTH), **dict.fromkeys(("roll", "pitch", "yaw"), ANGLE)}
 SIGHT_MEASURES: Measures = {**dict.fromkeys(("x", "y", "z", "radius"), LENGTH), "angle": ANGLE}
 KEEP_MEASURES: Measures = {**POSE_MEASURES, "joints": {"lower": None, "upper": None}, "sight": SIGHT_MEASURES}
 SHARES = {"speed": RATIO, "acceleration": RATIO}
+SHARE = NumberRange(0.0, 1.0, is_open=True)
+RANGES = {"speed": SHARE, "acceleration": SHARE, "tolerance": NumberRange(), "angle_tolerance": NumberRange()}
+TRACE_RANGES = {"speed": NumberRange(is_open=True), "acceleration": SHARE, "blend": NumberRange(), "least": SHARE}
 MOVE_MEASURES: Measures = {**SHARES, "tolerance": ANGLE, "keep": KEEP_MEASURES}
 REACH_MEASURES: Measures = {**POSE_MEASURES, **MOVE_MEASURES, "tolerance": LENGTH, "angle_tolerance": ANGLE}
 TRACE_MEASURES: Measures = {**SHARES, "points": POSE_MEASURES, "speed": SPEED, "blend": LENGTH, "least": RATIO}
@@ -59,7 +62,7 @@ def follow_goal(names: tuple[str, ...], trajectory: Trajectory) -> FollowJointTr
 
 
 def goal_of(message: ArmMessage, solver: SolverSettings = SOLVER) -> ArmGoal:
-    """Return a goal as the task takes it: a share, a speed or a tolerance of 0 is the usual one, that of the solver."""
+    """Return a goal as the task takes it: 0 in place of a share, a speed or a tolerance stands for the usual one."""
     acceleration = message.acceleration or 1.0
     if isinstance(message, rbxcompose_msgs.TraceArm.Goal):
         wish = TraceWish(

@@ -11,8 +11,9 @@ from typing import Any
 
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
-from rbxcompose.base.units import LENGTH, RATIO
+from rbxcompose.base.units import LENGTH
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
+from rbxcompose.domains.arms.goals import RANGES, SHARES
 from rbxcompose.domains.arms.motion import hand_task as hand_tasks
 from rbxcompose.domains.arms.motion.arm_task import ArmGoal
 from rbxcompose.domains.arms.motion.grasps import Grasp
@@ -62,14 +63,14 @@ def numbered(folder: Path, arm: str) -> dict[int, Path]:
 
 
 PICK, PLACE, GRIP, ATTACH, DETACH = "pick", "place", "grip", "attach", "detach"  # the ports
-SHARES = dict.fromkeys(("speed", "acceleration"), RATIO)
 
 
 def hand_ports(config: ArmConfig) -> dict[str, Port[Any]]:
     """Return the ports of an arm with a gripper; none without."""
     if config.hand is None:
         return {}
-    shared: Any = {"claims": config.controller, "outcomes": dict.fromkeys(GRASP_REASONS, "failure")}
+    outcomes = dict.fromkeys(GRASP_REASONS, "failure")
+    shared: Any = {"claims": config.controller, "outcomes": outcomes, "ranges": RANGES}
     lengths = dict.fromkeys(("approach", "lift", "opening", "squeeze"), LENGTH) | SHARES
     pick: ServesAction[Any, Any, Any] = ServesAction(
         PickObject, f"{config.name}/pick", skill=f"pick_{config.name}", measures=lengths, **shared

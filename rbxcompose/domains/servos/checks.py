@@ -42,7 +42,7 @@ from rbxcompose.missions.analysis.facts import Constants, number_in
 from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.language.asked import WrittenArgument, expression_of
 from rbxcompose.missions.program.answers import NodeFlow
-from rbxcompose.missions.program.program import MissionNode
+from rbxcompose.missions.program.program import MissionNode, Skill
 from rbxcompose.sdk.capabilities import BoundsGoals, LocksInSilence
 from rbxcompose.sdk.ports import In, ServesAction
 
@@ -522,6 +522,8 @@ class GoalRange:
     greatest: float
     whose: str
     place: Span
+    unless: str = ""
+    """The argument that permits what is beyond."""
 
     def nearest(self, value: float) -> float:
         """Return the nearest value within the range, or the value itself if it only differs by rounding."""
@@ -533,18 +535,21 @@ class GoalRange:
 def goal_beyond_limits(robot: Robot) -> Iterator[Finding]:
     """A skill is asked for what is beyond the limits."""
     bounded, reported = _bounded(robot), set[Span | None]()
-    for mission in robot.missions.values() if bounded else ():
+    limited = bounded.keys() | {name for name, source in robot.skills.items() if source.skill.ranges}
+    for mission in robot.missions.values() if limited else ():
         known = constants(mission)
         for node in mission.program.nodes:
             ranges = bounded.get(node.skill, {})
-            skill = robot.skills[node.skill].skill if ranges else None
+            skill = robot.skills[node.skill].skill if node.skill in limited else None
             for argument in node.step.arguments if skill else ():
-                if skill and (allowed := ranges.get(name := argument.name or skill.main)):
-                    wanted = skill.arguments[name]
-                    for finding in _beyond(mission, node.skill, name, argument, allowed, wanted, known):
-                        if finding.span not in reported:  # a name that is used twice
-                            yield finding
-                        reported.add(finding.span)
+                name = argument.name or skill.main if skill else ""
+                allowed = ranges.get(name)
+                if allowed is not None and any(allowed.unless == other.name for other in node.step.arguments):
+                    allowed = None
+                for finding in _beyond(mission, skill, name, argument, allowed, known) if skill else ():
+                    if finding.span not in reported:  # a name that is used twice
+                        yield finding
+                    reported.add(finding.span)
 
 
 def _bounded(robot: Robot) -> dict[str, dict[str, GoalRange]]:
@@ -558,33 +563,37 @@ def _bounded(robot: Robot) -> dict[str, dict[str, GoalRange]]:
         for argument, pair in bounds.ranges.value.items() if bounds.ranges else ():
             field = bounds.ranges.field if bounds.ranges else ""
             ranges[argument] = GoalRange(*pair, f"'{skill}'", setting_span(robot, (component, field)))
+        unless = bounds.unless.value if bounds.unless else ""
         for argument, joint in bounds.joints.value.items() if bounds.joints else ():
             if led := joints.get(joint):
                 limits = led.joint.limits
-                ranges[argument] = GoalRange(limits.least, limits.greatest, f"'{joint}'", led.key())
+                ranges[argument] = GoalRange(limits.least, limits.greatest, f"'{joint}'", led.key(), unless)
     return found
 
 
 def _beyond(
     mission: RobotMission,
-    skill: str,
+    skill: Skill,
     name: str,
     argument: WrittenArgument,
-    allowed: GoalRange,
-    wanted: Type,
+    allowed: GoalRange | None,
     known: Constants,
 ) -> Iterator[Finding]:
     """Yield the finding about a goal whose value is known and that is refused."""
     expression, value = _expression(argument), known_value(argument, known)
     if expression is None or value is None or not isinstance(argument.value, ScalarNode):
         return
-    if (nearest := allowed.nearest(value)) != value:
-        declared = _declared(mission, expression)
+    declared = _declared(mission, expression)
+    used = [Related(argument.value.span, "used here")] if declared else []
+    if mistake := skill.mistake_in(name, value):
+        yield goal_beyond_limits.at(declared or argument.value.span, mistake, related=used)
+    elif allowed is not None and (nearest := allowed.nearest(value)) != value:
+        wanted = skill.arguments[name]
         least, greatest = show(wanted, allowed.least), show(wanted, allowed.greatest)
-        used = [Related(argument.value.span, "used here")] if declared else []
         yield goal_beyond_limits.at(
             declared or argument.value.span,
-            f"'{skill}' cannot bring '{name}' to {show(wanted, value)}: {allowed.whose} is from {least} to {greatest}",
+            f"'{skill.name}' cannot bring '{name}' to {show(wanted, value)}:"
+            f" {allowed.whose} is from {least} to {greatest}",
             help=_unit_hint(argument.value.text, wanted, allowed)
             or f"the nearest that it reaches is {show(wanted, nearest)}",
             related=[*used, Related(allowed.place, "its limits")],

@@ -161,6 +161,8 @@ class RobotWorld:
 
     def _errand(self, done: errands.WhenDone, skill: str, arguments: Mapping[str, Value]) -> errands.Errand:
         source = self._shell.equipment.skills[skill]
+        if mistake := next(filter(None, (source.skill.mistake_in(*each) for each in arguments.items())), ""):
+            raise ValueError(mistake)
         match source.way:
             case SkillWay.ACTION:
                 goal = goal_of(registry.action(source.action), arguments, source.skill.entries)

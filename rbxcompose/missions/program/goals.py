@@ -13,7 +13,7 @@ from rbxcompose.base.units import NUMBER, TIME, Dimension
 from rbxcompose.missions.program.program import Skill
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import INTEGERS, FieldShape, attribute, parse_type
-from rbxcompose.msgs.fields import ArrayEntries, Measures
+from rbxcompose.msgs.fields import ArrayEntries, Measures, NumberRange
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
 from rbxcompose.msgs.plain import from_plain, to_plain
 from rbxcompose.msgs.stamps import to_duration, to_seconds
@@ -49,19 +49,21 @@ def skill_of(
     entries: ArrayEntries | None = None,
     measures: Measures = MappingProxyType({}),
     choices: Mapping[str, Collection[str]] = MappingProxyType({}),
+    ranges: Mapping[str, NumberRange] = MappingProxyType({}),
     may_lack: bool = False,
 ) -> Skill:
     """Return an action as a skill: the fields of its goal are the arguments, the first one is the main one.
 
     A field that is not a pose, time, text, flag or number is not an argument and keeps its zero value. `measures` are
     the dimensions of numbers, also of those in nested messages, which become arguments by that: maps, or lists of maps.
-    `choices` are the words that texts may be. A main argument that is a pose, a time or has a dimension is required
-    unless it `may_lack`. With `entries`, those are arguments, too, and only a text with choices is the main one.
+    `choices` are the words that texts may be, `ranges` what numbers may be. A main argument that is a pose, a time or
+    has a dimension is required unless it `may_lack`. With `entries`, those are arguments, too, and only a text with
+    choices is the main one.
     """
     asked, results = _asked(action.Goal, entries, measures, choices), result_fields(action.Result)
     if may_lack:
         asked = (*asked[:2], frozenset())
-    return Skill(name, *asked, claims, restartable, pausable, dict(outcomes), results, entries)
+    return Skill(name, *asked, claims, restartable, pausable, dict(outcomes), results, entries, dict(ranges))
 
 
 def topic_skill(

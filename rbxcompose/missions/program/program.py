@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import ClassVar, Protocol
 
 from rbxcompose.base.config import Place
@@ -18,6 +18,7 @@ from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import MappingNode, ScalarNode
 from rbxcompose.missions.engine.resume_points import NO_HISTORY
+from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.language.asked import Asked, WrittenArgument
 from rbxcompose.missions.language.fields import Declared
 from rbxcompose.missions.program.answers import Advice, NodeEffects, NodeFlow, NodeLook, Possibility, Skipped
@@ -25,7 +26,7 @@ from rbxcompose.missions.program.branches import BranchChoice, Branches
 from rbxcompose.missions.program.machines import Datum, Input, MachineStates, Next
 from rbxcompose.missions.program.modifier import Modifier
 from rbxcompose.missions.program.outcomes import Outcomes
-from rbxcompose.msgs.fields import ArrayEntries
+from rbxcompose.msgs.fields import ArrayEntries, NumberRange
 
 ROOT = 0  # number of the node under `do`
 RATE = 20.0  # [Hz] for polling conditions that change without a message
@@ -39,6 +40,7 @@ class Skill:
     `outcomes` are those besides `success` and `failure`, each with which of the two it counts as. `claims` is what it
     needs exclusively (base, arm, head, voice), empty for nothing. `results` are the types of its result values.
     `entries` are arguments among which at least one must be given, or the main one, or the one that may stand instead.
+    `ranges` are what numbers may be.
     """
 
     name: str
@@ -51,6 +53,14 @@ class Skill:
     outcomes: Mapping[str, str] = field(default_factory=dict)
     results: Mapping[str, Type] = field(default_factory=dict)
     entries: ArrayEntries | None = None
+    ranges: Mapping[str, NumberRange] = field(default_factory=dict)
+
+    def mistake_in(self, argument: str, value: Value) -> str:
+        """Return why a number is not within the range of an argument; nothing if it is, or there is none."""
+        allowed, shown = self.ranges.get(argument), partial(show, self.arguments.get(argument))
+        if allowed is None or not isinstance(value, int | float) or allowed.holds(value):
+            return ""
+        return f"the {argument} must be {allowed.phrase(shown)}, not {shown(value)}"
 
 
 @dataclass(frozen=True, slots=True)

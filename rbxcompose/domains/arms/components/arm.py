@@ -85,7 +85,6 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
     def ports(cls, config: ArmConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports: its goals, and those of its controller."""
         shared: Any = {"claims": config.controller, "outcomes": dict.fromkeys(REASONS, "failure")}
-        traced = arm_goals.TRACE_MEASURES
         return super().ports(config) | {
             MOVE: sdk.ServesAction(
                 MoveArm,
@@ -93,6 +92,7 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
                 skill=f"move_{config.name}",
                 entries=ArrayEntries("joints", "positions", dimensions_of(config), instead="remembered"),
                 measures=arm_goals.MOVE_MEASURES,
+                ranges=arm_goals.RANGES,
                 choices={"pose": tuple(config.poses)} if config.poses else {},
                 **shared,
             ).named(MOVE),
@@ -101,6 +101,7 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
                 f"{config.name}/reach",
                 skill=f"reach_{config.name}",
                 measures=arm_goals.REACH_MEASURES,
+                ranges=arm_goals.RANGES,
                 choices={"prefer": tuple(config.poses)} if config.poses else {},
                 may_lack=True,
                 **shared,
@@ -110,7 +111,12 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
                 DISPLAY
             ),
             TRACE: sdk.ServesAction(
-                TraceArm, f"{config.name}/trace", skill=f"trace_{config.name}", measures=traced, **shared
+                TraceArm,
+                f"{config.name}/trace",
+                skill=f"trace_{config.name}",
+                measures=arm_goals.TRACE_MEASURES,
+                ranges=arm_goals.TRACE_RANGES,
+                **shared,
             ).named(TRACE),
             **servo_ports(config),
             **moveit_ports(config),
@@ -121,11 +127,13 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
 
     @classmethod
     def capabilities(cls, config: ArmConfig) -> tuple[sdk.Capability, ...]:
-        """Declare what it imports."""
+        """Declare what it imports, and where its joints can go."""
         needed = [(module, "arm") for module in ("pinocchio", "ompl", "toppra")]
         needed += [("numba", FAST)] if config.planner.type == FAST else []
         needed += [(module, "arm") for module in readers_of(config.meshes.values())]
-        return tuple(sdk.NeedsExtra(sdk.Setting(module), sdk.Setting(extra)) for module, extra in needed)
+        led = sdk.Setting({name: name for name in config.joints})
+        extras = (sdk.NeedsExtra(sdk.Setting(module), sdk.Setting(extra)) for module, extra in needed)
+        return (sdk.BoundsGoals(MOVE, joints=led, unless=sdk.Setting("tolerance")), *extras)
 
     def configure(self) -> None:
         """Build the model of the body, its shapes and the planner."""
