@@ -82,3 +82,5 @@ def test_missions_attach_and_detach_objects_by_services(plan: Plan) -> None:
         f"'target' moves with '{link}'",
     )
     assert told(DetachObject, detach, DetachObject.Request(object="target"))[0] is True
+    free = told(DetachObject, detach, DetachObject.Request(object="target"))
+    assert free == (False, "no link holds 'target'")

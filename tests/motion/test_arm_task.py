@@ -89,7 +89,7 @@ def test_positions_of_joints_take_precedence_over_the_pose() -> None:
     [
         (ArmGoal("asid"), "there is no pose 'asid'; the poses of this arm: aside, up"),
         (ArmGoal(), "neither a pose nor positions"),
-        (ArmGoal("up", {"nose": 1.0}), "'nose' is no joint of this arm"),
+        (ArmGoal("up", {"nose": 1.0}), "'nose' is no joint of this arm; its joints: "),
         (ArmGoal("up", speed=1.5), "not 150%"),
         (ArmGoal("up", acceleration=float("nan")), "acceleration"),
         (ArmGoal(target=PoseTarget(Transform3(), True), prefer="asid"), "there is no pose 'asid'"),

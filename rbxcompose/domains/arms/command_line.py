@@ -19,6 +19,7 @@ from rbxcompose.commands.console import NotDoneError, misused, refuse, write_rep
 from rbxcompose.commands.targets import compiled, missing_extras, robot_path
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
+from rbxcompose.domains.arms.motion.arm_task import unknown_joint
 from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms
 from rbxcompose.domains.arms.sections.scene import scene
@@ -208,21 +209,21 @@ def positions_in(works: ArmWorks, robot: ArmOfRobot, written: str) -> dict[str, 
     if not written.startswith("{"):
         message = clauses(f"there is no pose '{written}'", suggest(written, robot.model.poses, "poses"))
         raise NotDoneError(NO_MOTION.at(None, message))
-    return read_joints(written, {joint.name: LENGTH if joint.slides else ANGLE for joint in works.space.joints})
+    positions = read_joints(written, {joint.name: LENGTH if joint.slides else ANGLE for joint in works.space.joints})
+    if unknown := next((name for name in positions if name not in works.space.names), ""):
+        raise NotDoneError(NO_MOTION.at(None, unknown_joint(unknown, works.space.names)))
+    return positions
 
 
 def read_joints(written: str, dimensions: Mapping[str, Dimension]) -> dict[str, float]:
-    """Return '{JOINT: POSITION, ...}' as positions [rad or m] of joints that measure these dimensions.
+    """Return '{JOINT: POSITION, ...}' as positions [rad or m] of joints, of which some measure these dimensions.
 
     Raises:
-        NotDoneError: if it is something else, or names another joint.
+        NotDoneError: if it is something else, or a position measures something else.
     """
     read = read_written(dict[str, JointPosition], written)
     for name, position in read.items():
-        if name not in dimensions:
-            message = clauses(f"'{name}' is no joint of this arm", suggest(name, dimensions, "joints"))
-            raise NotDoneError(NO_MOTION.at(None, message))
-        if position.dimension != dimensions[name]:
+        if position.dimension != dimensions.get(name, position.dimension):
             word = "slides" if dimensions[name] == LENGTH else "turns"
             raise NotDoneError(NO_MOTION.at(None, f"'{name}' {word}, and this is {position.dimension.phrase}"))
     return {name: position.value for name, position in read.items()}

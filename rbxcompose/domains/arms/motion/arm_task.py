@@ -11,6 +11,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion import inverse_kinematics
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
@@ -73,13 +74,18 @@ class ArmGoal:
         if not (self.pose or self.positions):
             return "the goal has neither a pose nor positions of joints"
         unknown = [name for name in self.positions if name not in kinematics.group.joints]
-        return f"'{unknown[0]}' is no joint of this arm" if unknown else ""
+        return unknown_joint(unknown[0], kinematics.group.joints) if unknown else ""
 
     @property
     def _mixed(self) -> str:
         if self.target is None or not (self.target.is_approximate and self.keep.is_about_tip):
             return ""
         return "what 'keep' asks of the tip is not possible together with 'approximate'"
+
+
+def unknown_joint(name: str, joints: Collection[str]) -> str:
+    """Return the words about a joint that an arm does not have."""
+    return clauses(f"'{name}' is no joint of this arm", suggest(name, joints, "its joints"))
 
 
 T = TypeVar("T")
@@ -235,10 +241,11 @@ class ArmTask:
         self._first = self._start if self._first is None else self._first
         self._obstacle = ""
         self._kinematics.place({name: one for name, (one, _) in measured.items() if name not in names})
-        self._site.report_stage("planning")
         if problem := self._goal.mistake(self._kinematics, self._site.poses):
             self._fail(MotionReason.UNKNOWN_GOAL, problem)
-        elif self._goal.trace is not None:
+            return
+        self._site.report_stage("planning")
+        if self._goal.trace is not None:
             frame = self._frame()
             planning = planned_trace(self._kinematics, self._planner, self._goal.trace, self._start, frame)
             self._stage = partial(self._continue_planning, planning)

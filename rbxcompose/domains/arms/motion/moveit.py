@@ -559,7 +559,9 @@ class MoveItScene:
             case CollisionObject.APPEND:
                 self.scene.put(self._extended(there, message) if there else self._placed(message))
             case CollisionObject.REMOVE if not message.id:
-                self.scene.objects = {name: item for name, item in self.scene.objects.items() if self._is_held(item)}
+                self.scene.objects = {
+                    name: item for name, item in self.scene.objects.items() if self.scene.is_held(item)
+                }
             case CollisionObject.REMOVE:
                 self.scene.remove(message.id)
             case CollisionObject.MOVE:
@@ -577,7 +579,7 @@ class MoveItScene:
         name = message.object.id
         if message.object.operation == CollisionObject.REMOVE:
             link = message.link_name
-            held = [one for one in self.scene.objects.values() if self._is_held(one) and link in ("", one.link)]
+            held = [one for one in self.scene.objects.values() if self.scene.is_held(one) and link in ("", one.link)]
             for object_ in held:
                 if name in ("", object_.name):
                     self.scene.detach(object_.name, poses)
@@ -610,7 +612,7 @@ class MoveItScene:
     def message(self, name: str, positions: Mapping[str, float]) -> PlanningSceneMessage:
         """Return the scene; `positions` are those of joints [rad or m]."""
         objects = self.scene.objects.values()
-        held = [object_ for object_ in objects if self._is_held(object_)]
+        held = [object_ for object_ in objects if self.scene.is_held(object_)]
         state = RobotState(
             joint_state=JointState(name=tuple(positions), position=np.array([*positions.values()])),
             attached_collision_objects=tuple(
@@ -628,9 +630,6 @@ class MoveItScene:
                 collision_objects=tuple(collision_object(object_) for object_ in objects if object_ not in held)
             ),
         )
-
-    def _is_held(self, thing: scenes.PlacedObject) -> bool:
-        return thing.link in self.scene.body.links and thing.link != self.scene.body.root
 
     def _placed(self, message: CollisionObject) -> scenes.PlacedObject:
         """Return the object of a message; a link that never moves does not hold it."""

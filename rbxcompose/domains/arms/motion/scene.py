@@ -250,13 +250,19 @@ class PlanningScene:
         allowed = tuple(touches) or (link, *self._carried(link))
         self.objects[name] = replace(thing, link=link, pose=pose, touches=allowed)
 
+    def is_held(self, thing: PlacedObject) -> bool:
+        """Return whether a link holds an object: it is in its frame, and not in that of the root."""
+        return thing.link in self.body.links and thing.link != self.body.root
+
     def detach(self, name: str, links: Mapping[str, Transform3]) -> None:
         """Let an object stay where it is, in the frame in which it stood or in the body's root; it may touch nothing.
 
         Raises:
-            SceneError: if there is no such object, or if its frame has no pose.
+            SceneError: if there is no such object, if no link holds it, or if its frame has no pose.
         """
         thing = self._there(name)
+        if not (self.is_held(thing) or thing.touches):
+            raise SceneError(f"no link holds '{name}'")
         frame, pose = self._stood_in.pop(name, self.body.root), self._pose(thing, links)
         if frame in links and frame != self.body.root:
             pose = links[frame].inverse().compose(pose)
