@@ -19,6 +19,7 @@ from rbxcompose.domains.servos.trajectory import (
     TrajectoryPoint,
     TrajectoryPolicy,
     TrajectoryRefusal,
+    TrajectoryTolerance,
     plan_trajectory,
 )
 from tests.control.trajectories import FREE, NAMES, SLOW, TIGHT, WIDE, ZERO, goal, goals, planned, points, rules
@@ -198,6 +199,32 @@ def test_the_time_to_a_point_at_zero_is_the_least_one() -> None:
 def test_a_first_point_where_the_joints_are_costs_no_time_and_another_one_delays_the_rest() -> None:
     assert planned(goal((0.0, (0.0, 0.0)), (4.0, (1.0, 1.0))), TIGHT).end == 4.0
     assert planned(goal((0.0, (1.0, 0.0)), (4.0, (1.0, 1.0))), TIGHT).end == pytest.approx(5.5)
+
+
+@pytest.mark.parametrize("limits", [TIGHT, FREE])
+@pytest.mark.parametrize("gap", [0.003, -0.02])
+def test_a_small_gap_to_a_slow_motion_fades_out_within_the_limits_and_costs_no_time(
+    limits: MotionLimits, gap: float
+) -> None:
+    speed = 0.01
+    rows = ((0.0, 0.0, 0.0), (0.001, 0.5e-5, speed), (3.0, 0.03, speed), (3.001, 0.030005, 0.0))
+    slow = TrajectoryGoal(NAMES, tuple(TrajectoryPoint(time, (at, at), (v, v)) for time, at, v in rows))
+    start = {name: JointSample(gap) for name in NAMES}
+    plan = plan_trajectory(slow, 0.0, start, rules(limits), replace(POLICY, tolerance=TrajectoryTolerance(goal=0.05)))
+    assert isinstance(plan, TrajectoryPlan), plan
+    curve = plan.curves["pan"]
+    assert (curve.first, curve.duration) == (gap, 3.001)
+    assert curve.speed <= speed + 0.06
+    assert curve.sample(2.9).position == pytest.approx(0.029, abs=1e-4)
+
+
+def test_a_gap_for_which_a_fast_motion_leaves_no_speed_is_closed_first() -> None:
+    times = [0.1 * step for step in range(11)]
+    fast = TrajectoryGoal(NAMES, tuple(TrajectoryPoint(time, (time, 0.0), (1.0, 0.0)) for time in times))
+    policy = TrajectoryPolicy(allow_final_velocity=True, tolerance=TrajectoryTolerance(goal=0.05))
+    plan = plan_trajectory(fast, 0.0, {name: JointSample(-0.01) for name in NAMES}, rules(TIGHT), policy)
+    assert isinstance(plan, TrajectoryPlan), plan
+    assert "the point at 0 s is reached as fast as the limits allow" in plan.notes[0]
 
 
 def test_without_limits_a_point_at_zero_is_refused() -> None:

@@ -6,10 +6,21 @@ import subprocess
 import sys
 
 import numpy as np
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
+from rbxcompose.domains.arms.goals import follow_goal
 from rbxcompose.domains.arms.motion.parametrisation import MARGIN, Spline, Trajectory, curve, timed
+from rbxcompose.domains.servos.controllers.joint_trajectory import trajectory_of
+from rbxcompose.domains.servos.curves import JointSample
+from rbxcompose.domains.servos.limits import MotionLimits
+from rbxcompose.domains.servos.trajectory import (
+    JointRules,
+    TrajectoryPlan,
+    TrajectoryPolicy,
+    TrajectoryTolerance,
+    plan_trajectory,
+)
 
 SEEDS = st.integers(0, 2**31)
 
@@ -79,3 +90,18 @@ def test_timing_imports_neither_matplotlib_nor_scipy() -> None:
     there = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
     assert "toppra" in there
     assert not {"matplotlib", "scipy"} & {*there}
+
+
+@given(st.floats(0.01, 1.0), st.floats(-0.03, 0.03))
+@example(0.01, 0.003)
+def test_a_motion_of_any_speed_is_followed_by_a_joint_that_is_commanded_a_little_beside_its_start(
+    share: float, beside: float
+) -> None:
+    limits, policy = MotionLimits(-3.0, 3.0, 1.5, 4.0), TrajectoryPolicy(tolerance=TrajectoryTolerance(goal=0.05))
+    made = timed(np.array(((0.5,), (1.5,))), np.full(1, 1.5 * share), np.full(1, 4.0))
+    assert isinstance(made, Trajectory)
+    goal = trajectory_of(follow_goal(("elbow",), made), 0.0, 0)
+    start, rules = {"elbow": JointSample(0.5 + beside)}, {"elbow": JointRules(limits)}
+    plan = plan_trajectory(goal, 0.0, start, rules, policy)
+    assert isinstance(plan, TrajectoryPlan), plan
+    assert abs(plan.end - made.duration) < 1e-6

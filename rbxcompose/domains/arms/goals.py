@@ -57,8 +57,8 @@ def feedback_of(message: Any, stage: str) -> Any:
 
 
 def follow_goal(names: tuple[str, ...], trajectory: Trajectory) -> FollowJointTrajectory.Goal:
-    """Return a trajectory as its controller takes it; where the arm is now is not among its points."""
-    return FollowJointTrajectory.Goal(trajectory=joint_trajectory(names, trajectory))
+    """Return a trajectory as its controller takes it: with its start, a little beside which it may command joints."""
+    return FollowJointTrajectory.Goal(trajectory=joint_trajectory(names, trajectory, begin=0))
 
 
 def goal_of(message: ArmMessage, solver: SolverSettings = SOLVER) -> ArmGoal:

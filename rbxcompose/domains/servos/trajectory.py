@@ -171,6 +171,8 @@ def _invalid(message: str, joint: str = "") -> TrajectoryRefusal:
 ROUNDING = 1e-9  # a smaller excess over a limit, relative or in [rad, m], counts as none
 BRIEFEST = 1e-3  # [s], the least time to a point
 LONGEST = 1e6  # [s], a motion that needs more is impossible
+FADES = 0.05  # share of its speed with which a joint catches up, which planners leave
+USUAL_SPEED = 1.0  # [rad/s or m/s] of a joint without a limit
 
 Kind = Literal["straight", "spline", "cubic", "quintic"]
 
@@ -257,6 +259,7 @@ class _Draft:
             self.kind = "quintic" if goal.points[0].accelerations else "cubic"
         self.times = [point.time for point in goal.points]
         self.tracks = {name: [_sample(point, i) for point in goal.points] for i, name in enumerate(goal.joints)}
+        self._as_given: tuple[list[float], dict[str, list[JointSample]]] | None = None  # before small gaps faded out
 
     def drop_past_points(self, elapsed: float) -> None:
         """Leave out what should have been reached `elapsed` [s] after the start."""
@@ -288,13 +291,36 @@ class _Draft:
                 self.tracks[name][index] = replace(sample, position=inside)
 
     def make_way_to_first_point(self) -> None:
-        """Give a first point at 0 s the time that the limits demand; all others are later by that."""
+        """Give a first point at 0 s the time that the limits demand; all others are later by that.
+
+        No time is needed by joints that are within their tolerance of it: the gap fades out during the motion.
+        """
         if self.times[0] > 0.0:
             return
-        gaps = [abs(track[0].position - self.start[name].position) for name, track in self.tracks.items()]
-        if max(gaps) <= ROUNDING and len(self.times) > 1:
-            self._drop(1)
+        gaps = {name: self.start[name].position - track[0].position for name, track in self.tracks.items()}
+        widest = max(map(abs, gaps.values()))
+        if len(self.times) == 1 or widest > max(self.policy.tolerance.goal or 0.0, ROUNDING):
+            self._go_to_first_point()
             return
+        if widest > ROUNDING:
+            self._as_given = self.times, self.tracks
+            self.tracks = {name: self._faded(name, gap) for name, gap in gaps.items()}
+        self._drop(1)
+
+    def _faded(self, name: str, gap: float) -> list[JointSample]:
+        """Return the samples of a joint that begins a gap [rad or m] away from the first one."""
+        speed = FADES * (self.joints[name].limits.velocity or USUAL_SPEED)
+        whole = min(max(1.5 * abs(gap) / speed, BRIEFEST), self.times[-1])
+        found = []
+        for time, at in zip(self.times, self.tracks[name], strict=True):
+            if (s := time / whole) >= 1.0:
+                break
+            position = self.joints[name].limits.clamped(at.position + gap * (1 - s) ** 2 * (1 + 2 * s))
+            velocity = at.velocity + 6 * gap * s * (s - 1) / whole
+            found.append(JointSample(position, velocity, at.acceleration + 6 * gap * (2 * s - 1) / whole**2))
+        return [*found, *self.tracks[name][len(found) :]]
+
+    def _go_to_first_point(self) -> None:
         needed = self._least_time()
         self.notes.append(f"the point at 0 s is reached as fast as the limits allow, after {needed:.3f} s")
         self.times = [time + needed for time in self.times]
@@ -310,6 +336,10 @@ class _Draft:
                 if total > 1.0:
                     self.notes.append(f"it takes {total:.2f} times as long, to keep to the limits of velocity")
                 return curves
+            if self._as_given is not None:
+                (self.times, self.tracks), self._as_given = self._as_given, None
+                self._go_to_first_point()
+                continue
             if self.policy.too_fast == "refuse" or math.isinf(excess):
                 break
             self._stretch(excess)

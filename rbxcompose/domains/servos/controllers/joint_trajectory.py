@@ -65,7 +65,8 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
     and its end is not reported. One without points brings them to rest.
 
     Trajectories are linear, cubic or quintic by what their points hold; one at 0 s is reached as fast as the limits
-    allow. A new goal replaces the old one. However a trajectory ends, its joints come to rest within their limits.
+    allow, or on the way by joints that are within their tolerance of it. A new goal replaces the old one. However a
+    trajectory ends, its joints come to rest within their limits.
 
     Example:
         head: {type: joint_trajectory, joints: [pan_joint, tilt_joint]}
