@@ -69,6 +69,8 @@ def test_each_cloud_runs_what_makes_a_thing_of_it(tmp_path: Path) -> None:
         ("{objects: {cup: {mesh: {file: ../../../cup.stl}}}}", "RBX1306", "outside the project"),
         ("{objects: {cup: {mesh: {file: ../../table.scene}}}}", "RBX2350", "is none of .stl"),
         ("{objects: {cup: {mesh: {file: ../../bad.stl}}}}", "RBX2350", "is no STL file"),
+        ("{objects: {cup: {octree: {file: ../../bad.bt}}}}", "RBX2350", "'bad.bt' is no binary octree of OctoMap"),
+        ("{objects: {cup: {octree: {file: ../../none.xyz}}}}", "RBX2350", "does not have three numbers in each line"),
         ("{file: ../../table.scene, objects: {table: {sphere: 1 cm}}}", "RBX2306", "'table' is an object of this"),
         ("{file: ../../cup.stl}", "RBX2351", "is neither '*'"),
         ("{objects: {a: {sphere: 1 cm, frame: mapp}}}", "RBX2019", "looks up the frame 'mapp'"),
@@ -84,6 +86,6 @@ def test_each_cloud_runs_what_makes_a_thing_of_it(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_wrong_is_told(scene: str, code: str, words: str, tmp_path: Path) -> None:
-    files = {"table.scene": TABLE, "cup.stl": CUP, "bad.stl": "<html>"}
+    files = {"table.scene": TABLE, "cup.stl": CUP, **dict.fromkeys(("bad.stl", "bad.bt"), "<html>"), "none.xyz": ""}
     checked = Project(tmp_path).check(f"{ROBOT}scene: {scene}\n", files=files)
     assert (checked.codes, words in checked.text) == ([code], True), checked.text

@@ -14,7 +14,6 @@ from pathlib import Path
 
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Finding, Report, clauses, kind, suggest
-from rbxcompose.base.printable import plain
 from rbxcompose.base.requests import Command, to_data
 from rbxcompose.commands.console import NotDoneError, emit, misused, refuse, table, write_report
 from rbxcompose.commands.lookup import add_asking_options, answer_of, find_robot, pass_on
@@ -22,7 +21,7 @@ from rbxcompose.commands.options import Declare, Subcommand, add_actions, argume
 from rbxcompose.domains.arms import scene_view
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
 from rbxcompose.domains.arms.motion.scene_text import written_scene
-from rbxcompose.domains.arms.sections.scene import NO_MESH, ObjectModel, mesh_mistake, scene_of
+from rbxcompose.domains.arms.sections.scene import NO_MESH, ObjectModel, file_mistake, scene_of
 from rbxcompose.domains.body.meshes import MissingLibraryError
 from rbxcompose.domains.body.model import Body, Geometry
 from rbxcompose.domains.body.urdf import read_body
@@ -112,8 +111,8 @@ def _add(arguments: argparse.Namespace) -> int:
     report.extend(findings)
     read = validate(ObjectModel, root, (), report) if root is not None and not findings else None
     file = Path(read.file).absolute() if read is not None and read.file else None
-    if read is not None and file is not None and (problem := mesh_mistake(file) if read.mesh else ""):
-        report.add(NO_MESH.at(None, f"the mesh '{plain(read.file)}' {problem}"))
+    if read is not None and file is not None and (problem := file_mistake(read, file)):
+        report.add(NO_MESH.at(None, problem))
         read = None
     if read is None:
         write_report(report, {_SHOWN: arguments.object})

@@ -354,17 +354,24 @@ def _file(reading: Reading[SceneModel], model: ObjectModel, path: KeyPath) -> Pa
         return None
     span = reading.value(*path, "mesh" if model.mesh else "octree", "file")
     found = _resolved(reading, model.file, span)
-    if found is None or model.mesh is None:
-        return found
-    if problem := mesh_mistake(found):
-        reading.report.add(NO_MESH.at(span, f"the mesh '{plain(model.file)}' {problem}"))
+    if found is not None and (problem := file_mistake(model, found)):
+        reading.report.add(NO_MESH.at(span, problem))
         return None
     return found
 
 
-def mesh_mistake(file: Path) -> str:
-    """Return why a file can be no mesh, nothing if it may be one."""
-    return mesh_problem(file) if file.suffix.lower() in FORMATS else f"is none of {', '.join(FORMATS)}"
+def file_mistake(model: ObjectModel, file: Path) -> str:
+    """Return why the file of an object can be no mesh or octree, nothing if it may be one."""
+    if model.octree is None:
+        problem = mesh_problem(file) if file.suffix.lower() in FORMATS else f"is none of {', '.join(FORMATS)}"
+        return problem and f"the mesh '{plain(model.file)}' {problem}"
+    from rbxcompose.domains.arms.motion.octree_files import read_cells  # numpy, which other objects do not need
+
+    try:
+        cells, _ = read_cells(file, model.octree.cell)
+    except ValueError as error:
+        return f"the octree '{plain(model.file)}' cannot be read: {error}"
+    return "" if len(cells) else f"the octree '{plain(model.file)}' has no occupied cell"
 
 
 def _resolved(reading: Reading[SceneModel], written: str, span: Span) -> Path | None:
