@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from itertools import product
 
 from rbxcompose.base.dataclass import dataclass
@@ -25,7 +25,7 @@ from rbxcompose.domains.body.model import Body, BodyJoint, Geometry
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.servos.checks import known_value
 from rbxcompose.domains.servos.sections.joints import limits_in
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode, at
 from rbxcompose.missions.analysis.facts import Constants
 from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.program.answers import NodeFlow
@@ -366,9 +366,52 @@ _TURNS = ("roll", "pitch", "yaw")
 def reach_goal(robot: Robot) -> Iterator[Finding]:
     """An arm is to reach what it cannot reach."""
     description = robot.manifest.contents.of(body)
-    for reach in written_reaches(robot) if description else ():
-        if description:
-            yield from _mistakes(robot, description.body, reach)
+    if description is None:
+        return
+    for reach in written_reaches(robot):
+        yield from _mistakes(robot, description.body, reach)
+    for node, known, what in _named(robot, description.body):
+        if isinstance(node, ScalarNode) and node.text and "$" not in node.text and node.text not in known:
+            yield reach_goal.at(node.span, f"{what} '{node.text}'", help=suggest(node.text, known, "there are"))
+    for trace in written_reaches(robot, "trace"):
+        yield from _no_way(trace)
+
+
+def _named(robot: Robot, body: Body) -> Iterator[tuple[TreeNode | None, Collection[str], str]]:
+    """Yield links, joints and spots that steps of arms name: what is written, what there is, and the words if it is
+    another one."""
+    links = body.links, "the body has no link"
+    for verb in ("reach", "move"):
+        for goal in written_reaches(robot, verb):
+            if _KEEP not in goal.arguments:
+                continue
+            keep = goal.arguments[_KEEP].value
+            yield at(keep, ("frame",)), *links
+            yield at(keep, ("sight", "sensor")), *links
+            yield at(keep, ("sight", "target")), *links
+            joints = at(keep, ("joints",))
+            for joint in joints.items if isinstance(joints, SequenceNode) else ():
+                yield at(joint, ("name",)), goal.arm.group.joints, f"'{goal.name}' has no joint"
+    for verb in ("trace", "place"):
+        for goal in written_reaches(robot, verb):
+            if written := goal.arguments.get("frame"):
+                yield written.value, *links
+            if (written := goal.arguments.get("spot")) and not goal.arm.model.spots:
+                yield written.value, (), f"'{goal.name}' has no 'spots', so not the spot"
+    for step in _steps(robot, _ATTACH):
+        yield from ((argument.value, *links) for argument in step.step.arguments if argument.name == "link")
+
+
+def _no_way(trace: WrittenReach) -> Iterator[Finding]:
+    """Yield that the points of a step are no way."""
+    points = trace.arguments["points"].value if "points" in trace.arguments else None
+    if not isinstance(points, SequenceNode):
+        return
+    last = at(points.items[-1], ("via",)) if points.items else None
+    if not points.items:
+        yield reach_goal.at(points.span, f"'{trace.node.skill}' has no points to go through")
+    elif isinstance(last, ScalarNode) and last.text == "true":
+        yield reach_goal.at(last.span, "the last point is in the middle of an arc", help="add the point where it ends")
 
 
 def _mistakes(robot: Robot, body: Body, reach: WrittenReach) -> Iterator[Finding]:

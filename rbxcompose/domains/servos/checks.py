@@ -539,14 +539,15 @@ def goal_beyond_limits(robot: Robot) -> Iterator[Finding]:
     for mission in robot.missions.values() if limited else ():
         known = constants(mission)
         for node in mission.program.nodes:
-            ranges = bounded.get(node.skill, {})
-            skill = robot.skills[node.skill].skill if node.skill in limited else None
-            for argument in node.step.arguments if skill else ():
-                name = argument.name or skill.main if skill else ""
+            if node.skill not in limited or node.skill not in robot.skills:
+                continue
+            skill, ranges = robot.skills[node.skill].skill, bounded.get(node.skill, {})
+            given = {argument.name or skill.main: argument for argument in node.step.arguments}
+            for name, argument in given.items():
                 allowed = ranges.get(name)
-                if allowed is not None and any(allowed.unless == other.name for other in node.step.arguments):
+                if allowed is not None and allowed.unless in given:
                     allowed = None
-                for finding in _beyond(mission, skill, name, argument, allowed, known) if skill else ():
+                for finding in _beyond(mission, skill, name, argument, allowed, known):
                     if finding.span not in reported:  # a name that is used twice
                         yield finding
                     reported.add(finding.span)
