@@ -27,6 +27,7 @@ class ValueSource:
     type: Type = UNKNOWN
     group: str = ""
     is_event: bool = False
+    is_latched: bool = False
 
 
 def events_of(values: Mapping[str, ValueSource]) -> frozenset[str]:

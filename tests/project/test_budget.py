@@ -35,7 +35,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "base": Cost(code=3807, files=33, small=4, imports=238),
     "bus": Cost(code=2457, files=21, small=0, imports=176),
     "commands": Cost(code=2498, files=25, small=1, imports=293),
-    "compiler": Cost(code=7761, files=75, small=9, imports=929),
+    "compiler": Cost(code=7739, files=75, small=9, imports=930),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
     "domains/arms": Cost(code=13081, files=77, small=2, imports=1199),
     "domains/bases": Cost(code=2098, files=19, small=0, imports=191),
@@ -52,7 +52,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/vision": Cost(code=2603, files=31, small=1, imports=354),
     "domains/worlds": Cost(code=4630, files=41, small=4, imports=561),
     "manifest": Cost(code=3509, files=26, small=1, imports=277),
-    "missions": Cost(code=12408, files=135, small=19, imports=1322),
+    "missions": Cost(code=12412, files=135, small=19, imports=1322),
     "msgs": Cost(code=1572, files=16, small=3, imports=107),
     "runtime": Cost(code=7681, files=46, small=1, imports=714),
     "sdk": Cost(code=1475, files=12, small=2, imports=157),
@@ -62,10 +62,10 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114880,
+    "lines of code": 114886,
     "files": 948,
     "files of 1 to 30 lines of code": 75,
-    "lines of imports": 11256,
+    "lines of imports": 11257,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 368,

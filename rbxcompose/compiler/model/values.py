@@ -1,6 +1,7 @@
 """Values: the field of a message that a `$name` of the missions refers to, and what it measures."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from rbxcompose.base.expressions.types import TYPES, UNKNOWN, Type, TypeKind, choice_of, quantity_of
 from rbxcompose.base.levels import Level
@@ -11,7 +12,7 @@ from rbxcompose.missions.sources import ValueSource
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import FieldShape, FieldType
 from rbxcompose.msgs.fields import NoFieldError, field_type
-from rbxcompose.sdk.ports import In, Out
+from rbxcompose.sdk.ports import In, Out, Qos
 
 # The message for data from outside whose type nothing in the robot declares.
 STANDARD = {"text": "std_msgs/msg/String", "flag": "std_msgs/msg/Bool", "count": "std_msgs/msg/Int32"}
@@ -53,7 +54,8 @@ def _of_port(end: PortEnd, entry: ValueModel) -> ValueSource | None:
     fields = tuple(registry.message(end.type_name).FIELDS)
     if len(fields) != 1:
         return None  # a whole message is not a value
-    return _value(end.topic, end.type_name, fields[0], entry.unit or port.unit, None, entry.event)
+    found = _value(end.topic, end.type_name, fields[0], entry.unit or port.unit, None, entry.event)
+    return replace(found, is_latched=port.qos is Qos.LATCHED)
 
 
 def _value(

@@ -35,7 +35,10 @@ def ports_of_triggers(triggers: Iterable[Trigger]) -> dict[str, Port[Any]]:
 def _ports(equipment: errands.Equipment) -> Ports:
     for name in sorted(equipment.reads & equipment.values.keys()):
         source = equipment.values[name]
-        yield errands.VALUE + name, In(registry.message(source.message), source.topic)
+        yield (
+            errands.VALUE + name,
+            In(registry.message(source.message), source.topic, qos=Qos.LATCHED if source.is_latched else Qos.STATE),
+        )
     for name, skill in equipment.used.items():
         yield from _of_skill(name, skill)
     for topic, target in equipment.topics.items():
