@@ -179,9 +179,9 @@ class Activate:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """The whole robot is active: missions may begin, and stepped time runs; `begins`: also the one that `up` starts."""
+    """The whole robot is active: missions may start, also that of `start` if it `starts_mission`; stepped time runs."""
 
-    begins: bool = True
+    starts_mission: bool = True
 
 
 @dataclass(frozen=True, slots=True)

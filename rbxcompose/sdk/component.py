@@ -47,8 +47,8 @@ class Context(Protocol):
         ...
 
     @property
-    def begins(self) -> bool:
-        """Return whether the mission that `up` starts begins: not when it is over, nor because files have changed."""
+    def starts_mission(self) -> bool:
+        """Return whether the mission of `start` is to start: not when it is over, nor because files have changed."""
         ...
 
     @property

@@ -169,6 +169,32 @@ class FakeWindow:
         self.news.append(json.loads(json.dumps(value)))
 
 
+def skills() -> dict[str, SkillSource]:
+    """Return what the robot can do, by name."""
+    return {
+        "go_to": SkillSource(skill_of(NavigateToPose, "go_to", "base"), "nav2_msgs/action/NavigateToPose", "go_to"),
+        "recharge": SkillSource(
+            skill_of(Recharge, "recharge", restartable=False), "rbxcompose_msgs/action/Recharge", "recharge"
+        ),
+        "scan": SkillSource(
+            skill_of(Recharge, "scan", "head", pausable=True), "rbxcompose_msgs/action/Recharge", "scan"
+        ),
+        "reach": SkillSource(
+            skill_of(MoveArm, "reach", measures=SHARES, ranges=RANGES), "rbxcompose_msgs/action/MoveArm", "reach"
+        ),
+        "switch": SkillSource(
+            Skill("switch", {"data": FLAG}, "data", results={"message": TEXT}),
+            "std_srvs/srv/SetBool",
+            "switch",
+            SkillWay.SERVICE,
+        ),
+        **{
+            python_skill.skill.name: python_skill
+            for python_skill in python_skills(["say", "toy_count", "toy_raise", "toy_exit", "toy_slow"])
+        },
+    }
+
+
 class Robot:
     """A mission component with a fake context and fake ports, on a stepped clock."""
 
@@ -176,7 +202,7 @@ class Robot:
         self.stepped = SteppedClock()
         self.clock: Clock = self.stepped
         self.is_stopped = self.is_over = self.is_again = False
-        self.begins = True
+        self.starts_mission = True
         self.lines: list[str] = []
         self.levels: list[Level] = []
         self.events: list[RobotEvent] = []
@@ -192,32 +218,7 @@ class Robot:
             start=start,
             values=VALUES,
             places=PLACES,
-            skills={
-                "go_to": SkillSource(
-                    skill_of(NavigateToPose, "go_to", "base"), "nav2_msgs/action/NavigateToPose", "go_to"
-                ),
-                "recharge": SkillSource(
-                    skill_of(Recharge, "recharge", restartable=False), "rbxcompose_msgs/action/Recharge", "recharge"
-                ),
-                "scan": SkillSource(
-                    skill_of(Recharge, "scan", "head", pausable=True), "rbxcompose_msgs/action/Recharge", "scan"
-                ),
-                "reach": SkillSource(
-                    skill_of(MoveArm, "reach", measures=SHARES, ranges=RANGES),
-                    "rbxcompose_msgs/action/MoveArm",
-                    "reach",
-                ),
-                "switch": SkillSource(
-                    Skill("switch", {"data": FLAG}, "data", results={"message": TEXT}),
-                    "std_srvs/srv/SetBool",
-                    "switch",
-                    SkillWay.SERVICE,
-                ),
-                **{
-                    python_skill.skill.name: python_skill
-                    for python_skill in python_skills(["say", "toy_count", "toy_raise", "toy_exit", "toy_slow"])
-                },
-            },
+            skills=skills(),
             topics={name: topics[name] for name in published},
             services=dict.fromkeys(called, "std_srvs/srv/Trigger"),
         )

@@ -54,15 +54,15 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "manifest": Cost(code=3509, files=26, small=1, imports=277),
     "missions": Cost(code=12412, files=135, small=19, imports=1322),
     "msgs": Cost(code=1572, files=16, small=3, imports=107),
-    "runtime": Cost(code=7681, files=46, small=1, imports=714),
+    "runtime": Cost(code=7689, files=46, small=1, imports=714),
     "sdk": Cost(code=1475, files=12, small=2, imports=157),
     "testing": Cost(code=642, files=7, small=2, imports=79),
-    "tools": Cost(code=18240, files=143, small=10, imports=1976),
+    "tools": Cost(code=18241, files=143, small=10, imports=1976),
 }
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114886,
+    "lines of code": 114895,
     "files": 948,
     "files of 1 to 30 lines of code": 75,
     "lines of imports": 11257,

@@ -116,7 +116,7 @@ def test_an_executive_in_another_process_begins_no_mission() -> None:
     stage.exit("mission")
     stage.configure("brain")
     stage.activate()
-    assert stage.orders(say.Start) == [("brain", say.Start(begins=False))]
+    assert stage.orders(say.Start) == [("brain", say.Start(starts_mission=False))]
 
 
 def test_a_new_process_is_forked_with_the_new_plan_and_started() -> None:

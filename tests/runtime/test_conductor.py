@@ -212,7 +212,7 @@ def test_a_mission_begins_again_after_a_crash_unless_it_was_over(is_over: bool) 
     stage.scheduler.advance(stage.scheduler.now + 0.1)
     stage.configure("mission")
     stage.speak("mission", say.States({"mission": ("active", 0)}))
-    assert stage.orders(say.Start)[-1] == ("mission", say.Start(begins=not is_over))
+    assert stage.orders(say.Start)[-1] == ("mission", say.Start(starts_mission=not is_over))
 
 
 def test_a_process_that_comes_again_to_a_stopped_robot_is_told_so() -> None:

@@ -21,7 +21,7 @@ from rbxcompose.missions.execution.requests import ListMissions, PauseMission
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import HostReport
 from rbxcompose.runtime.folder import RobotState, RunOptions
-from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison, RevertPlan
+from rbxcompose.runtime.plan_requests import AdoptSaved, ApplyPlan, ComparePlan, PlanComparison, RevertPlan
 from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import BringDown, NoteInLog, ReleaseRobot, RobotStatus, StopRobot
 from rbxcompose.runtime.supervision.changes import Fate
@@ -300,8 +300,28 @@ def test_a_process_that_ends_has_nothing_to_say_about_a_change() -> None:
 
 
 def test_a_text_that_is_no_plan_is_refused() -> None:
-    for request in (ComparePlan("{}"), ApplyPlan("{}", 0)):
+    for request in (ComparePlan("{}"), ApplyPlan("{}", 0), AdoptSaved("{}", {})):
         assert Desk().ask(request) == ("this is not a plan of version 1", True)
+
+
+@pytest.mark.parametrize(
+    ("plan", "names", "reason"),
+    [
+        (PLAN, {"patrol": ["speed"]}, "the robot has no such settings"),
+        (replace(PLAN, instances=()), {"patrol": ["start"]}, "the robot has no such settings"),
+        (
+            replace(PLAN, instances=(replace(PLAN.instances[0], config=MissionConfig(for_others=True)),)),
+            {"patrol": ["for_others"]},
+            "they are not live",
+        ),
+    ],
+)
+def test_saved_values_of_what_is_no_live_setting_are_refused(
+    plan: Plan, names: dict[str, list[str]], reason: str
+) -> None:
+    desk = Desk()
+    desk.conductor._is_running = True
+    assert desk.ask(AdoptSaved(dump(plan), names)) == (reason, True)
 
 
 def test_what_cannot_be_done_now_is_refused_with_the_reason() -> None:

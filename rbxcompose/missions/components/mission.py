@@ -183,7 +183,7 @@ class Mission(Component[MissionConfig]):
         memory = TriggerMemory(self.snapshots.triggers_file)
         self.triggering = Triggering(self.config.triggers, self.config.names, seen, self, memory)
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
-        self.begins_held = False  # the start mission, which was paused and cannot go on where it was
+        self.restarts_held = False  # the start mission, which was paused and cannot go on where it was
         self.kept: dict[str, requests.RunMission] = {}  # requests by people that began missions that still run
         self.repeated: tuple[Command, ...] = ()  # those, and the breakpoints
         self.left: list[LeftMission] = []  # those that were paused when another executive took over
@@ -215,7 +215,7 @@ class Mission(Component[MissionConfig]):
         if name in self.missions.names:  # taken over
             return
         try:
-            begins = self.context.begins or self.begins_held
+            begins = self.context.starts_mission or self.restarts_held
             run = self.recovered(name) if begins or self.context.is_again else None
             if run is None and begins:
                 run = self.begin(name)
@@ -392,7 +392,7 @@ class Mission(Component[MissionConfig]):
             try:
                 run = self.missions.taken_over(left, self.now)
             except Refused as refusal:
-                self.begins_held |= left.name == self.config.start
+                self.restarts_held |= left.name == self.config.start
                 self.warn(f"{refusal}; it starts again")
             else:
                 self.announce(f"mission {run.name} is where it was, and still paused")

@@ -154,7 +154,7 @@ class Triggering:
         if not self._took_over:
             if self._executive.context.is_again:
                 self._recall()
-            elif self._executive.context.begins:
+            elif self._executive.context.starts_mission:
                 self.core.at_start(self._executive.now, self)
         self._executive.look_soon()
 

@@ -236,8 +236,8 @@ class ProcessGroup:
                 self._configure(router, time)
             case messages.Activate(names):
                 self._activate(names)
-            case messages.Start(begins):
-                self._start(begins)
+            case messages.Start(starts_mission):
+                self._start(starts_mission)
             case messages.Stop():
                 self._made_host().stop()
             case messages.Release():
@@ -354,11 +354,11 @@ class ProcessGroup:
         self._made_host().activate(names)
         self._channel.send(messages.States(self._made_host().states()))
 
-    def _start(self, begins: bool) -> None:
+    def _start(self, starts_mission: bool) -> None:
         gc.collect()
         gc.freeze()  # what lives now lives until the end: later collections need not inspect it
         give_back_free_memory()
-        self._made_host().start(begins)
+        self._made_host().start(starts_mission)
         if isinstance(self._driver, SteppedDriver):
             self._driver.go(self._options.duration)
         if isinstance(self._driver, RealTimeDriver):

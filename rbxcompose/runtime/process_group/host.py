@@ -128,7 +128,7 @@ class Host:
         self.is_stopped = is_stopped
         self.is_restart = is_restart
         self.has_started = False
-        self.begins = True  # the mission that `up` starts: not when it is over, and not because files have changed
+        self.starts_mission = True  # that of `start`: not when it is over, and not because files have changed
         self.is_braking = False
         self.is_held = False  # robot time stands still
         self._log, self._post = log, post
@@ -173,10 +173,10 @@ class Host:
             if self.hosted[name].state is Lifecycle.INACTIVE:
                 self._guarded(name, self.hosted[name].activate)
 
-    def start(self, begins: bool = True) -> None:
-        """Start everything that waits for the whole robot to be active; `begins`: also the mission that `up` starts."""
+    def start(self, starts_mission: bool = True) -> None:
+        """Start everything that waits for the whole robot to be active, with or without the mission of `start`."""
         self._on_order("start")
-        self.has_started, self.begins = True, begins
+        self.has_started, self.starts_mission = True, starts_mission
         self._deliveries.start()
         self._each_active("start")
         for hosted in self.hosted.values():
@@ -295,7 +295,7 @@ class Host:
     def prepare(self, instances: Sequence[Instance]) -> None:
         """Configure components beside those that run, or in their place."""
         self.retire([one.name for one in instances])
-        self.begins &= not any(declared(one.type, one.config, RunsMissions) for one in instances)
+        self.starts_mission &= not any(declared(one.type, one.config, RunsMissions) for one in instances)
         self.frames = self.frames or self._frames(instances)
         for instance in instances:
             self.hosted[instance.name] = Hosted(self, instance)

@@ -248,7 +248,7 @@ class InstanceHome(Protocol):
     is_held: bool
     is_braking: bool
     is_restart: bool
-    begins: bool
+    starts_mission: bool
     has_started: bool
     doing: str
 
@@ -421,7 +421,7 @@ class Hosted:
     def _release(self, component: Component[Any], in_turn: Callable[[Callable[[], None]], None]) -> None:
         try:
             component.at_end.close()
-        except Exception as error:  # whatever it raises, all the rest has been released
+        except (Exception, SystemExit) as error:  # whatever it raises, all the rest has been released
             words, detail = explain(error, self.file)
             in_turn(partial(self.host.log, self.instance.name, Level.WARN, f"not all is released: {words}", detail))
 
@@ -508,9 +508,9 @@ class Hosted:
         return self.host.is_stopped
 
     @property
-    def begins(self) -> bool:
-        """Return whether the mission that `up` starts begins."""
-        return self.host.begins
+    def starts_mission(self) -> bool:
+        """Return whether the mission of `start` is to start."""
+        return self.host.starts_mission
 
     @property
     def is_over(self) -> bool:
@@ -551,7 +551,7 @@ class Hosted:
         """Report something that concerns the whole robot to the supervisor; what must stop stops here at once."""
         if isinstance(event, RobotHeld) and event.reason:
             self.host.scheduler.at(self.clock.now(), self.instance.name, self.host.stop)
-        self.host.begins &= not isinstance(event, MissionOver)
+        self.host.starts_mission &= not isinstance(event, MissionOver)
         self.host.notify(event)
 
     def repeat(self, requests: Sequence[Command]) -> None:

@@ -105,7 +105,7 @@ class Worker:
         return f"has been in {label} for {seconds:.0f} s" if seconds > LONG else ""
 
     def close(self, patience: float, last: Call | None = None) -> bool:
-        """Drop the waiting calls and end the thread, after the call `last`; return whether that took `patience` [s]."""
+        """Drop the waiting calls, run `last` and end the thread; return whether it has ended within `patience` [s]."""
         self.is_closed = True
         self._waiting.clear()
         self._last = last
@@ -289,9 +289,9 @@ class HandedOver:
         return self._context.is_stopped
 
     @property
-    def begins(self) -> bool:
-        """Return whether the mission that `up` starts begins."""
-        return self._context.begins
+    def starts_mission(self) -> bool:
+        """Return whether the mission of `start` is to start."""
+        return self._context.starts_mission
 
     @property
     def is_again(self) -> bool:

@@ -60,7 +60,7 @@ class Conductor:
         self.members = {name: Member(name) for name in (*([router] if router else []), *plan.groups)}
         self.latch = StopLatch(effects, self._holding, lambda: scheduler.now if self.is_real_time else self.time)
         self._is_running = False  # everything has been active
-        self._begins = True  # the start mission, when its process starts: not once it is over, nor by another plan
+        self._starts_mission = True  # that of `start`, with its process: not once it is over, nor by another plan
         self._silence = Silence(effects, self._report_lost, scheduler.now)
         self.hosts = OtherHosts(plan.share, effects, self._to_configured)
         self._closing: Closing | None = None  # set once the robot goes down
@@ -133,7 +133,7 @@ class Conductor:
     def _start(self, member: Member) -> None:
         if not member.is_started and not member.is_given_up:
             member.is_started = member.was_started = True
-            self._effects.send(member.name, messages.Start(self._begins))
+            self._effects.send(member.name, messages.Start(self._starts_mission))
             for text, request in self.kept.repeated(self.plan.of_group(member.name) if member.restarts else ()):
                 self._effects.send(member.name, messages.Ask(0, text, request))  # nobody waits for the answer
 
@@ -155,7 +155,7 @@ class Conductor:
                 self.kept.receive(message)
                 self._effects.states_changed()
             case MissionOver():
-                self._begins = False
+                self._starts_mission = False
                 self._mission_over(message)
             case messages.TimeIsUp():
                 self.go_down(FINE, "the time is up")
@@ -377,7 +377,7 @@ class Conductor:
     def _switch(self, changes: Changes) -> None:
         """Apply the new plan, now that everything that stops has stopped."""
         executives = {one.name for one in changes.after.instances if declared(one.type, one.config, RunsMissions)}
-        self._begins &= changes.after.start == self.plan.start and executives.isdisjoint(changes.starting)
+        self._starts_mission &= changes.after.start == self.plan.start and executives.isdisjoint(changes.starting)
         self.plan, self.generation = changes.after, self.generation + 1
         fresh = {
             instance.name: ("unconfigured", 0) for instance in self.plan.instances if instance.name in changes.starting

@@ -190,11 +190,19 @@ class RequestHandler:
             return replace(old, config=with_values(old.config, new))
 
         plan = conductor.plan
-        found = changes(plan, replace(plan, instances=tuple(map(with_saved, plan.instances))))
-        if why_not := conductor.why_not(found):
+        try:
+            found = changes(plan, replace(plan, instances=tuple(map(with_saved, plan.instances))))
+        except (LookupError, AttributeError) as error:
+            raise Refused("the robot has no such settings") from error
+        if why_not := conductor.why_not(found) or ("they are not live" if found.starting else ""):
             raise Refused(why_not)
-        answer = self._supervisor.answer
-        conductor.change(found, lambda text, is_refused: answer(number, text))
+        self._hold_settings()
+
+        def adopted(text: str, is_refused: bool) -> None:
+            self._settings.go_on()
+            self._supervisor.answer(number, text)
+
+        conductor.change(found, adopted)
 
     def _revert(self, request: RevertPlan, number: int) -> None:
         if not self._before or request.generation not in (None, self._before[-1][2]):
@@ -223,9 +231,7 @@ class RequestHandler:
             raise Refused("it was changed by someone else meanwhile: look at the difference again")
         if why_not := refused or conductor.why_not(found):
             raise Refused(why_not)
-        if self._settings.is_busy:
-            raise Refused("settings of the robot are just being changed: try again")
-        self._settings.hold()
+        self._hold_settings()
         before = conductor.plan, conductor.layers, conductor.generation
 
         def applied(text: str, is_refused: bool) -> None:
@@ -240,6 +246,12 @@ class RequestHandler:
             (self._supervisor.refuse if is_refused else self._supervisor.answer)(number, text)
 
         conductor.change(found, applied)
+
+    def _hold_settings(self) -> None:
+        """Let nobody change settings until they go on."""
+        if self._settings.is_busy:
+            raise Refused("settings of the robot are just being changed: try again")
+        self._settings.hold()
 
     def _changes(self, after: Plan) -> Changes:
         conductor = self._supervisor.conductor

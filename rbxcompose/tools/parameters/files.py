@@ -405,7 +405,8 @@ def param_save(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
         names: dict[str, list[str]] = {}
         for change in changes:
             names.setdefault(change.component, []).append(change.name)
-        answer_of(folder, AdoptSaved(dump(live.plan_with(live.now), reveals_secrets=True), names), timeout=_COMPARE)
+        with suppress(NotDoneError):  # while it is changed, or goes down; `apply` then shows again what is saved
+            answer_of(folder, AdoptSaved(dump(live.plan_with(live.now), reveals_secrets=True), names), timeout=_COMPARE)
     return exit_code
 
 
