@@ -21,6 +21,7 @@ from rbxcompose.missions.engine.value_text import show, show_briefly
         ("place", Place("living_room", 0.0, 0.0, 0.0), "living room", "living room"),
         ("flag", True, "true", "true"),
         ("ratio", -1e308, "-inf %", "-inf %"),
+        ("place", None, "None", "None"),  # nothing that a mission knows
     ],
 )
 def test_values_have_the_unit_of_their_type(type_name: str, value: Value, whole: str, brief: str) -> None:

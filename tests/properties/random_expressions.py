@@ -19,10 +19,11 @@ from pathlib import Path
 from rbxcompose.base.expressions.check import check
 from rbxcompose.base.expressions.evaluate import evaluate, holds
 from rbxcompose.base.expressions.parser import parse
-from rbxcompose.base.expressions.text import fill, parse_template, show_value
+from rbxcompose.base.expressions.text import fill, parse_template
 from rbxcompose.base.expressions.tree import ExpressionError
 from rbxcompose.base.expressions.types import FLAG, TYPES, UNKNOWN, Type, list_of, map_of
 from rbxcompose.base.expressions.values import NOT_ARRIVED, EvaluationError, NotArrived, NotArrivedError, Value
+from rbxcompose.missions.engine.value_text import show
 
 MEMORY = 200_000_000  # bytes of address space beyond what the process has at its start
 DEADLINE = 20  # [s] of processor time for a batch of 500, more for more
@@ -222,7 +223,7 @@ def attempt(text: str) -> bool:
     except (EvaluationError, NotArrivedError):
         return False
     require_value(value)
-    show_value("x", value)
+    show(None, value)
     return True
 
 
@@ -234,7 +235,7 @@ def require_inside(error: ExpressionError, text: str) -> None:
 def parse_templates(text: str) -> Iterable[str]:
     """Fill a text in which names stand."""
     try:
-        yield fill(parse_template(text), World())
+        yield fill(parse_template(text), World(), lambda name, value: show(None, value))
     except (ExpressionError, EvaluationError, NotArrivedError):
         return
 

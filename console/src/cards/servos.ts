@@ -75,7 +75,7 @@ function faultForm(component: Component, robot: Robot): HTMLElement {
   const formOf = (faults: Message) => {
     const what = Object.entries(faults).map(([name, about]) => h("option", { value: name }, `${formatName(name)}: ${String(about)}`));
     const of = jointsOf(component).map(({ name }) => h("option", { value: name }, formatName(name)));
-    const [joint, fault, lasts] = [h("select", { id: `of-${component.name}` }, ...of), h("select", { id: `fault-${component.name}` }, ...what), h("input", { id: `lasts-${component.name}`, type: "number", min: "1", value: "10" })];
+    const [joint, fault, lasts] = [h("select", { id: `of-${component.name}` }, ...of), h("select", { id: `fault-${component.name}` }, ...what), h("input", { id: `lasts-${component.name}`, type: "number", min: "1", value: "10", required: "" })];
     const field = (title: string, input: HTMLElement) => h("div", { class: "field" }, h("label", { for: input.id }, title), input);
     const form = h("form", {}, field("Joint", joint), field("Fault", fault), field("For how long, s", lasts), h("button", {}, icon("warning"), "Simulate it"));
     form.onsubmit = (event) => {

@@ -1,15 +1,14 @@
 """Text arguments: `$name` and `$name.field` are filled in, `$$` is a dollar, everything else is text."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TypeAlias
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.evaluate import evaluate
 from rbxcompose.base.expressions.parser import NAME, parse
 from rbxcompose.base.expressions.tree import Expression, ExpressionError, Reference
-from rbxcompose.base.expressions.values import LONGEST_TEXT, EvaluationError, Scope, Value, is_located, is_named_pose
-from rbxcompose.base.units import format_number
+from rbxcompose.base.expressions.values import LONGEST_TEXT, EvaluationError, Scope, Value
 
 Show: TypeAlias = Callable[[str, Value], str]
 """Formats the value of a name (`battery`, `result.count`) for people."""
@@ -76,8 +75,8 @@ def _slot(path: str, start: int, end: int) -> TextSlot:
         raise ExpressionError(error.message, start, end) from None
 
 
-def fill(template: Template, scope: Scope, show: Show | None = None) -> str:
-    """Return the text with each value written by `show`, else by `show_value`.
+def fill(template: Template, scope: Scope, show: Show) -> str:
+    """Return the text with each value written by `show`.
 
     Raises:
         NotArrivedError: if a value has not arrived yet.
@@ -86,7 +85,7 @@ def fill(template: Template, scope: Scope, show: Show | None = None) -> str:
     filled: list[str] = []
     left = LONGEST_TEXT
     for part in template.parts:
-        filled.append(part if isinstance(part, str) else _filled(part, scope, show or show_value))
+        filled.append(part if isinstance(part, str) else _filled(part, scope, show))
         left -= len(filled[-1])
         if left < 0:  # checked each time, since many long values would take time and memory
             raise EvaluationError(f"the text has more than {LONGEST_TEXT:,} characters", 0, len(template.text))
@@ -99,22 +98,3 @@ def _filled(slot: TextSlot, scope: Scope, show: Show) -> str:
     except EvaluationError as error:
         raise EvaluationError(error.message, slot.start, slot.end) from None
     return show(slot.path, value)
-
-
-def show_value(name: str, value: Value) -> str:
-    """Return a value as text for people: short numbers, and places by their names without underscores."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return value
-    if isinstance(value, int | float):
-        return format_number(value)
-    if isinstance(value, Mapping):
-        return ", ".join(f"{key}: {show_value(name, each)}" for key, each in value.items())
-    if isinstance(value, list | tuple):
-        return ", ".join(show_value(name, each) for each in value)
-    if is_named_pose(value):
-        return value.name.replace("_", " ")
-    if is_located(value):
-        return f"({format_number(value.x)} m, {format_number(value.y)} m)"
-    return str(value)

@@ -110,7 +110,7 @@ class NotArrivedError(Exception):
         self.name = name
 
 
-def is_number(value: Value) -> bool:
+def is_number(value: Value) -> TypeGuard[float]:
     """Return whether a value is a number; a flag is not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 

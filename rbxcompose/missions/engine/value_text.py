@@ -3,9 +3,8 @@
 import math
 from collections.abc import Collection, Mapping
 
-from rbxcompose.base.expressions.text import show_value
 from rbxcompose.base.expressions.types import UNKNOWN, Type
-from rbxcompose.base.expressions.values import Value, is_number
+from rbxcompose.base.expressions.values import Value, is_located, is_named_pose, is_number
 from rbxcompose.base.units import format_number, format_quantity
 
 DIGITS = 3  # that people want to read of something measured
@@ -27,12 +26,18 @@ def show(type: Type | None, value: Value, *, briefly: bool = False, places: Coll
     if isinstance(value, list | tuple):
         parts = known.parts if len(known.parts) == len(value) else {}  # else it is no more what it was
         return ", ".join(within(parts.get(str(index), known.entry), item) for index, item in enumerate(value))
-    if isinstance(value, str) and value in places:
-        return value.replace("_", " ")
-    if not isinstance(value, int | float) or not is_number(value):
-        return show_value("", value)
-    text = format_quantity(value, known.dimension) if known.dimension else format_number(value)
-    return _brief(text) if briefly else text
+    if isinstance(value, str):
+        return value.replace("_", " ") if value in places else value
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if is_number(value):
+        text = format_quantity(value, known.dimension) if known.dimension else format_number(value)
+        return _brief(text) if briefly else text
+    if is_named_pose(value):
+        return value.name.replace("_", " ")
+    if is_located(value):
+        return f"({format_number(value.x)} m, {format_number(value.y)} m)"
+    return str(value)
 
 
 def show_briefly(type: Type | None, value: Value) -> str:
