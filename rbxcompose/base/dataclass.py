@@ -7,6 +7,7 @@ library.
 """
 
 import dataclasses
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from operator import attrgetter
@@ -21,6 +22,20 @@ else:
     def dataclass(cls=None, /, **options):
         """Make a class a dataclass: `@dataclass(frozen=True, slots=True)`. It takes all options, but no `InitVar`."""
         return _made(cls, **options) if cls is not None else lambda one: _made(one, **options)
+
+
+if sys.version_info >= (3, 14):
+    from annotationlib import Format, get_annotations
+
+    def _annotations(cls: Any) -> Any:
+        """Return the annotations of a class itself; names that only type checkers know stay references."""
+        return get_annotations(cls, format=Format.FORWARDREF)
+
+else:
+
+    def _annotations(cls: Any) -> Any:
+        """Return the annotations of a class itself."""
+        return vars(cls).get("__annotations__", {})
 
 
 @dataclasses.dataclass
@@ -66,7 +81,7 @@ def _fields(cls: type, kw_only: bool) -> dict[str, dataclasses.Field[Any]]:
     found: dict[str, Any] = {}
     for base in cls.__mro__[-1:0:-1]:
         found |= getattr(base, "__dataclass_fields__", {})
-    for name, annotation in vars(cls).get("__annotations__", {}).items():
+    for name, annotation in _annotations(cls).items():
         if annotation in ("KW_ONLY", dataclasses.KW_ONLY):
             kw_only = True
         elif not _is_class_variable(annotation):

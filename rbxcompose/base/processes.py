@@ -87,7 +87,7 @@ def _limit(start: float) -> None:
 class _PathBeneath(ctypes.Structure):
     """What Landlock allows below an open folder."""
 
-    _pack_ = 1
+    _pack_, _layout_ = 1, "ms"  # as the C compiler lays it out: nothing between the fields
     _fields_ = (("allowed", ctypes.c_uint64), ("folder", ctypes.c_int32))
 
 
