@@ -105,6 +105,7 @@ $(VENV)/.up: requirements.lock pyproject.toml | $(VENV)/bin/python
 	@touch $@
 
 $(VENV)/.test: requirements-test.lock pyproject.toml | $(VENV)/bin/python
+	@$(BIN)/python -c 'import sys; sys.exit("tests need Python 3.11 to 3.13, which OMPL has packages for: make clean; make test PYTHON=python3.13") if sys.version_info >= (3, 14) else None'
 	$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements-test.lock
 	$(BIN)/python -m pip install -q --disable-pip-version-check --no-deps -e .
 	@touch $@
