@@ -41,6 +41,14 @@ const SQUARE = 0.5; // [m] of the lines on the ground
 const VIEWS = { Front: [1, 0, 0.25], Side: [0, 1, 0.25], Top: [0.001, 0, 1], Corner: [1, 1, 0.7], All: [-0.3, -0.8, 1] } as const;
 export type View = keyof typeof VIEWS;
 
+function newRenderer(): three.WebGLRenderer {
+  try {
+    return new three.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
+  } catch {
+    throw new Error("This browser draws nothing in 3D, since WebGL is off or blocked: switch it on, or take another browser.");
+  }
+}
+
 export class RobotScene {
   readonly element = document.createElement("div");
   /** Called when the handle was let go, with where it is in the frame that it was shown in. */
@@ -49,7 +57,7 @@ export class RobotScene {
   readonly missing: string[] = [];
   readonly #scene = new three.Scene();
   readonly #camera = new three.PerspectiveCamera(45, 1, 0.01, FAR);
-  readonly #renderer = new three.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
+  readonly #renderer = newRenderer();
   readonly #orbit: OrbitControls;
   readonly #handle = new three.Object3D();
   readonly #gizmo: TransformControls;
