@@ -136,3 +136,18 @@ def test_a_neutral_tick_beyond_those_of_the_servo_is_told_its_range(tmp_path: Pa
     assert codes["RBX2225"] == (
         "the ticks of servo 1, AX-12, go from 0 to 1023: the middle, 'neutral: 512', is the default"
     )
+
+
+@pytest.mark.parametrize(
+    ("heading", "label", "remedy"),
+    [
+        ("450 deg", "this is 450 deg", "write the angle within one turn: '90 deg'"),
+        ("-400.5 deg", "this is -400.5 deg", "write the angle within one turn: '-40.5 deg'"),
+        ("90 rad", "this is 5156.62 deg", "write it in 'deg'"),
+    ],
+)
+def test_a_heading_beyond_a_turn_is_told_as_it_is_written_and_what_to_write(
+    heading: str, label: str, remedy: str, tmp_path: Path
+) -> None:
+    finding = only(HEAD + f"places:\n  window: {{x: 2 m, y: 1 m, heading: {heading}}}\n", tmp_path)
+    assert (finding.code, finding.label, finding.help) == ("RBX3507", label, remedy)

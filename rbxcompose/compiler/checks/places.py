@@ -52,11 +52,14 @@ def full_turn(robot: Robot) -> Iterator[Finding]:
     """The heading of a place is beyond a full turn."""
     for name, place in robot.manifest.places.items():
         if abs(place.heading) > math.tau + 1e-9:
+            written = at(robot.manifest.root, ("places", name, "heading"))
+            is_in_degrees = isinstance(written, ScalarNode) and written.text.endswith("deg")
+            within = format_quantity(math.remainder(place.heading, math.tau), ANGLE)
             yield full_turn.at(
                 robot.value("places", name, "heading"),
                 f"the heading of '{name}' is more than a full turn",
-                label=f"this is {format_quantity(round(place.heading, 3), ANGLE)}",
-                help="write it in 'deg'",
+                label=f"this is {format_quantity(place.heading, ANGLE)}",
+                help=f"write the angle within one turn: '{within}'" if is_in_degrees else "write it in 'deg'",
             )
 
 
