@@ -40,17 +40,34 @@ export function stopButtons(link: Rosbridge, stopped: Signal<boolean>, notify: (
   link.state.watch((state) => {
     if (state.is === "open" && owed) void sendStop();
   });
-  window.addEventListener("keydown", (event) => {
-    if (event.code !== "Space" || event.repeat || event.composedPath().some(takesSpace)) return;
-    event.preventDefault();
-    void sendStop();
-  });
+  let isReached = false; // by keys, whatever has the focus
+  const isStop = (event: KeyboardEvent) => {
+    const focused = event.composedPath()[0] as HTMLElement;
+    return event.code === "Space" && (focused === stop || !takesSpace(focused, isReached && !event.shiftKey));
+  };
+  const onKey = (event: KeyboardEvent) => {
+    if (event.key === "Tab") isReached = true;
+    if (!isStop(event)) return;
+    event.preventDefault(); // also of repeats and of the end, with which browsers press a button
+    if (event.type === "keydown" && !event.repeat) void sendStop();
+  };
+  window.addEventListener("keydown", onKey, true);
+  window.addEventListener("keyup", onKey, true);
+  window.addEventListener("pointerdown", () => (isReached = false), true);
   return h("section", { class: "stops", "aria-label": "Emergency" }, release, stop);
 }
 
-/** Returns whether Space means something else there: a control, or a text that is edited, also below a root of its own. */
-function takesSpace(target: EventTarget): boolean {
-  return target instanceof HTMLElement && (target.isContentEditable || target.matches("a, button, input, select, textarea"));
+const PRESSED = new Set(["button", "checkbox", "color", "file", "image", "radio", "reset", "select", "submit", "summary"]);
+
+/**
+ * Returns whether Space means something else there: in a text, and on a control that it presses, if keys brought the
+ * focus there. A control that was clicked keeps the focus: whoever then hits Space in need does not mean it. Shift drives.
+ */
+export function takesSpace(focused: Partial<HTMLInputElement>, isReached: boolean): boolean {
+  const { localName = "", type = "", isContentEditable = false } = focused;
+  const kind = localName === "input" ? type : localName;
+  if (PRESSED.has(kind)) return isReached;
+  return isContentEditable || localName === "textarea" || (localName === "input" && kind !== "range");
 }
 
 /** Calls a service that may answer that it did not succeed: unlike a request, STOP needs no supervisor. */

@@ -157,6 +157,7 @@ def test_stop_needs_no_lease_and_nothing_moves_until_release(
 
     gateway.answers["/console/release"] = release
     page = open_page(name="")
+    page.get_by_role("link", name="Drive").click()
     page.keyboard.press("Space")
     wait_for(lambda: gateway.calls("/console/stop") == [{}], page)
     page.get_by_role("button", name="Release").click()
@@ -170,6 +171,10 @@ def test_stop_needs_no_lease_and_nothing_moves_until_release(
     page.get_by_role("button", name="STOP").click()
     expect_stop(page, gateway, since)
     wait_for(lambda: len(gateway.calls("/console/stop")) == 2, page)
+    page.get_by_role("button", name="Rename").evaluate("button => button.focus()")  # as a click does, not as Tab
+    page.keyboard.press("Space")
+    wait_for(lambda: len(gateway.calls("/console/stop")) == 3, page)
+    expect(page.get_by_role("button", name="Rename")).to_be_visible()
     expect(page.get_by_text("Nothing moves until you press Release")).to_be_visible()
     page.keyboard.up("Shift")
     page.keyboard.up("ArrowUp")
