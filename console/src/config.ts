@@ -45,6 +45,13 @@ export interface Config {
   role: string;
 }
 
+const ROLES = ["view", "operate", "configure"];
+
+/** Returns why a visitor may not do what needs a role; empty if the own role suffices. */
+export function whyNot({ role }: Config, needed: "operate" | "configure", what = "This"): string {
+  return ROLES.indexOf(role) < ROLES.indexOf(needed) ? `${what} needs the link of the role ${needed}.` : "";
+}
+
 export class ConfigError extends Error {
   override name = "ConfigError";
 }

@@ -64,6 +64,11 @@ export function setText(element: Element, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
 
+/** Disables controls for a reason, which they tell; enables them if it is empty. */
+export function disable(why: string, ...controls: (HTMLButtonElement | HTMLInputElement | HTMLSelectElement)[]): void {
+  for (const control of controls) [control.disabled, control.title] = [why !== "", why];
+}
+
 /** Returns what a page shows in place of its content: that it is loading, empty, or what went wrong. */
 export function emptyCard(picture: Icon, text: string, ...more: Child[]): HTMLElement {
   return h("section", { class: "card empty", role: "status" }, icon(picture), h("p", {}, text), ...more);

@@ -58,7 +58,7 @@ export function showFrame(config: Config, link: Rosbridge): void {
   const title = h("h1", {}, config.robot);
   const tabs = h("nav", { "aria-label": "Pages" });
   const bar = h("header", {}, h("div", { class: "who" }, title, h("p", {}, config.about)), connection(link, config.role));
-  const stops = stopButtons(link, robot.stopped, robot.notify);
+  const stops = stopButtons(robot);
   const host = h("main", { id: "page" });
   const banner = stoppedBanner();
   document.body.replaceChildren(bar, stops, tabs, lostBanner(link), banner.element, host, notice);

@@ -1,6 +1,6 @@
 /** Brings what was saved to the robot that runs, as `rbxcompose apply` does, and takes it back. */
-import { fetchConfig } from "./config";
-import { askInDialog, h, icon } from "./dom";
+import { fetchConfig, whyNot } from "./config";
+import { askInDialog, disable, h, icon } from "./dom";
 import type { Robot } from "./page";
 import { askRobotEditor } from "./robot_edits";
 import { LostError } from "./rosbridge";
@@ -61,8 +61,7 @@ export class LiveChanges {
 
   #button(picture: "undo" | "play", text: string, act: () => Promise<void>): HTMLButtonElement {
     const made = h("button", { type: "button" }, icon(picture), text);
-    made.disabled = this.#robot.config.role !== "configure";
-    made.title = made.disabled ? "Needs the link of the role configure" : "";
+    disable(whyNot(this.#robot.config, "configure"), made);
     made.onclick = () => {
       made.disabled = true;
       void act();

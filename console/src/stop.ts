@@ -1,13 +1,15 @@
 /** STOP and RELEASE: the two buttons that stand on every page and need no lease. */
-import { h, icon } from "./dom";
+import { whyNot } from "./config";
+import { disable, h, icon } from "./dom";
+import type { Robot } from "./page";
 import { CallError, isMessage, type Rosbridge } from "./rosbridge";
-import type { Signal } from "./signal";
 
 /** Returns the buttons. A STOP without a connection is sent as soon as there is one again. */
-export function stopButtons(link: Rosbridge, stopped: Signal<boolean>, notify: (text: string) => void): HTMLElement {
+export function stopButtons({ config, link, stopped, notify }: Robot): HTMLElement {
   let owed = false;
   const stop = h("button", { type: "button", class: "stop", "aria-keyshortcuts": "Space" }, icon("stop"), "STOP");
   const release = h("button", { type: "button", class: "release" }, icon("play"), "Release");
+  disable(whyNot(config, "operate"), release);
 
   const sendStop = async () => {
     const answer = ask(link, "/console/stop"); // before all that follows from it

@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect
 
 from rbxcompose.base.requests import Refused
 from tests.console.browser import CHROMIUM
-from tests.console.fake_gateway import FakeGateway
+from tests.console.fake_gateway import CONFIG, FakeGateway
 from tests.console.looks import PHONE, expect_fit, violations
 from tests.console.test_page_robot import DESCRIBED, component
 from tests.soak import rare
@@ -132,6 +132,26 @@ def test_an_input_is_selected_where_inputs_are(open_page: Callable[..., Page], g
     page.get_by_role("button", name="Select b").click()
     expect(page.get_by_text("b must rest first")).to_be_visible()
     assert gateway.asked("mux.SelectMuxInput") == [{"component": "cmd_vel", "type": "mux.SelectMuxInput", "input": "b"}]
+
+
+def test_who_may_only_look_is_offered_nothing_that_the_robot_refuses(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    has_mux(gateway)
+    gateway.config = {**CONFIG, "role": "view"}
+    gateway.windows["robot/RobotStatus"] = {"stop": {"by": "the console", "time": 1.0}}
+    page = open_page(page_name="mux")
+    for name in ("Lock navigation", "Lock all", "Unlock all", "Release"):
+        button = page.get_by_role("button", name=name, exact=True)
+        expect(button).to_be_disabled()
+        expect(button).to_have_attribute("title", "This needs the link of the role operate.")
+    page.get_by_role("link", name="Drive").click()
+    expect(page.locator(".hint").first).to_have_text("Driving needs the link of the role operate.")
+    expect(page.get_by_label("Top speed")).to_be_disabled()
+    expect(page.get_by_label("Driver", exact=True)).to_contain_text("Nobody is driving")
+    page.keyboard.press("Shift+ArrowUp")
+    assert {frame["op"] for _, frame in gateway.frames} == {"subscribe", "unsubscribe"}
+    assert violations(page) == []
 
 
 class Log:

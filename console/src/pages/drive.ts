@@ -1,6 +1,6 @@
 /** Drive: the pad, keys with a dead-man switch, speeds, batteries, and who drives. */
-import { pluck, type DriveConfig } from "../config";
-import { h, icon, setText } from "../dom";
+import { pluck, whyNot, type DriveConfig } from "../config";
+import { disable, h, icon, setText } from "../dom";
 import { drive, parked, PERIOD, STILL, wanted, type Direction, type DriveEvent, type Motion } from "../driving";
 import { BatteryGauge } from "../elements/battery_gauge";
 import { CameraView } from "../elements/camera_view";
@@ -59,6 +59,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
   let name = storedName();
   let holder = "";
   let lastPublish = 0;
+  const barred = whyNot(robot.config, "operate", "Driving"); // empty if this visitor may drive
   let blocked = ""; // why the last attempt to drive came to nothing
 
   const pad = new DrivePad();
@@ -73,6 +74,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
   }
   const lease = h("section", { class: "card lease", "aria-label": "Driver" });
   const speeds = speedCard(limits, state.speeds, (next) => dispatch({ is: "speeds", speeds: next }));
+  disable(barred, ...speeds.querySelectorAll("input"));
   const velocity = velocityCard(limits);
   const camera = robot.config.camera ? new CameraView(robot.config.camera) : null;
   const overlay = robot.config.camera ? new SeenOverlay(link, robot.config.camera) : null;
@@ -137,6 +139,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
   };
 
   const hintOf = (): string => {
+    if (barred) return barred;
     if (!state.connected) return "Not connected.";
     if (state.stopped) return "Stopped. Press Release to drive again.";
     if (state.keys.size > 0 && !state.shift) return "Hold Shift as well to drive.";
@@ -145,18 +148,20 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
 
   let painted = "";
   const paintLease = () => {
-    const kind = !name ? "name" : state.lease === "held" ? "mine" : holder && holder !== name ? "other" : "free";
+    const kind = barred ? (holder ? "other" : "barred") : !name ? "name" : state.lease === "held" ? "mine" : holder && holder !== name ? "other" : "free";
     const shown = `${kind} ${name} ${holder} ${state.connected}`;
     lease.classList.toggle("wanting", kind === "name" && blocked !== "");
     if (shown === painted) return;
     painted = shown;
     const held = lease.contains(document.activeElement);
     lease.dataset.kind = kind;
-    const other = [icon("warning"), words(`${holder} is driving`, `You can drive when ${holder} lets go`)];
+    const other = [icon("warning"), words(`${holder} is driving`, barred || `You can drive when ${holder} lets go`)];
     if (kind === "name") {
       lease.replaceChildren(...(holder ? other : []), nameForm);
     } else if (kind === "other") {
       lease.replaceChildren(...other);
+    } else if (kind === "barred") {
+      lease.replaceChildren(icon("person"), words("Nobody is driving", barred));
     } else if (kind === "mine") {
       lease.replaceChildren(
         icon("wheel"),
@@ -231,14 +236,14 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
   cleanups.push(
     link.state.watch(({ is }) => {
       if (is !== "open") holder = "";
-      dispatch({ is: is === "open" ? "connected" : "disconnected" });
+      dispatch({ is: is === "open" && !barred ? "connected" : "disconnected" });
     }),
     robot.stopped.watch((stopped) => dispatch({ is: stopped ? "stopped" : "released" })),
     link.watch("drive", showHolder),
     link.subscribe("odom", velocity.measured, { type: "nav_msgs/Odometry", throttle: PERIOD }),
     batteries.close,
   );
-  link.advertise(config.topic, config.type);
+  if (!barred) link.advertise(config.topic, config.type);
   link.onStatus = ({ id, level, msg }) => {
     if (level !== "error") return;
     if (!id.startsWith("drive:")) robot.notify(sentence(msg));

@@ -1,6 +1,7 @@
 /** Mux: who may command, who does and why; select, lock and unlock. */
+import { whyNot } from "../config";
 import { watchComponents } from "../description";
-import { emptyCard, h, icon, setText, type Icon } from "../dom";
+import { disable, emptyCard, h, icon, setText, type Icon } from "../dom";
 import { formatName } from "../format";
 import { MuxesEditor } from "../muxes_editor";
 import type { Page, Robot } from "../page";
@@ -100,11 +101,12 @@ class MuxView {
   readonly #locks = h("p", { class: "label" });
   readonly #buttons = h("div", { class: "row" });
   readonly #close: () => void;
+  readonly #whyNot: string; // it may not be commanded by who looks at it
   #shape = "";
   #rows = new Map<string, Row>();
 
   constructor(robot: Robot, name: string) {
-    [this.#robot, this.#name] = [robot, name];
+    [this.#robot, this.#name, this.#whyNot] = [robot, name, whyNot(robot.config, "operate")];
     const head = ["Input", "Priority", "State", "Last heard", "Control"].map((title) => h("th", { scope: "col" }, title));
     const table = h("table", {}, h("thead", {}, h("tr", {}, ...head)), this.#body);
     const wide = h("div", { class: "wide", tabindex: "0", role: "region", "aria-label": `Inputs of ${name}` }, table);
@@ -125,7 +127,7 @@ class MuxView {
     const shape = `${mux.mode} ${mux.inputs.map(({ name }) => name).join()}`;
     if (shape !== this.#shape) {
       this.#shape = shape;
-      this.#rows = new Map(mux.inputs.map(({ name, topic }) => [name, new Row(name, topic, mux.mode === "select", (request) => this.#ask(request))]));
+      this.#rows = new Map(mux.inputs.map(({ name, topic }) => [name, new Row(name, topic, mux.mode === "select", this.#whyNot, (request) => this.#ask(request))]));
       this.#body.replaceChildren(...[...this.#rows.values()].map(({ element }) => element));
       this.#buttons.replaceChildren(...this.#commands(mux));
     }
@@ -142,6 +144,7 @@ class MuxView {
     const button = (text: string, request: Asked) => {
       const made = h("button", { type: "button" }, text);
       made.onclick = () => void this.#ask(request);
+      disable(this.#whyNot, made);
       return made;
     };
     const all = [button("Lock all", { type: "mux.LockMuxInputs" }), button("Unlock all", { type: "mux.UnlockMuxInputs" })];
@@ -165,9 +168,12 @@ class Row {
   readonly #heard = h("td", { class: "value" });
   readonly #lock = h("button", { type: "button" });
   readonly #select = h("button", { type: "button" }, "Select");
+  readonly #whyNot: string;
   #isLocked = false;
 
-  constructor(name: string, topic: string, isSelected: boolean, ask: (request: Asked) => Promise<void>) {
+  constructor(name: string, topic: string, isSelected: boolean, whyNot: string, ask: (request: Asked) => Promise<void>) {
+    this.#whyNot = whyNot;
+    disable(whyNot, this.#lock, this.#select);
     this.#lock.onclick = () => void ask({ type: this.#isLocked ? "mux.UnlockMuxInputs" : "mux.LockMuxInputs", inputs: [name] });
     this.#select.onclick = () => void ask({ type: "mux.SelectMuxInput", input: name });
     const buttons = h("td", {}, h("div", { class: "row" }, ...(isSelected ? [this.#select] : []), this.#lock));
@@ -188,7 +194,7 @@ class Row {
     this.#isLocked = input.state === "locked";
     setText(this.#lock, this.#isLocked ? "Unlock" : "Lock");
     this.#lock.setAttribute("aria-label", `${this.#isLocked ? "Unlock" : "Lock"} ${input.name}`);
-    this.#select.disabled = isSelected;
+    this.#select.disabled = isSelected || this.#whyNot !== "";
     setText(this.#select, isSelected ? "Selected" : "Select");
   }
 }
