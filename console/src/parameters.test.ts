@@ -1,5 +1,5 @@
 import { afterEach, describe, expect, it, vi } from "vitest";
-import { limitsOf, parameterOf, parsed, Sender, settingOf, slideOf, valueOf, type Setting, type Value } from "./parameters";
+import { Changes, limitsOf, parameterOf, parsed, Sender, settingOf, shownOf, slideOf, textOf, valueOf, type Setting, type Value } from "./parameters";
 
 const descriptor = (more: object) => ({
   name: "runtime",
@@ -29,11 +29,19 @@ describe("a setting", () => {
   it("shows shares in percent and angles in degrees, and sends SI", () => {
     const share = setting({ description: "Below this it warns. [0 to 1]", floating_point_range: [{ from_value: 0, to_value: 1 }] });
     expect(share).toMatchObject({ unit: "%", least: 0, most: 100 });
-    expect(valueOf(share, { type: 3, double_value: 0.2 })).toBe(20);
-    expect(parameterOf(share, 20)).toEqual({ name: "runtime", value: { type: 3, double_value: 0.2 } });
+    expect(shownOf(share, 0.2)).toBe(20);
+    expect(parsed(share, "20", 0.5)).toEqual({ value: 0.2 });
     const turn = setting({ description: "Largest turn rate. [rad/s]" });
     expect(turn.unit).toBe("\u00b0/s");
-    expect(valueOf(turn, { type: 3, double_value: Math.PI / 2 })).toBe(90);
+    expect(shownOf(turn, Math.PI / 2)).toBe(90);
+  });
+
+  it("keeps the digits of a value that is shown with fewer", () => {
+    const turn = setting({ description: "Largest turn rate. [rad/s]" });
+    const sent = { type: 3, double_value: 2 };
+    expect(parameterOf(turn, valueOf(turn, sent)!)).toEqual({ name: "runtime", value: sent });
+    expect(textOf(turn, 2)).toBe("114.592");
+    expect(parsed(turn, "114.592", 2)).toEqual({ value: 2 });
   });
 
   it("has the words that it may be", () => {
@@ -48,7 +56,7 @@ describe("a setting", () => {
     ["4,5", { value: 4.5 }],
     ["", { why: "This is no number." }],
     ["-1", { why: "At least 0 s." }],
-  ])("reads %j", (text, result) => expect(parsed(setting(), text)).toEqual(result));
+  ])("reads %j", (text, result) => expect(parsed(setting(), text, 1)).toEqual(result));
 });
 
 describe("a slider", () => {
@@ -61,6 +69,49 @@ describe("a slider", () => {
   it("is none without any limit, and for texts", () => {
     expect(slideOf(setting({ floating_point_range: [] }), 3)).toBeNull();
     expect(slideOf(setting({ type: 4 }), 3)).toBeNull();
+  });
+});
+
+it("slides in the unit that is shown", () => {
+  const share = setting({ description: "It warns. [0 to 1]", floating_point_range: [{ from_value: 0, to_value: null }] });
+  expect(slideOf(share, 0.4)).toMatchObject({ least: 0, most: 100 });
+});
+
+describe("what can be taken back", () => {
+  const changes = () => {
+    const one = { value: 0.5 as Value, isSending: false };
+    const kept = new Changes<typeof one>();
+    const set = (value: Value) => {
+      kept.put(one, one.value);
+      one.value = value;
+    };
+    return { one, kept, set };
+  };
+
+  it("is what was taken, without what was refused", () => {
+    const { one, kept, set } = changes();
+    set(0.4);
+    set(0);
+    one.value = 0.4; // refused
+    expect(kept.takeBack()).toEqual({ of: one, before: 0.5 });
+    expect(kept.isEmpty).toBe(true);
+  });
+
+  it("is one change of a slider that moves", () => {
+    const { one, kept, set } = changes();
+    set(0.4);
+    one.isSending = true;
+    set(0.3);
+    expect(kept.takeBack()).toEqual({ of: one, before: 0.5 });
+    expect(kept.isEmpty).toBe(true);
+  });
+
+  it("is nothing after the only change was refused", () => {
+    const { one, kept, set } = changes();
+    set(0);
+    expect(kept.isEmpty).toBe(false);
+    one.value = 0.5;
+    expect(kept.isEmpty).toBe(true);
   });
 });
 

@@ -2,9 +2,10 @@
 import { numberIn } from "./format";
 import { isMessage, type Json, type Message } from "./rosbridge";
 
+/** As the robot has it: numbers are SI, and are not changed by being shown. */
 export type Value = boolean | number | string;
 
-/** A parameter of a node; numbers are in the unit that is shown: `scale` times a number is what is sent. */
+/** A parameter of a node; its numbers are in the unit that is shown: `scale` times a number is SI. */
 export interface Setting {
   node: string;
   name: string;
@@ -62,30 +63,44 @@ function shownUnit(unit: string): { unit: string; scale: number } {
   return { unit: unit.replace("^2", "\u00b2"), scale: 1 };
 }
 
-/** Returns the value of `rcl_interfaces/msg/ParameterValue` as it is shown, or null if it is not set. */
+/** Returns the value of `rcl_interfaces/msg/ParameterValue`, or null if it is not set. */
 export function valueOf(setting: Setting, message: Json): Value | null {
   const field = FIELDS[setting.type];
   if (!isMessage(message) || !field || message.type !== setting.type) return null;
   const value = message[field];
-  if (typeof value === "number") return tidy(value / setting.scale);
-  return typeof value === "boolean" || typeof value === "string" ? value : null;
+  return isValue(value) ? value : null;
 }
 
-/** Returns a shown value as `rcl_interfaces/msg/Parameter`. */
+export function isValue(value: Json | undefined): value is Value {
+  return typeof value === "boolean" || typeof value === "number" || typeof value === "string";
+}
+
+/** Returns a value as `rcl_interfaces/msg/Parameter`. */
 export function parameterOf(setting: Setting, value: Value): Message {
-  const sent = typeof value === "number" ? value * setting.scale : value;
-  return { name: setting.name, value: { type: setting.type, [FIELDS[setting.type]!]: setting.type === INTEGER ? Math.round(Number(sent)) : sent } };
+  return { name: setting.name, value: { type: setting.type, [FIELDS[setting.type]!]: setting.type === INTEGER ? Math.round(Number(value)) : value } };
 }
 
-/** Returns a typed text as a value, or why it is none. */
-export function parsed(setting: Setting, text: string): { value: Value } | { why: string } {
+/** Returns a value in the unit that is shown. */
+export function shownOf(setting: Setting, value: Value): Value {
+  return typeof value === "number" ? tidy(value / setting.scale) : value;
+}
+
+/** Returns a value as its field shows it, where a number has six digits. */
+export function textOf(setting: Setting, value: Value): string {
+  const shown = shownOf(setting, value);
+  return String(typeof shown === "number" ? Number(shown.toPrecision(6)) : shown);
+}
+
+/** Returns a typed text as a value, or why it is none; the text of the present value is that value, with all its digits. */
+export function parsed(setting: Setting, text: string, present: Value): { value: Value } | { why: string } {
   if (setting.type === STRING) return { value: text };
+  if (text.trim() === textOf(setting, present)) return { value: present };
   const value = numberIn(text);
   if (!Number.isFinite(value)) return { why: "This is no number." };
   if (setting.type === INTEGER && !Number.isInteger(value)) return { why: "This must be a whole number." };
   if (setting.least !== null && value < setting.least) return { why: `At least ${tidy(setting.least)} ${setting.unit}`.trim() + "." };
   if (setting.most !== null && value > setting.most) return { why: `At most ${tidy(setting.most)} ${setting.unit}`.trim() + "." };
-  return { value };
+  return { value: value * setting.scale };
 }
 
 /** Returns the limits of a number in words, empty if it has none. */
@@ -103,7 +118,8 @@ export interface Slide {
 }
 
 /** Returns the ends of a slider, or null for what is no number; without a limit it reaches to twice a round value. */
-export function slideOf(setting: Setting, value: number): Slide | null {
+export function slideOf(setting: Setting, present: Value): Slide | null {
+  const value = Number(shownOf(setting, present));
   if (setting.type !== INTEGER && setting.type !== DOUBLE) return null;
   if (setting.least === null && setting.most === null) return null;
   const least = setting.least ?? Math.min(0, -round(2 * Math.abs(value)));
@@ -121,6 +137,32 @@ function round(value: number): number {
 /** Returns a number without the rounding errors of scaling. */
 export function tidy(value: number): number {
   return Number(value.toPrecision(12));
+}
+
+/** Something that is changed: `value` is the newest, whether it has arrived or not. */
+interface Changing {
+  readonly value: Value;
+  readonly isSending: boolean;
+}
+
+/** What can be taken back, the last change first. */
+export class Changes<T extends Changing> {
+  readonly #all: { of: T; before: Value }[] = [];
+
+  /** Keeps what a value was before a change; a slider that moves is one change. */
+  put(of: T, before: Value): void {
+    if (this.#all.at(-1)?.of !== of || !of.isSending) this.#all.push({ of, before });
+  }
+
+  /** Whether nothing can be taken back; what was refused, or is as it was before, is forgotten. */
+  get isEmpty(): boolean {
+    while (this.#all.length > 0 && this.#all.at(-1)!.of.value === this.#all.at(-1)!.before) this.#all.pop();
+    return this.#all.length === 0;
+  }
+
+  takeBack(): { of: T; before: Value } | undefined {
+    return this.isEmpty ? undefined : this.#all.pop();
+  }
 }
 
 /**

@@ -189,9 +189,12 @@ class FakeGateway:
                 else:
                     self.velocity = (frame["msg"]["linear"]["x"], frame["msg"]["angular"]["z"])
             case "call_service":
-                values = self._call(frame["service"], frame["args"])
                 answer = {"op": "service_response", "id": frame["id"], "service": frame["service"]}
-                connection.send(json.dumps({**answer, "result": True, "values": values}))
+                try:
+                    answer |= {"result": True, "values": self._call(frame["service"], frame["args"])}
+                except Refused as refusal:
+                    answer |= {"result": False, "values": str(refusal)}
+                connection.send(json.dumps(answer))
 
     def _call(self, service: str, args: dict[str, Any]) -> dict[str, Any]:
         if service == "/console/drive":

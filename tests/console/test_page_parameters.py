@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from rbxcompose.base.requests import Refused
 from tests.console.browser import CHROMIUM
-from tests.console.fake_gateway import FakeGateway
+from tests.console.fake_gateway import CONFIG, FakeGateway
 from tests.console.looks import PHONE, expect_fit, violations
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
@@ -33,6 +34,11 @@ FIXED = descriptor("topic", "Where it goes.", 4, read_only=True)
 
 def number(value: float) -> dict[str, Any]:
     return {"type": 3, "double_value": value}
+
+
+def changed_elsewhere(runtime: float) -> dict[str, Any]:
+    changed = [{"name": "runtime", "value": number(runtime)}]
+    return {"node": "/battery", "changed_parameters": changed, "new_parameters": []}
 
 
 class Battery:
@@ -157,12 +163,46 @@ def test_what_is_wrong_or_refused_is_said_at_its_place(open_page: Callable[..., 
     runtime.fill("200")
     page.keyboard.press("Enter")
     expect(page.get_by_text("At most 100 s.")).to_be_visible()
+    runtime.fill("45")
+    page.keyboard.press("Enter")
+    expect(page.get_by_text("At most 100 s.")).to_be_hidden()
     battery.refusal = "the charger takes longer than that"
     runtime.fill("1")
     page.keyboard.press("Enter")
     expect(page.get_by_text("the charger takes longer than that")).to_be_visible()
-    page.get_by_label("Mode").focus()
+    expect(page.get_by_role("button", name="Undo")).to_be_disabled()
+    expect(runtime).to_have_value("45")
     assert battery.values["runtime"] == number(45.0)
+    battery.gateway.say(EVENTS, changed_elsewhere(70.0))  # the field has the focus, and nothing is typed
+    expect(runtime).to_have_value("70")
+    runtime.press("End")
+    page.keyboard.type("1")
+    battery.gateway.say(EVENTS, changed_elsewhere(80.0))
+    expect(page.get_by_label("Runtime, slider")).to_have_value("80")
+    expect(runtime).to_have_value("701")
+    page.keyboard.press("Backspace")
+    page.keyboard.press("Tab")
+    expect(runtime).to_have_value("80")
+
+
+def test_where_parameters_cannot_be_asked_for_or_changed_it_is_said(
+    open_page: Callable[..., Page], battery: Battery
+) -> None:
+    def refuse(_: dict[str, Any]) -> dict[str, Any]:
+        raise Refused("this needs the role 'configure'; yours is 'operate'")
+
+    battery.gateway.config = {**CONFIG, "role": "operate"}
+    nodes = {"services": ["/arm/describe_parameters", "/battery/describe_parameters"]}
+    battery.gateway.answers |= {"/rosapi/services": lambda _: nodes, "/arm/list_parameters": refuse}
+    page = open_page(page_name="parameters")
+    expect(page.get_by_label("Runtime", exact=True)).to_have_value("45")
+    expect(page.get_by_label("Runtime", exact=True)).to_be_disabled()
+    expect(page.get_by_text("Changing them needs the link of the role configure.")).to_be_visible()
+    arm = page.get_by_label("arm", exact=True)
+    expect(arm).to_have_text("ArmIts parameters are unknown: this needs the role 'configure'; yours is 'operate'.")
+    page.get_by_label("Find a parameter").fill("runtime")
+    expect(arm).to_be_hidden()
+    assert battery.gateway.calls("/console/save") == []
 
 
 @pytest.mark.soak
@@ -176,10 +216,9 @@ def test_a_change_is_taken_back_and_changes_of_others_appear(open_page: Callable
     expect(page.get_by_role("button", name="Saved")).to_be_visible()
     assert battery.values["runtime"] == number(45.0)
     page.get_by_label("Mode").focus()
-    changed = [{"name": "runtime", "value": number(70.0)}]
     expect(runtime).to_have_value("45")
     page.wait_for_timeout(300)  # a value of this page counts as on its way for a while
-    battery.gateway.say(EVENTS, {"node": "/battery", "changed_parameters": changed, "new_parameters": []})
+    battery.gateway.say(EVENTS, changed_elsewhere(70.0))
     expect(runtime).to_have_value("70")
 
 

@@ -1,10 +1,25 @@
 /** Parameters: what may change while the robot runs, by sliders, boxes and lists; kept in the manifest by Save. */
-import { emptyCard, h, icon, setText } from "../dom";
+import { whyNot } from "../config";
+import { disable, emptyCard, h, icon, setText } from "../dom";
 import { confirmed } from "../edits_bar";
 import { formatName } from "../format";
 import type { Page, Robot } from "../page";
-import { limitsOf, parameterOf, parsed, Sender, settingOf, slideOf, tidy, valueOf, type Setting, type Value } from "../parameters";
-import { isMessage, type Json, type Message } from "../rosbridge";
+import {
+  Changes,
+  isValue,
+  limitsOf,
+  parameterOf,
+  parsed,
+  Sender,
+  settingOf,
+  shownOf,
+  slideOf,
+  textOf,
+  valueOf,
+  type Setting,
+  type Value,
+} from "../parameters";
+import { isMessage, LostError, type Json, type Message } from "../rosbridge";
 import "./parameters.css";
 
 const PAUSE = 200; // [ms] between two values of a slider
@@ -18,6 +33,13 @@ interface Saving {
   difference: string[];
   /** Of what was shown: only that is written. */
   hash: string;
+}
+
+/** What a node has, or why that is unknown. */
+interface Found {
+  node: string;
+  settings: { setting: Setting; value: Value }[];
+  refused: string;
 }
 
 /** A value that is not as in the manifest, in SI. */
@@ -54,17 +76,19 @@ class ParametersView {
   readonly #says = h("p", { class: "says", role: "status" });
   readonly #cards = h("div", { class: "parameter-cards" });
   readonly #rows = new Map<string, Row>();
-  readonly #done: { row: Row; before: Value }[] = [];
+  readonly #changes = new Changes<Row>();
+  readonly #whyNot: string; // it may not be changed by who looks at it
   readonly #close: () => void;
   #looking = false;
   #again = false;
 
   constructor(robot: Robot) {
-    this.#robot = robot;
+    [this.#robot, this.#whyNot] = [robot, whyNot(robot.config, "configure", "Changing them")];
     this.#filter.oninput = () => this.#find();
     this.#undo.onclick = () => this.#takeBack();
     this.#save.onclick = () => void this.#keep();
     this.#undo.disabled = this.#save.disabled = true;
+    setText(this.#says, this.#whyNot);
     this.#close = robot.link.subscribe("/parameter_events", (event) => this.#follow(event), {
       type: "rcl_interfaces/msg/ParameterEvent",
     });
@@ -80,15 +104,23 @@ class ParametersView {
       const answer = await this.#robot.link.call("/rosapi/services");
       const services = isMessage(answer) && Array.isArray(answer.services) ? answer.services.map(String) : [];
       const nodes = services.flatMap((name) => /^(.+)\/describe_parameters$/.exec(name)?.[1] ?? []);
-      const found = (await Promise.all(nodes.map((node) => this.#ask(node)))).flat();
-      this.#show(found);
+      this.#show(await Promise.all(nodes.map((node) => this.#ask(node))));
       void this.#look();
     } catch (error) {
       this.element.replaceChildren(emptyCard("warning", (error as Error).message));
     }
   }
 
-  async #ask(node: string): Promise<{ setting: Setting; value: Value }[]> {
+  async #ask(node: string): Promise<Found> {
+    try {
+      return { node, settings: await this.#settings(node), refused: "" };
+    } catch (error) {
+      if (error instanceof LostError) throw error;
+      return { node, settings: [], refused: (error as Error).message };
+    }
+  }
+
+  async #settings(node: string): Promise<Found["settings"]> {
     const listed = await this.#robot.link.call(`${node}/list_parameters`);
     const names = isMessage(listed) && isMessage(listed.result) && Array.isArray(listed.result.names) ? listed.result.names : [];
     if (names.length === 0) return [];
@@ -105,25 +137,24 @@ class ParametersView {
     });
   }
 
-  #show(found: { setting: Setting; value: Value }[]): void {
-    if (found.length === 0) {
+  #show(found: Found[]): void {
+    const told = found.filter(({ settings, refused }) => settings.length > 0 || refused);
+    if (told.length === 0) {
       const help = h("p", {}, "What may change while the robot runs is marked in the reference of its components.");
       this.element.replaceChildren(emptyCard("warning", "This robot has no parameters that may change while it runs.", help));
       return;
     }
     this.#rows.clear();
-    const cards = new Map<string, HTMLElement>();
-    for (const { setting, value } of found) {
-      const row = new Row(setting, value, (before, after) => this.#set(row, before, after));
-      this.#rows.set(`${setting.node}:${setting.name}`, row);
-      let card = cards.get(setting.node);
-      if (!card) {
-        card = h("section", { class: "card", "aria-label": setting.node.slice(1) }, h("h2", {}, formatName(setting.node)));
-        cards.set(setting.node, card);
-      }
-      card.append(row.element);
-    }
-    this.#cards.replaceChildren(...cards.values());
+    const cards = told.map(({ node, settings, refused }) => {
+      const rows = settings.map(({ setting, value }) => {
+        const row = new Row(setting, value, this.#whyNot, (before, after) => this.#set(row, before, after));
+        this.#rows.set(row.key, row);
+        return row.element;
+      });
+      if (refused) rows.push(h("p", { class: "parameter", "data-words": node }, `Its parameters are unknown: ${refused}.`));
+      return h("section", { class: "card", "aria-label": node.slice(1) }, h("h2", {}, formatName(node)), ...rows);
+    });
+    this.#cards.replaceChildren(...cards);
     const bar = h("div", { class: "parameter-bar" }, this.#filter, this.#undo, this.#save);
     this.element.replaceChildren(bar, this.#says, this.#cards);
     this.#find();
@@ -131,15 +162,19 @@ class ParametersView {
 
   #find(): void {
     const wanted = this.#filter.value.trim().toLowerCase();
-    for (const [key, row] of this.#rows) row.element.hidden = !`${key} ${row.setting.about}`.toLowerCase().includes(wanted);
+    for (const row of this.#cards.querySelectorAll<HTMLElement>(".parameter")) row.hidden = !row.dataset.words!.toLowerCase().includes(wanted);
     for (const card of this.#cards.children) (card as HTMLElement).hidden = !card.querySelector(".parameter:not([hidden])");
   }
 
   #set(row: Row, before: Value, after: Value): void {
-    const last = this.#done.at(-1);
-    if (last?.row !== row || !row.isSending) this.#done.push({ row, before }); // a slider that moves is one change
+    this.#changes.put(row, before);
+    this.#send(row, after);
+  }
+
+  #send(row: Row, value: Value): void {
+    row.send(value, (next) => this.#tell(row.setting, next));
     this.#undo.disabled = false;
-    row.send(after, (value) => this.#tell(row.setting, value));
+    void row.settled.then(() => (this.#undo.disabled = this.#changes.isEmpty));
   }
 
   async #tell(setting: Setting, value: Value): Promise<void> {
@@ -150,9 +185,9 @@ class ParametersView {
   }
 
   #takeBack(): void {
-    const last = this.#done.pop();
-    this.#undo.disabled = this.#done.length === 0;
-    last?.row.send(last.before, (value) => this.#tell(last.row.setting, value));
+    const last = this.#changes.takeBack();
+    if (last) this.#send(last.of, last.before);
+    this.#undo.disabled = this.#changes.isEmpty;
   }
 
   /** Takes what others have changed, and what the robot made of what was sent. */
@@ -169,6 +204,7 @@ class ParametersView {
 
   /** Learns what is not as in the manifest: one question at a time, and another if something changed meanwhile. */
   async #look(): Promise<void> {
+    if (this.#whyNot) return;
     if (this.#looking) {
       this.#again = true;
       return;
@@ -232,30 +268,39 @@ class ParametersView {
 class Row {
   readonly element: HTMLElement;
   readonly setting: Setting;
+  /** The newest, which may be on its way. */
+  value: Value;
   readonly #control: Control;
   readonly #note = h("p", { class: "says", role: "status" });
   readonly #mark = h("span", { class: "parameter-mark" });
   readonly #default = h("button", { type: "button", hidden: "" }, "As in the manifest");
   #sender: Sender | null = null;
-  #value: Value;
+  #arrived: Value; // at the robot
 
-  constructor(setting: Setting, value: Value, changed: (before: Value, after: Value) => void) {
+  constructor(setting: Setting, value: Value, whyNot: string, changed: (before: Value, after: Value) => void) {
     this.setting = setting;
-    this.#value = value;
+    this.value = this.#arrived = value;
     this.#control = controlOf(setting, value, (next) => {
-      if ("why" in next) this.#say(next.why, "bad");
-      else if (next.value !== this.#value) changed(this.#value, next.value);
+      if ("why" in next) return this.#say(next.why, "bad");
+      this.#say("", "");
+      if (next.value !== this.value) changed(this.#arrived, next.value);
+      else this.#control.show(this.value);
     });
+    disable(whyNot, ...this.#control.element.querySelectorAll<HTMLInputElement | HTMLSelectElement>("input, select"));
     const label = h("label", { for: this.#control.id }, formatName(setting.name.replaceAll(".", " ")));
     const title = h("div", {}, label, this.#mark);
     const about = h("p", { class: "label" }, setting.about, h("small", {}, ` ${limitsOf(setting)}`));
-    this.element = h("div", { class: "parameter" }, title, this.#control.element, about, this.#default, this.#note);
+    this.element = h("div", { class: "parameter", "data-words": `${this.key} ${setting.about}` }, title, this.#control.element, about, this.#default, this.#note);
     this.#default.onclick = () => {
-      if (this.#inManifest !== null) changed(this.#value, this.#inManifest);
+      if (this.#inManifest !== null) changed(this.#arrived, this.#inManifest);
     };
   }
 
   #inManifest: Value | null = null;
+
+  get key(): string {
+    return `${this.setting.node}:${this.setting.name}`;
+  }
 
   get settled(): Promise<void> {
     return this.#sender?.settled ?? Promise.resolve();
@@ -267,34 +312,37 @@ class Row {
 
   send(value: Value, tell: (value: Value) => Promise<void>): void {
     this.#sender ??= new Sender(async (next) => {
-      const before = this.#value;
       try {
-        this.#value = next;
         await tell(next);
+        this.#arrived = next;
         this.#say("", "");
       } catch (error) {
-        this.#value = before;
-        this.#control.show(before);
+        if (next === this.value) this.#show(this.#arrived);
         this.#say((error as Error).message, "bad");
       }
     }, PAUSE);
-    this.#control.show(value);
+    this.#show(value);
     this.#sender.put(value);
   }
 
   /** Shows a value that the robot has now, unless a newer one of this page is on its way. */
   arrived(value: Value): void {
     if (this.isSending) return;
-    this.#value = value;
+    this.#arrived = value;
+    this.#show(value);
+    this.#say("", "");
+  }
+
+  #show(value: Value): void {
+    this.value = value;
     this.#control.show(value);
   }
 
-  /** Marks it as being as in the manifest or not, which then has `old` [SI]. */
+  /** Marks it as being as in the manifest or not, which then has `old`. */
   mark(old: Json | undefined, isKnown: boolean): void {
-    const value = typeof old === "number" ? tidy(old / this.setting.scale) : old;
-    this.#inManifest = typeof value === "boolean" || typeof value === "string" || typeof value === "number" ? value : null;
+    this.#inManifest = isValue(old) ? old : null;
     const differs = this.#inManifest !== null;
-    const written = `${String(this.#inManifest)} ${this.setting.unit}`.trim();
+    const written = isValue(old) ? `${String(shownOf(this.setting, old))} ${this.setting.unit}`.trim() : "";
     const words = differs ? `changed since the start, not saved; the manifest has ${written}` : "as in the manifest";
     setText(this.#mark, isKnown ? ` ${words}` : "");
     this.#mark.classList.toggle("differs", differs);
@@ -331,24 +379,38 @@ function controlOf(setting: Setting, value: Value, changed: (next: { value: Valu
     return { id, element: h("div", { class: "parameter-control" }, list), show };
   }
   const input = h("input", { id, type: "text", autocomplete: "off", inputmode: typeof value === "number" ? "decimal" : "text" });
-  input.onchange = () => changed(parsed(setting, input.value));
+  let present: Value = value;
+  let isTyped = false; // and not yet taken: it is not replaced
+  input.oninput = () => (isTyped = true);
+  input.onchange = () => {
+    isTyped = false;
+    changed(parsed(setting, input.value, present));
+  };
+  input.onblur = () => {
+    if (!isTyped) return; // else what was typed is what stood there before, which is no change
+    isTyped = false;
+    show(present);
+  };
   const parts: Node[] = [h("span", { class: "number" }, input, h("span", { class: "unit" }, setting.unit))];
-  const slide = typeof value === "number" ? slideOf(setting, value) : null;
+  const slide = slideOf(setting, value);
   let slider: HTMLInputElement | null = null;
   if (slide) {
     const ends = { min: String(slide.least), max: String(slide.most), step: String(slide.step) };
     slider = h("input", { type: "range", "aria-label": `${formatName(setting.name)}, slider`, ...ends });
     const moved = slider;
     slider.oninput = () => {
-      input.value = moved.value;
-      changed({ value: Number(moved.value) });
+      isTyped = false;
+      changed({ value: Number(moved.value) * setting.scale });
     };
     parts.unshift(slider);
   }
   const show = (next: Value) => {
-    if (document.activeElement !== input) input.value = typeof next === "number" ? String(Number(next.toPrecision(6))) : String(next);
-    if (slider && document.activeElement !== slider) slider.value = String(next);
-    if (slider) slider.style.setProperty("--share", String((Number(next) - slide!.least) / (slide!.most - slide!.least)));
+    present = next;
+    const shown = Number(shownOf(setting, next));
+    if (!isTyped) input.value = textOf(setting, next);
+    if (!slider || !slide) return;
+    slider.value = String(shown);
+    slider.style.setProperty("--share", String((shown - slide.least) / (slide.most - slide.least)));
   };
   show(value);
   return { id, element: h("div", { class: "parameter-control" }, ...parts), show };
