@@ -16,7 +16,7 @@ from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from tests.navigation.test_robot import Room
-from tests.navigation.test_sensors import EYE, SIMULATORS
+from tests.navigation.test_sensors import EYE, SIMULATORS, skip_without_pictures
 from tests.parts.project import Project
 
 pytestmark = pytest.mark.timeout(120)
@@ -57,8 +57,7 @@ def test_a_wall_is_as_far_away_as_it_is_to_a_centimetre(tmp_path: Path, simulato
     bench = bench_in(tmp_path, simulator)
     taken = bench.collect("/camera/depth/image_raw", Image)
     bench.advance(0.5)
-    if not taken and simulator == "physics":
-        pytest.skip(bench.statuses("physics: pictures")[-1].message)
+    skip_without_pictures(bench, simulator, taken)
     depths = np.frombuffer(taken[-1].data, np.float32).reshape(120, 160)
     on_wall = depths[5:60, 5:155]
     assert np.abs(on_wall - WALL).max() < 0.01

@@ -28,7 +28,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.sdk.robot_events import MissionOver
 from rbxcompose.testing import Bench
 from tests.conftest import ROOT
-from tests.navigation.test_sensors import SIMULATORS
+from tests.navigation.test_sensors import SIMULATORS, skip_without_pictures
 from tests.parts.project import Project
 
 pytestmark = pytest.mark.timeout(120)
@@ -53,8 +53,7 @@ def test_the_robot_keeps_its_distance_to_a_guide_through_the_house(simulator: st
     truth, contacts = bench.collect("/ground_truth", Odometry), bench.collect("/contact", String)
     told, worlds = bench.collect("/people", People), bench.collect("/world", World, Qos.LATCHED)
     bench.advance(1.0)
-    if not told[-1].people and simulator == "physics":
-        pytest.skip(bench.statuses("physics: pictures")[-1].message)
+    skip_without_pictures(bench, simulator, told[-1].people)
     (guide,) = (shape for shape in world_of(worlds[-1]).shapes if shape.path is not None)
     path = guide.path
     assert isinstance(path, ShapePath)

@@ -30,7 +30,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from tests.navigation.test_eyes import LEVEL
 from tests.navigation.test_robot import Room
-from tests.navigation.test_sensors import SELDOM_PHYSICS
+from tests.navigation.test_sensors import SELDOM_PHYSICS, skip_without_pictures
 from tests.parts.project import Project
 
 SETTINGS = FollowingSettings()
@@ -112,8 +112,7 @@ def test_it_keeps_its_distance_to_somebody_who_walks(tmp_path: Path, simulator: 
     taken = bench.collect("/tags", Detection3DArray)
     truth, contacts = bench.collect("/ground_truth", Odometry), bench.collect("/contact", String)
     bench.advance(1.0)
-    if not taken and simulator == "physics":
-        pytest.skip(bench.statuses("physics: pictures")[-1].message)
+    skip_without_pictures(bench, simulator, taken)
     bench.advance(17.0)
     at = truth[-1].pose.pose.position
     back = 4.2 - 0.25 * math.cos(math.atan2(1.4, 1.0)), 1.8 - 0.25 * math.sin(math.atan2(1.4, 1.0))

@@ -19,7 +19,7 @@ from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.vision_msgs import Detection3DArray
 from tests.navigation.test_eyes import LEVEL
 from tests.navigation.test_robot import Room
-from tests.navigation.test_sensors import SIMULATORS
+from tests.navigation.test_sensors import SIMULATORS, skip_without_pictures
 from tests.parts.project import Project
 
 cv2 = pytest.importorskip("cv2", reason="OpenCV is not installed")
@@ -108,8 +108,7 @@ def test_a_camera_sees_tags_of_what_stands_what_is_loose_and_who_walks(tmp_path:
     bench = Room(tmp_path, ROBOT.replace("SIMULATOR", simulator), WORLD).bench
     taken = bench.collect("/tags", Detection3DArray)
     bench.advance(2.0)
-    if not taken and simulator == "physics":
-        pytest.skip(bench.statuses("physics: pictures")[-1].message)
+    skip_without_pictures(bench, simulator, taken)
     first, last = (
         {one.id: pose_of(one.bbox.center).translation for one in array.detections} for array in taken[:: len(taken) - 1]
     )
