@@ -3,6 +3,7 @@
 from rbxcompose.msgs.builtin_interfaces import Duration, Time
 
 NANOSECONDS = 1_000_000_000
+LONGEST = 2.0**31 - 1  # [s] that a duration can hold
 
 
 def to_time(nanoseconds: int) -> Time:

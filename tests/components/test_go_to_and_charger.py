@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 from rbxcompose.base.config import Place
 from rbxcompose.base.geometry import Pose2, quaternion_from_yaw
 from rbxcompose.bus.services import ServedRequest
+from rbxcompose.domains.bases.components.go_to import pose_of
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.rbxcompose_msgs import Recharge, SetBatteryLevel
+from rbxcompose.msgs.stamps import to_nanoseconds, to_seconds
 from rbxcompose.msgs.std_msgs import Float32, Header
 from rbxcompose.sdk import Ended, Outcome, SentGoal
 from rbxcompose.sdk.ports import Qos
@@ -22,12 +24,12 @@ from rbxcompose.testing import Bench, instance
 DOCK = Place("dock", 0.5, 0.5, 0.0)
 
 
-def bench() -> Bench:
+def bench(speed: str = "0.3 m/s") -> Bench:
     return Bench(
         instance("base", "diff_drive_sim"),
         instance("transforms", "transforms"),
         instance("battery", "battery_sim", {"runtime": "60 s"}),
-        instance("go_to", "go_to"),
+        instance("go_to", "go_to", {"speed": speed}),
         instance("charger", "charger", {"dock": "dock"}, [DOCK]),
     )
 
@@ -43,11 +45,11 @@ class Driver:
     def __init__(self, robot: Bench) -> None:
         self.robot = robot
         self.ended: list[Ended[NavigateToPose.Result]] = []
-        self.left: list[float] = []
+        self.told: list[NavigateToPose.Feedback] = []
         self.client = robot.bus.action_client("bench", "/go_to", NavigateToPose)
 
     def send(self, request: NavigateToPose.Goal) -> SentGoal:
-        return self.client(request, self.ended.append, lambda feedback: self.left.append(feedback.distance_remaining))
+        return self.client(request, self.ended.append, self.told.append)
 
     def pose(self) -> Pose2:
         pose: Pose2 = self.robot.component("base").core.pose  # type: ignore[attr-defined]
@@ -63,7 +65,26 @@ def test_it_drives_to_a_pose_and_turns_to_its_heading() -> None:
     assert driver.ended[0].outcome is Outcome.SUCCEEDED
     assert driver.pose().distance(Pose2(1.0, 0.0)) < 0.05
     assert driver.pose().heading == pytest.approx(math.pi / 2, abs=math.radians(3))
-    assert driver.left[0] > driver.left[-1]
+    first, *_, last = driver.told
+    assert first.distance_remaining > last.distance_remaining
+    assert (first.current_pose.header.frame_id, last.current_pose.header.frame_id) == ("map", "map")
+    assert to_nanoseconds(first.current_pose.header.stamp) < to_nanoseconds(last.current_pose.header.stamp)
+    assert pose_of(first.current_pose).distance(Pose2()) < 0.05
+    assert pose_of(last.current_pose).distance(driver.pose()) < 0.05
+    assert pose_of(last.current_pose).heading == pytest.approx(math.pi / 2, abs=math.radians(6))
+    assert to_seconds(first.navigation_time) < 0.1
+    took = to_seconds(last.navigation_time)
+    assert 0.7 * took < to_seconds(first.estimated_time_remaining) < 1.1 * took
+    assert to_seconds(last.estimated_time_remaining) < 0.1
+
+
+def test_a_drive_takes_no_longer_than_a_message_can_say() -> None:
+    robot = bench(speed="0.00001 m/s")
+    driver = Driver(robot)
+    robot.advance(0.1)
+    driver.send(goal(90_000.0, 0.0))
+    robot.advance(0.2)
+    assert driver.told[-1].estimated_time_remaining.sec == 2**31 - 1
 
 
 def test_a_cancelled_goal_ends_canceled_and_the_base_rests() -> None:
@@ -112,12 +133,12 @@ def test_a_stop_cancels_the_goal_and_refuses_new_ones() -> None:
     assert [end.outcome for end in driver.ended] == [Outcome.CANCELED, Outcome.REJECTED]
 
 
-@pytest.mark.parametrize("x", [math.inf, math.nan, 1e300, -1e6])
-def test_a_goal_that_no_robot_can_reach_is_refused(x: float) -> None:
+@pytest.mark.parametrize(("x", "heading"), [(math.inf, 0), (math.nan, 0), (1e300, 0), (-1e6, 0), (0, math.nan)])
+def test_a_goal_that_no_robot_can_reach_is_refused(x: float, heading: float) -> None:
     robot = bench()
     driver = Driver(robot)
     robot.advance(0.1)
-    driver.send(goal(x, 0.0))
+    driver.send(goal(x, 0.0, heading))
     robot.advance(0.1)
     assert [end.outcome for end in driver.ended] == [Outcome.REJECTED]
 

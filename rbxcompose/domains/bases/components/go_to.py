@@ -10,10 +10,12 @@ from typing import Annotated
 from pydantic import Field
 
 from rbxcompose import sdk
-from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2, yaw_of
+from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2, quaternion_from_yaw, yaw_of
 from rbxcompose.domains.bases.driving import GoToCore, GoToSettings, least_time
-from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist, Vector3
+from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion, Twist, Vector3
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
+from rbxcompose.msgs.stamps import LONGEST, to_duration, to_time
+from rbxcompose.msgs.std_msgs import Header
 
 MAP = "map"
 FARTHEST = 100_000.0  # [m] from the origin; no map is as large
@@ -59,6 +61,7 @@ class GoTo(sdk.Component[GoToConfig]):
         """Build the core."""
         self.core = GoToCore(settings_of(self.config))
         self.driving: object = None  # the goal that the core drives to
+        self.began = 0.0  # [s], when it began to
 
     def reconfigure(self, old: GoToConfig) -> None:
         """Continue to the current goal with the new settings."""
@@ -66,10 +69,10 @@ class GoTo(sdk.Component[GoToConfig]):
 
     def accept_go_to(self, goal: NavigateToPose.Goal) -> str:
         """Refuse a goal in another frame, or one that is no valid pose."""
-        frame, at = goal.pose.header.frame_id, goal.pose.pose.position
+        frame, at = goal.pose.header.frame_id, pose_of(goal.pose)
         if frame not in ("", MAP):
             return f"a goal must be given in '{MAP}', not in '{frame}'"
-        if not (math.isfinite(at.x) and math.isfinite(at.y)):
+        if not all(map(math.isfinite, (at.x, at.y, at.heading))):
             return "the goal is not a finite pose"
         return "" if math.hypot(at.x, at.y) <= FARTHEST else f"the goal is farther than {FARTHEST / 1000:g} km away"
 
@@ -95,10 +98,11 @@ class GoTo(sdk.Component[GoToConfig]):
         pose: Pose2,
         dt: float,
     ) -> None:
-        """Command the base for one cycle and report the remaining distance."""
+        """Command the base for one cycle and report where it is and what remains."""
+        wanted = pose_of(goal.request.pose)
         if goal is not self.driving:
-            self.driving = goal
-            self.core.start(pose_of(goal.request.pose))
+            self.driving, self.began = goal, self.now
+            self.core.start(wanted)
         velocity, done = self.core.update(pose, dt)
         self.drive(velocity)
         if done:
@@ -107,7 +111,15 @@ class GoTo(sdk.Component[GoToConfig]):
             self.drive(AT_REST)
             goal.aborted("the base gets no closer")
         else:
-            goal.feedback(NavigateToPose.Feedback(distance_remaining=self.core.distance))
+            left = least_time(pose, wanted, self.core.settings)
+            at = Pose(Point(pose.x, pose.y), Quaternion(*quaternion_from_yaw(pose.heading)))
+            told = NavigateToPose.Feedback(
+                current_pose=PoseStamped(Header(stamp=to_time(self.stamp), frame_id=MAP), at),
+                navigation_time=to_duration(self.now - self.began),
+                estimated_time_remaining=to_duration(min(LONGEST, left)),
+                distance_remaining=self.core.distance,
+            )
+            goal.feedback(told)
 
     def hold(self) -> None:
         """Command a halt: no step follows while robot time stands still."""

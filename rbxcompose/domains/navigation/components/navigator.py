@@ -35,13 +35,12 @@ from rbxcompose.domains.worlds.poses import NewestMessage, message_of, pose_in, 
 from rbxcompose.domains.worlds.shapes import PolygonFootprint
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_message, grid_of
 from rbxcompose.msgs import geometry_msgs as geometry
-from rbxcompose.msgs.builtin_interfaces import Duration
 from rbxcompose.msgs.nav2_msgs import BackUp as Nav2BackUp
 from rbxcompose.msgs.nav2_msgs import NavigateThroughPoses, NavigateToPose, Spin
 from rbxcompose.msgs.nav_msgs import OccupancyGrid, Path
 from rbxcompose.msgs.rbxcompose_msgs import BackUp, RunMission
 from rbxcompose.msgs.sensor_msgs import LaserScan
-from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.stamps import LONGEST, to_duration, to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.msgs.visualization_msgs import MarkerArray
@@ -524,7 +523,7 @@ class Navigator(sdk.Component[NavigatorConfig]):
         """Report how far it is."""
         at = geometry.PoseStamped(header=Header(stamp=to_time(self.stamp), frame_id=MAP_FRAME), pose=message_of(pose))
         away = self.follower.left + sum(before.distance(after) for before, after in pairwise(self.poses))
-        spent, left = duration_of(self.now - self.began), duration_of(away / self.config.speed)
+        spent, left = to_duration(self.now - self.began), to_duration(min(LONGEST, away / self.config.speed))
         told = at, spent, left, self.recoveries, away
         if isinstance(goal.request, NavigateThroughPoses.Goal):
             goal.feedback(NavigateThroughPoses.Feedback(*told, len(self.poses)))
@@ -609,13 +608,8 @@ def result_of(request: BackUp.Goal | Nav2BackUp.Goal | Spin.Goal, time: float, w
     if isinstance(request, BackUp.Goal):
         return BackUp.Result(message=why)
     if isinstance(request, Spin.Goal):
-        return Spin.Result(duration_of(time), code, why)
-    return Nav2BackUp.Result(duration_of(time), code + 10 if code else 0, why)
-
-
-def duration_of(time: float) -> Duration:
-    """Return a time [s] as a message."""
-    return Duration(sec=int(time), nanosec=int(time % 1 * 1e9))
+        return Spin.Result(to_duration(time), code, why)
+    return Nav2BackUp.Result(to_duration(time), code + 10 if code else 0, why)
 
 
 def poses_of(request: NavigateToPose.Goal | NavigateThroughPoses.Goal) -> list[Pose2]:
