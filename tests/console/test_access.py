@@ -11,8 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.console.access import (
+    OF_PARAMETERS,
     Door,
     Role,
+    Target,
     needed,
     own_secret,
     renew_secret,
@@ -21,39 +23,45 @@ from rbxcompose.domains.console.access import (
     token_of,
 )
 from rbxcompose.domains.console.links import network_address
+from rbxcompose.msgs.types import Service
+from rbxcompose.runtime.process_group.parameters import INTERFACES
 
 ROLES = [Role.VIEW, Role.OPERATE, Role.CONFIGURE]
 SECRET = bytes(32)
 
 
 @pytest.mark.parametrize(
-    ("frame", "least"),
+    ("target", "least"),
     [
-        ({"op": "subscribe", "topic": "/odom"}, Role.VIEW),
-        ({"op": "subscribe", "topic": "/arm/state"}, Role.VIEW),
-        ({"op": "publish", "topic": "/cmd_vel"}, Role.OPERATE),
-        ({"op": "publish", "topic": "arm/goal"}, Role.CONFIGURE),
-        ({"op": "call_service", "service": "/console/stop"}, Role.VIEW),
-        ({"op": "call_service", "service": "console/release"}, Role.OPERATE),
-        ({"op": "call_service", "service": "/rosapi/topics"}, Role.VIEW),
-        ({"op": "call_service", "service": "rosapi/set_param"}, Role.CONFIGURE),
-        ({"op": "call_service", "service": "/dock"}, Role.OPERATE),
-        ({"op": "call_service", "service": "/arm/home"}, Role.CONFIGURE),
-        ({"op": "send_action_goal", "action": "/go_to"}, Role.OPERATE),
-        ({"op": "advertise_service", "service": "/x"}, Role.CONFIGURE),
-        ({"op": "auth", "mac": "x"}, Role.NOBODY),
-        ({"op": "who knows"}, Role.OPERATE),
-        ({}, Role.VIEW),
+        (Target("subscribe", "/odom"), Role.VIEW),
+        (Target("subscribe", "/arm/state"), Role.VIEW),
+        (Target("publish", "/cmd_vel"), Role.OPERATE),
+        (Target("publish", "/arm/goal"), Role.CONFIGURE),
+        (Target("publish", "/cmd_vel", others=("/arm/cmd_vel",)), Role.CONFIGURE),
+        (Target("call_service", "/console/stop"), Role.VIEW),
+        (Target("call_service", "/console/release"), Role.OPERATE),
+        (Target("call_service", "/rosapi/topics"), Role.VIEW),
+        (Target("call_service", "/rosapi/topics", type="std_srvs/srv/Trigger"), Role.OPERATE),
+        (Target("call_service", "/rosapi/set_param"), Role.CONFIGURE),
+        (Target("call_service", "/dock", type="std_srvs/srv/Trigger"), Role.OPERATE),
+        (Target("call_service", "/get_parameters", type="std_srvs/srv/Trigger"), Role.OPERATE),
+        (Target("call_service", "/arm/home", type="std_srvs/srv/Trigger"), Role.CONFIGURE),
+        (Target("send_action_goal", "/go_to"), Role.OPERATE),
+        (Target("advertise_service", "/x"), Role.CONFIGURE),
+        (Target("auth"), Role.NOBODY),
+        (Target("who knows"), Role.OPERATE),
     ],
-    ids=lambda value: " ".join(map(str, value.values())) if isinstance(value, dict) else None,
+    ids=str,
 )
-def test_each_operation_and_name_has_its_least_role(frame: dict[str, str], least: Role) -> None:
-    assert needed(frame, {"/arm/*": Role.CONFIGURE}) is least
+def test_each_operation_and_name_has_its_least_role(target: Target, least: Role) -> None:
+    assert needed(target, {"/arm/*": Role.CONFIGURE}) is least
 
 
-@given(st.dictionaries(st.sampled_from(["op", "topic", "service", "action"]), st.text() | st.integers() | st.none()))
-def test_any_frame_has_a_role(frame: dict[str, object]) -> None:
-    assert needed(frame, {"/*": Role.OPERATE}) in Role
+def test_who_may_set_parameters_is_said_of_each_service_that_a_component_has_for_them() -> None:
+    served = [each.TYPE for each in INTERFACES if issubclass(each, Service)]
+    assert sorted(OF_PARAMETERS) == sorted(served)
+    sets = {name for name in served if name.rpartition("/")[2].startswith(("Set", "Change"))}
+    assert {name for name, role in OF_PARAMETERS.items() if role is Role.CONFIGURE} == sets
 
 
 @pytest.mark.parametrize("role", ROLES)

@@ -84,6 +84,8 @@ def test_a_goal_is_cancelled_by_its_id_by_its_client_only() -> None:
     goal = sent(room)
     (status,) = other.does("cancel_action_goal", action="go_to", id="g")
     assert "no goal of this id" in status["msg"]
+    (status,) = client.does("cancel_action_goal", action="/another", id="g")
+    assert "no goal of this id" in status["msg"]
     assert client.does("cancel_action_goal", action="go_to", id="g") == []
     assert room.asked() == [CancelGoal(goal.number)]
 
@@ -104,12 +106,30 @@ def test_a_goal_goes_on_when_its_client_leaves() -> None:
         ({"action": "/none"}, "there is no action '/none'"),
         ({"action": "go_to", "args": {"posse": {}}}, "has no field 'posse'"),
         ({"action": "go_to", "args": 7}, "is a map of its fields"),
+        ({"action": "go_to", "action_type": "foo/Bar"}, f"is of the type '{NAVIGATE}', not 'foo/Bar'"),
+        ({"action": "go_to", "action_type": "nav2_msgs/srv/NavigateToPose"}, "is of the type"),
+        ({"action": "go_to", "action_type": ["nav2_msgs/NavigateToPose"]}, "is of the type"),
     ],
 )
 def test_a_goal_that_cannot_be_sent_is_answered(frame: dict[str, Any], why: str) -> None:
     (answer,) = Room().client().does("send_action_goal", id="g", **frame)
     assert (answer["op"], answer["id"], answer["result"]) == ("action_result", "g", False)
     assert why in answer["values"]
+
+
+@pytest.mark.parametrize("type_", ["nav2_msgs/NavigateToPose", NAVIGATE, "", None])
+def test_the_type_of_an_action_is_taken_in_each_spelling(type_: str | None) -> None:
+    room = Room()
+    assert room.client().does("send_action_goal", action="go_to", action_type=type_) == []
+    assert sent(room).type.TYPE == NAVIGATE
+
+
+def test_a_service_is_of_the_type_that_a_client_takes_it_for() -> None:
+    room = Room()
+    client = room.client()
+    (answer,) = client.does("call_service", service="/lamp", type="std_srvs/Trigger")
+    assert answer["values"] == "'/lamp' is of the type 'std_srvs/srv/SetBool', not 'std_srvs/Trigger'"
+    assert client.does("call_service", service="/lamp", type="std_srvs/SetBool") == []
 
 
 # As ROS 1 has them
@@ -293,8 +313,8 @@ def test_only_its_server_answers_for_an_action_and_an_end_has_a_status_of_ros() 
 # Parameters and types
 
 
-def with_parameters() -> Room:
-    room = Room()
+def with_parameters(**access: Any) -> Room:
+    room = Room(**access)
     services = {
         "get_parameters": "GetParameters",
         "set_parameters": "SetParameters",
@@ -336,6 +356,43 @@ def test_a_number_is_set_in_the_type_that_the_parameter_has() -> None:
     room.bridge.answered(asked.number, refused)
     (answer,) = client.gets()
     assert (answer["result"], answer["values"]) == (False, "too long")
+
+
+@pytest.mark.parametrize(
+    ("value", "why"),
+    [
+        ("1" + "0" * 400, "no parameter can have this value"),
+        (10**400, "no parameter can have this value"),
+        ("1" + "0" * 5000, ""),  # a text
+        ("[" * 100_000, "nested"),
+        ("[" * 101 + "]" * 101, "nested"),
+        ([[[1]]], "no parameter can have this value"),
+        ({"a": 1}, "no parameter can have this value"),
+        ("\ud800", "surrogates"),
+    ],
+    ids=lambda value: str(value)[:9].encode(errors="replace").decode(),
+)
+def test_each_value_is_set_or_answered(value: object, why: str) -> None:
+    room = with_parameters()
+    client = room.client()
+    answers = client.does("call_service", service="/rosapi/set_param", args=["/battery:runtime", value], id="a")
+    if not answers:
+        now = GetParameters.Response(values=(ParameterValue(type=3, double_value=60.0),))
+        room.bridge.answered(call(room, "/battery/get_parameters").number, now)
+        room.requests += room.bridge.take_requests()
+        answers = client.gets()
+    if why:
+        assert [(answer["id"], answer["result"]) for answer in answers] == [("a", False)]
+        assert why in answers[0]["values"]
+    else:
+        call(room, "/battery/set_parameters")
+
+
+def test_a_node_that_is_guarded_is_guarded_by_rosapi_too() -> None:
+    room = with_parameters(guarded={"/battery/*": Role.CONFIGURE})
+    client = room.client(Role.OPERATE)
+    assert "needs the role 'configure'" in client.calls("/rosapi/get_param", ["/battery:runtime"])
+    assert client.calls("/rosapi/get_param_names") == {"names": []}
 
 
 def test_the_parameters_of_all_nodes_are_listed() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.domains.console.access import Role, needed
+from rbxcompose.domains.console.access import Role, Target, needed
 from rbxcompose.domains.console.editor_process import MOST_WAITING, EditorProcess
 from rbxcompose.domains.console.protocol import MISSION_TEXTS, ROBOT_TEXTS, EditMission
 from rbxcompose.tools.mission_editor.editor import REQUESTS
@@ -37,7 +37,7 @@ def test_a_request_about_a_text_is_passed_on_and_its_answer_comes_back() -> None
 
 def test_the_gateway_passes_on_all_that_the_editor_answers_each_with_a_role_of_its_own() -> None:
     assert set(MISSION_TEXTS) == set(REQUESTS)
-    roles = {name: needed({"op": "call_service", "service": f"/console/mission/{name}"}, {}) for name in REQUESTS}
+    roles = {name: needed(Target("call_service", f"/console/mission/{name}"), {}) for name in REQUESTS}
     assert {name for name, role in roles.items() if role is Role.CONFIGURE} == {"new", "save", "test_new"}
     assert {name for name, role in roles.items() if role is Role.OPERATE} == {"test", "try"}
 
@@ -54,10 +54,33 @@ def test_who_looks_may_read_and_only_who_configures_may_save() -> None:
 def test_who_saved_what_is_in_the_log() -> None:
     room = Room()
     client = room.client(who="10.0.0.7")
-    client.does("call_service", service="/console/mission/save", args={**SAVE, "dry_run": True})
-    assert not any("saves" in note for note in room.bridge.notes)
+    for args, refusal in (({**SAVE, "dry_run": True}, ""), (SAVE, "it was changed meanwhile")):
+        client.does("call_service", service="/console/mission/save", args=args)
+        room.bridge.robot_answered(room.asked()[-1].number, None, refusal)  # type: ignore[union-attr]
+        assert not any("saves" in note for note in room.bridge.notes)
     client.does("call_service", service="/console/mission/save", args=SAVE)
+    client.leaves()
+    room.bridge.robot_answered(room.asked()[-1].number, {})  # type: ignore[union-attr]
     assert room.bridge.notes[-1] == "10.0.0.7 (configure): saves the mission patrol"
+
+
+def test_who_makes_a_mission_is_in_the_log_whatever_else_is_asked() -> None:
+    room = Room()
+    args = {"mission": "patrol", "template": "empty", "dry_run": True}
+    room.client(who="10.0.0.7").does("call_service", service="/console/mission/new", args=args)
+    room.bridge.robot_answered(room.asked()[-1].number, {})  # type: ignore[union-attr]
+    assert room.bridge.notes[-1] == "10.0.0.7 (configure): makes the mission patrol"
+
+
+@pytest.mark.parametrize("where", ["text", "mission"])
+@pytest.mark.parametrize("service", ["look", "edit", "save"])
+def test_a_text_that_no_file_can_hold_is_refused_at_the_door(service: str, where: str) -> None:
+    room = Room()
+    args = {**SAVE, "operation": {"text": "x"}} | {where: "a\ud800"}
+    assert "half of a pair of surrogates" in room.client().calls(f"/console/mission/{service}", args)
+    args = {**SAVE, "operation": {"op": "insert", "\udfff": [{"yaml": "\ud800"}]}}
+    assert "half of a pair of surrogates" in room.client().calls(f"/console/mission/{service}", args)
+    assert room.asked() == []
 
 
 @pytest.mark.parametrize("args", [None, {}, {"mission": 7}, {"mission": "patrol", "text": ["x"], "hash": "h"}, [1, 2]])
@@ -108,6 +131,7 @@ def test_what_the_robot_is_is_edited_by_the_same_process() -> None:
     client.does("call_service", service="/console/robot/save", args={**MOVED, "dry_run": True})
     assert not any("saves" in note for note in room.bridge.notes)
     client.does("call_service", service="/console/robot/save", args=MOVED)
+    room.bridge.robot_answered(room.asked()[-1].number, {})  # type: ignore[union-attr]
     assert room.bridge.notes[-1] == "10.0.0.7 (configure): saves places of the robot"
 
 
@@ -119,10 +143,12 @@ def test_the_robot_that_runs_is_changed_by_who_configures_and_that_is_noted() ->
         assert "needs the role 'configure'" in room.client(Role.OPERATE).calls(
             f"/console/robot/{name}", {"generation": 0}
         )
-        client.does("call_service", service=f"/console/robot/{name}", args={"generation": 0})
-        assert note in room.bridge.notes[-1]
+        for refusal in ("the robot has changed meanwhile", ""):
+            client.does("call_service", service=f"/console/robot/{name}", args={"generation": 0})
+            room.bridge.robot_answered(room.requests[-1].number, {}, refusal)  # type: ignore[union-attr]
+            assert (note in room.bridge.notes[-1]) == (not refusal)
     asked = [one.request["do"] for one in room.asked() if isinstance(one, EditMission)]
-    assert asked == ["robot/compare", "robot/apply", "robot/revert"]
+    assert asked == ["robot/compare", *["robot/apply"] * 2, *["robot/revert"] * 2]
 
 
 def test_only_who_configures_may_change_what_the_robot_is() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from rbxcompose.base.garbage_collection import paused_collection
@@ -22,17 +22,27 @@ from rbxcompose.domains.console.protocol import (
     MOST_FRAMES,
     MOST_PER_SECOND,
     MOST_SUBSCRIPTIONS,
+    RELEASE,
     Advertise,
     AskRobot,
+    BusRequest,
+    EditMission,
     Publish,
+    ReadTested,
+    SaveSettings,
+    SendGoal,
+    Serve,
+    ServeAction,
     ServiceCall,
     Subscribe,
+    TailLog,
     Unadvertise,
     Unsubscribe,
     Unwatch,
     Watch,
 )
 from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist, Vector3
+from rbxcompose.msgs.rcl_interfaces import GetParameters, ParameterValue
 from rbxcompose.msgs.sensor_msgs import Image, LaserScan
 from rbxcompose.msgs.std_msgs import ColorRGBA, Float32, Header, String
 from rbxcompose.msgs.std_srvs import SetBool
@@ -198,6 +208,8 @@ def test_each_failed_call_is_answered_with_values() -> None:
         ("/strange", {}, "is not known here"),
         ("/lamp", {"datum": 1}, "has no field 'datum'"),
         ("/lamp", [True, True], "has 1 fields"),
+        ("/lamp", {"data": 10**400}, "expected"),
+        ("/console/ask", {"type": "mission.RunMission", "mission": "\ud800"}, "surrogates"),
         ("/rosapi/set_param", {}, "'name' is a text"),
         ("/rosapi/get_param", {"name": "/nobody:speed"}, "no node with a parameter"),
         ("/rosapi/message_details", {"type": "toy_msgs/Toy"}, "is not known here"),
@@ -343,7 +355,9 @@ def test_what_is_no_window_is_refused(path: str) -> None:
         ('{"op": "publish", "topic": "/level", "msg": {"data": "x"}}', "expected a number"),
         ('{"op": "publish", "topic": "/text", "type": "std_msgs/String", "msg": {"data": "\\ud800"}}', "surrogates"),
         ('{"op": "call_service"}', "'service'"),
+        (f'{{"op": "service_response", "service": "/x", "id": "{"1" * 5000}"}}', "no open request"),
         ('{"op": "set_level", "level": "loud"}', "a level"),
+        (f'{{"op": "set_level", "level": {"[" * 101}{"]" * 101}}}', "nested"),
         ('{"op":' * 10_000, "nested"),
         ('{"op": "publish", "msg": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested"),
         (" " * (LARGEST + 1), "at most 8 MiB"),
@@ -590,6 +604,116 @@ def test_no_other_name_leads_round_a_guard(topic: str, pattern: str) -> None:
     assert "the role 'configure'" in status["msg"]
 
 
+def needed_by(request: BusRequest, guards: dict[str, Role]) -> Role:
+    """Return the least role that may have the bus asked for something: by what is asked, not by how."""
+    least, names = Role.OPERATE, list[str]()
+    match request:
+        case Publish(topic) | Advertise(topic):
+            names = [topic]
+        case SendGoal(action=action):
+            names = [action]
+        case ServiceCall(service=service, type=type_):
+            word, names = type_.TYPE.rpartition("/")[2], [service, service.removesuffix("/pause")]
+            if word.endswith(("Parameters", "ParametersAtomically")):
+                least = Role.CONFIGURE if word.startswith(("Set", "Change")) else Role.VIEW
+        case SaveSettings() | Serve() | ServeAction():
+            least = Role.CONFIGURE
+        case EditMission(request=asked):
+            writes = asked["do"].endswith(("new", "save", "apply", "revert"))
+            least = Role.CONFIGURE if writes else Role.OPERATE if asked["do"] in ("test", "try") else Role.VIEW
+        case AskRobot(request=asked):
+            least = Role.OPERATE if asked is RELEASE else Role.VIEW
+        case Subscribe() | Unsubscribe() | Watch() | TailLog() | ReadTested():
+            return Role.VIEW
+    names += [name.partition("/_action/")[0] for name in names]
+    return max([least, *(guards[name] for name in names if name in guards)])
+
+
+NODE = {"get_parameters": "GetParameters", "set_parameters": "SetParameters", "list_parameters": "ListParameters"}
+SERVICES = {f"/level/{name}": f"rcl_interfaces/srv/{type_}" for name, type_ in NODE.items()} | {
+    "/level/change_parameters": "rbxcompose_parameters/srv/ChangeParameters",
+    "/go_to/pause": "std_srvs/srv/SetBool",
+    "/rosapi/strange": "std_srvs/srv/SetBool",
+    "/get_parameters": "std_srvs/srv/SetBool",
+}
+GATEWAYS = ("stop", "release", "drive", "ask", "save", "log", "mission/new", "mission/save", "mission/look")
+TARGETS = st.sampled_from(
+    ["/level", "/cmd_vel", TELEOP, "/lamp", "//lamp", "/./lamp", "/LAMP", "/go_to", "/move_base", *SERVICES]
+    + [f"{action}/{part}" for action in ("/go_to", "/move_base") for part in ("goal", "cancel", "_action/feedback")]
+    + ["/go_to/_action/cancel_goal", "/go_to/_action/send_goal"]
+    + [f"/console/{name}" for name in (*GATEWAYS, "robot/apply", "robot/save", "windows/drive")]
+    + [f"/rosapi/{name}" for name in ("nodes", "set_param", "get_param", "get_param_names")]
+).flatmap(lambda name: st.sampled_from([name, name.removeprefix("/")]))
+KEY_OF = {
+    **dict.fromkeys(("publish", "advertise", "unadvertise", "subscribe", "unsubscribe"), "topic"),
+    **dict.fromkeys(("call_service", "advertise_service", "unadvertise_service", "service_response"), "service"),
+    **dict.fromkeys(("send_action_goal", "cancel_action_goal", "advertise_action", "action_result"), "action"),
+}
+ARGUMENTS = [
+    {"name": "/level:runtime", "value": "1"},
+    {"mission": "m", "text": "t", "hash": "", "template": "t", "dry_run": True},
+    {"subject": "places", "changes": [], "hashes": {}, "generation": 1},
+    {"take": True, "type": "robot.StopRobot"},
+    {},
+]
+ASKED = st.sampled_from([*KEY_OF, *("call_service",) * 10]).flatmap(
+    lambda op: st.fixed_dictionaries(
+        {"op": st.just(op), KEY_OF[op]: TARGETS, "args": st.sampled_from(ARGUMENTS)},
+        optional={"type": st.sampled_from(["std_msgs/Float32", "std_srvs/SetBool"]), "id": st.just("g")},
+    )
+)
+GUARDS = st.dictionaries(
+    st.sampled_from(["/go_to", "/lamp", TELEOP, "/cmd_vel", "/level", *SERVICES]), st.sampled_from(Role), max_size=3
+)
+
+
+def came_of(
+    frames: list[dict[str, Any]], role: Role, guards: dict[str, Role]
+) -> tuple[list[Any], list[BusRequest], Any]:
+    """Return what frames lead to: what the client gets, what the bus is asked for, and the notes."""
+    drive = DriveLimits(TELEOP, "geometry_msgs/msg/Twist", 0.5, 1.0, frozenset({"/cmd_vel"}))
+    room = Room(drive, guarded=guards)
+    room.graph.served |= SERVICES
+    client, told, asked = room.client(role), list[Any](), list[BusRequest]()
+    for frame in frames:
+        client.sends(json.dumps(frame))
+        while room.requests:
+            request = room.requests.pop(0)
+            asked.append(request)
+            if isinstance(request, ServiceCall) and request.type is GetParameters:
+                value = ParameterValue(type=3, double_value=60.0)
+                room.bridge.answered(request.number, GetParameters.Response(values=(value,)))
+                room.requests += room.bridge.take_requests()
+        told += client.gets()
+    return told, asked, list(room.bridge.notes)
+
+
+CALLED = {"op": "call_service", "service": "/rosapi/set_param", "args": ARGUMENTS[0]}
+ANY_FRAMES = st.lists(ASKED, min_size=30, max_size=60)
+MORE = st.dictionaries(st.sampled_from(["topic", "service", "action"]), TARGETS)
+
+
+@given(ANY_FRAMES, MORE, st.sampled_from(Role), GUARDS)
+@example([CALLED], {"topic": "/rosapi/nodes"}, Role.VIEW, {})
+@example([{"op": "call_service", "service": "/level/change_parameters"}], {}, Role.OPERATE, {})
+@example([{"op": "call_service", "service": "/rosapi/strange"}], {}, Role.VIEW, {})
+@example([{"op": "send_action_goal", "action": "go_to"}], {"topic": "/x"}, Role.OPERATE, {"/go_to": Role.CONFIGURE})
+@example([{"op": "call_service", "service": "/go_to/pause"}], {}, Role.OPERATE, {"/go_to": Role.CONFIGURE})
+def test_nobody_gets_done_what_needs_a_higher_role(
+    frames: list[dict[str, Any]], more: dict[str, str], role: Role, guards: dict[str, Role]
+) -> None:
+    for request in came_of([{**more, **frame} for frame in frames], role, guards)[1]:
+        assert needed_by(request, guards) <= role, request
+
+
+@given(ANY_FRAMES, MORE, st.sampled_from(Role), GUARDS)
+@example([CALLED], {"topic": "/rosapi/nodes"}, Role.CONFIGURE, {})
+def test_no_other_key_of_a_frame_changes_what_it_leads_to(
+    frames: list[dict[str, Any]], more: dict[str, str], role: Role, guards: dict[str, Role]
+) -> None:
+    assert came_of([{**more, **frame} for frame in frames], role, guards) == came_of(frames, role, guards)
+
+
 def test_a_token_of_the_operation_auth_gives_a_role_and_never_takes_one() -> None:
     room = Room(admit=lambda token: {"o": Role.OPERATE, "v": Role.VIEW}.get(token, Role.NOBODY))
     client = room.client(Role.NOBODY)
@@ -610,6 +734,9 @@ def test_the_log_says_once_who_does_what() -> None:
         client.does("publish", topic="/level", msg={"data": value})
     client.does("subscribe", topic="/odom")
     client.does("call_service", service="/lamp", args=[True])
+    for topic, msg in (("/a b", {}), ("/odom", {"data": 1}), ("/cmd_vel", {})):
+        client.does("publish", topic=topic, msg=msg)
+    client.does("call_service", service="/lamp", args=[1, 2])
     assert list(room.bridge.notes) == [
         "192.168.1.7 (operate): publish /level",
         "192.168.1.7 (operate): call_service /lamp",

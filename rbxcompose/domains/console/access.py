@@ -18,7 +18,6 @@ from contextlib import suppress
 from enum import IntEnum
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import replace_file, state_folder
@@ -80,28 +79,51 @@ _SERVICES = {
     "/rosapi/set_param": Role.CONFIGURE,
     "/rosapi/delete_param": Role.CONFIGURE,
 }
-_NAMES = ("topic", "service", "action")
-_SHOWS_PARAMETERS = ("/list_parameters", "/describe_parameters", "/get_parameters", "/get_parameter_types")
-_SETS_PARAMETERS = ("/set_parameters", "/set_parameters_atomically")  # of each node
+OF_PARAMETERS = {
+    "rcl_interfaces/srv/DescribeParameters": Role.VIEW,
+    "rcl_interfaces/srv/GetParameters": Role.VIEW,
+    "rcl_interfaces/srv/GetParameterTypes": Role.VIEW,
+    "rcl_interfaces/srv/ListParameters": Role.VIEW,
+    "rcl_interfaces/srv/SetParameters": Role.CONFIGURE,
+    "rcl_interfaces/srv/SetParametersAtomically": Role.CONFIGURE,
+    "rbxcompose_parameters/srv/ChangeParameters": Role.CONFIGURE,
+}
+"""The roles for the services that nodes have for their parameters, by type: any service may have their names."""
 
 
-def needed(frame: Mapping[str, Any], guarded: Mapping[str, Role]) -> Role:
-    """Return the least role that may have a frame of rosbridge carried out.
+@dataclass(frozen=True, slots=True)
+class Target:
+    """An operation and what it is carried out on: all that is asked when it is checked, noted and done."""
+
+    op: str
+    name: str = ""
+    """The full name of the topic, service or action; empty if the operation has none."""
+    written: str = ""
+    """That name as the client writes it."""
+    others: tuple[str, ...] = ()
+    """Other names by which a guard may mean it."""
+    type: str = ""
+    """The type of a service of the bus; empty for those of the gateway."""
+    old: tuple[str, str, str] | None = None
+    """Of a topic that actions have in ROS 1: the name that it gives the action, the action, and which topic it is."""
+
+
+def needed(target: Target, guarded: Mapping[str, Role]) -> Role:
+    """Return the least role that may have an operation of rosbridge carried out.
 
     Args:
-        frame: the frame.
+        target: the operation, and what it is carried out on.
         guarded: least roles by patterns of names of topics, services and actions: `/arm/*`.
     """
-    op = frame.get("op")
-    least = _ROLES.get(op, Role.OPERATE) if isinstance(op, str) else Role.VIEW
-    name = next((f"/{value.lstrip('/')}" for key in _NAMES if isinstance(value := frame.get(key), str)), "")
-    if op == "call_service":
-        looks = name.startswith("/rosapi/") or name.endswith(_SHOWS_PARAMETERS)
-        otherwise = Role.CONFIGURE if name.endswith(_SETS_PARAMETERS) else Role.VIEW if looks else Role.OPERATE
-        least = _SERVICES.get(name, otherwise)
-    if least <= Role.VIEW and op != "call_service":
+    least = _ROLES.get(target.op, Role.OPERATE)
+    if target.op == "call_service" and target.type:
+        least = OF_PARAMETERS.get(target.type, Role.OPERATE)
+    elif target.op == "call_service":
+        least = _SERVICES.get(target.name, Role.VIEW if target.name.startswith("/rosapi/") else Role.OPERATE)
+    elif least <= Role.VIEW:
         return least  # looking harms nobody
-    return max(least, *(role for pattern, role in guarded.items() if fnmatchcase(name, pattern)), Role.NOBODY)
+    names = target.name, *target.others
+    return max([least, *(guarded[each] for each in guarded if any(fnmatchcase(name, each) for name in names))])
 
 
 # Tokens

@@ -8,16 +8,18 @@ from __future__ import annotations
 import json
 import math
 import re
+import sys
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.printable import plain
 from rbxcompose.domains.console import old_actions, rosapi
-from rbxcompose.domains.console.access import Role, needed
+from rbxcompose.domains.console.access import Role, Target, needed
 from rbxcompose.domains.console.encodings import (
     COMPRESSIONS,
     SMALLEST_PIECE,
@@ -32,6 +34,7 @@ from rbxcompose.domains.console.encodings import (
 from rbxcompose.domains.console.json_messages import WrongMessageError, arguments, encoded, from_json, to_json
 from rbxcompose.domains.console.lease import LATEST, DriveLease, DriveLimits, Lateness, limited, moves
 from rbxcompose.domains.console.rosapi import GraphView, absolute
+from rbxcompose.missions.sources import PAUSE
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.rcl_interfaces import GetParameters, ListParameters, SetParameters
 from rbxcompose.msgs.types import Action, Message, Service
@@ -39,6 +42,7 @@ from rbxcompose.sdk import parameters
 from rbxcompose.sdk.bound import Ended, Outcome
 
 LARGEST = 8 * 1024 * 1024  # [characters] of a frame
+DEEPEST = 100  # lists and maps of a frame, each within the one before
 MOST_PER_SECOND = 200  # frames of a client
 MOST_SUBSCRIPTIONS = 200  # of a client; as many topics may it advertise, and as many calls may be open
 MOST_ACTIONS = 20  # that a client serves; each is eight ends on the bus
@@ -58,13 +62,20 @@ LEVELS = ("info", "warning", "error", "none")
 
 WINDOWS = "/console/windows/"
 DRIVE_WINDOW = f"{WINDOWS}drive"  # who holds the drive lease
+_DRIVES = "/console/drive"
 _QUERY = re.compile(r"(?P<about>\w+)/(?P<name>\w+)(?P<values>(/\w+/\w+)*)", re.ASCII)
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"\w+(/(msg|srv|action))?/\w+", re.ASCII)
 _SETTING = re.compile(r"[A-Za-z_]\w*(\.\w+)*", re.ASCII)
 _HASH = re.compile(r"[0-9a-f]{0,64}", re.ASCII)
 _LONGEST_ROS_NAME = 247
+_NODE_SERVICES: Mapping[type[Service[Any, Any]], str] = {
+    GetParameters: "get_parameters",
+    ListParameters: "list_parameters",
+    SetParameters: "set_parameters",
+}
 _CANCELS = "/_action/cancel_goal"  # the end of the name of the service that cancels goals of an action
+_TOO_DEEP = f"lists and maps are nested more than {DEEPEST} deep"
 _SHOWN = 60  # characters of what a client sent, in a status
 
 
@@ -522,6 +533,7 @@ class Bridge:
         self._served: dict[str, _Served] = {}
         self._served_actions: dict[str, _ServedAction] = {}
         self._goals: dict[int, _Goal] = {}
+        self._promised: dict[int, str] = {}  # notes of what calls will have changed
         self._old_statuses: dict[str, dict[object, tuple[int, str]]] = {}  # by name of an action, then of a goal
         self._clients_so_far = self._calls_so_far = 0
         self._requests: list[BusRequest] = []
@@ -726,6 +738,8 @@ class Bridge:
 
     def robot_answered(self, number: int, answer: object, refusal: str = "") -> None:
         """Pass on what the robot answered to a request, or why it refused."""
+        if (note := self._promised.pop(number, "")) and not refusal:
+            self.notes.append(note)
         message = refusal or (answer if isinstance(answer, str) else "")
         self._respond(number, {"success": not refusal, "message": message, "answer": answer}, is_good=True)
 
@@ -752,64 +766,93 @@ class Bridge:
             client.piece_size = min(client.piece_size or least, least)
         if not isinstance(data.get("id"), str | int | float | None):
             raise BadFrameError("an 'id' is a text")
-        if (operation := _OPERATIONS.get(op)) is not None:
-            if op not in _ANSWERED:
-                self._require(client, data)
-            operation(self, client, data)
-        else:
+        if op not in _OPERATIONS:
             raise BadFrameError(f"there is no operation '{_short(op)}'")
+        operation, key = _OPERATIONS[op]
+        target = self._target(op, key, data.get(key)) if key else Target(op)
+        if op in _ANSWERED:
+            operation(self, client, data, target)
+        else:
+            self._permitted(client, target, partial(operation, self, client, data, target))
 
-    def _require(self, client: _Client, data: Mapping[str, Any]) -> None:
-        """Refuse what a client's role may not, and note what changes something.
+    def _target(self, op: str, key: str, name: object) -> Target:
+        """Return what an operation is carried out on that names a topic, a service or an action.
 
         Raises:
-            BadFrameError: if another role is needed.
+            BadFrameError: if that is no name.
         """
-        least = max(needed(frame, self._guarded) for frame in self._meanings(data))
+        if not isinstance(name, str) or not _is_name(name):
+            raise BadFrameError(f"'{key}' is the name of {'an' if key == 'action' else 'a'} {key}")
+        full = done = absolute(name)
+        if key == "service":
+            return self._service_target(op, full, name)
+        whole, old = _whole(full), None
+        if key == "topic":
+            done = full if op in _LISTENS else self._commanded(full)
+            if (old := self._old_parts(done)) is not None:
+                whole = old[1]
+        return Target(op, done, name, (full, whole), old=old)
+
+    def _service_target(self, op: str, service: str, written: str = "") -> Target:
+        actions, whole = self._graph.actions(), _whole(service)
+        type_ = "" if service in _OWN or service in _ROSAPI else self._graph.services().get(service, "")
+        if service == f"{whole}{_CANCELS}" and whole in actions:
+            type_ = "action_msgs/srv/CancelGoal"  # hidden, as in ROS 2, but pages cancel goals that others sent
+        if (paused := service.removesuffix(f"/{PAUSE}")) in actions:
+            whole = paused
+        elif service == _DRIVES and self._drive is not None:
+            whole = self._drive.topic
+        return Target(op, service, written, (whole,), type_)
+
+    def _require(self, client: _Client, target: Target) -> Role:
+        """Refuse what a client's role may not; return the role that is needed.
+
+        Raises:
+            BadFrameError: if it has a lower one.
+        """
+        least = needed(target, self._guarded)
         if client.role < least:
             raise BadFrameError(f"this needs the role '{least.word}'; yours is '{client.role.word}'")
-        if least > Role.VIEW:
-            name = next((str(data[key]) for key in ("topic", "service", "action", "id") if key in data), "")
-            if data["op"] != "publish" or absolute(name) not in client.advertised:
-                self._note(client, f"{data['op']} {_short(name)}")
+        return least
 
-    def _meanings(self, data: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-        """Yield a frame, and what it amounts to if its topic or service stands for another one, or for an action."""
-        yield data
-        if data.get("op") in ("publish", "advertise") and isinstance(topic := data.get("topic"), str):
-            yield {**data, "topic": self._commanded(absolute(topic))}
-            if (parts := self._old_parts(absolute(topic))) is not None:
-                yield {"op": "send_action_goal", "action": parts[1]}
-        if isinstance(service := data.get("service"), str) and service.endswith(_CANCELS):
-            yield {"op": "cancel_action_goal", "action": absolute(service).removesuffix(_CANCELS)}
+    def _permitted(self, client: _Client, target: Target, do: Callable[[], None]) -> None:
+        """Do what a client may, and note it if it changes something."""
+        least = self._require(client, target)
+        is_known = target.name in client.advertised
+        do()
+        is_new = not is_known and target.name in client.advertised
+        if least > Role.VIEW and (target.op != "publish" or is_new or target.old is not None):
+            text = f"{target.op} {target.name}"
+            if client.noted != text:
+                client.noted = text
+                self.notes.append(f"{client.who} ({client.role.word}): {text}")
 
-    def _note(self, client: _Client, text: str) -> None:
-        if client.noted != text:
-            client.noted = text
-            self.notes.append(f"{client.who} ({client.role.word}): {text}")
+    def _promise(self, client: _Client, number: int, text: str) -> None:
+        """Note what a request changes once that is done, also if its client is gone by then."""
+        self._promised[number] = f"{client.who} ({client.role.word}): {text}"
 
-    def _fragment(self, client: _Client, data: Mapping[str, Any]) -> None:
+    def _fragment(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
         if (frame := client.pieces.add(data)) is not None:
             self._carry_out(client, _within(frame))
 
-    def _png(self, client: _Client, data: Mapping[str, Any]) -> None:
+    def _png(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
         self._carry_out(client, _within(from_png(data.get("data"), LARGEST)))
 
-    def _auth(self, client: _Client, data: Mapping[str, Any]) -> None:
+    def _auth(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
         """Give a client the role of its token, which is the `mac` of rosbridge's `auth`."""
         role = self._admit(token) if isinstance(token := data.get("mac"), str) else Role.NOBODY
         if role is Role.NOBODY:
             raise BadFrameError("'mac' is no token of this robot")
         client.role = max(client.role, role)
 
-    def _subscribe(self, client: _Client, data: Mapping[str, Any]) -> None:
-        name, topic = _topic_of(data)
+    def _subscribe(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+        name, topic = target.written, target.name
         if (compression := data.get("compression") or "none") not in COMPRESSIONS:
             raise BadFrameError(f"a compression is one of {', '.join(COMPRESSIONS)}, not '{_short(compression)}'")
         throttle = _count(data, "throttle_rate", math.inf) / 1000
         wish = _Wish(throttle, min(_count(data, "queue_length"), LONGEST_QUEUE), compression)
         is_window = topic.startswith(WINDOWS)
-        is_old = self._old_parts(topic) is not None
+        is_old = target.old is not None
         message = None if is_window or is_old else self._message_on(topic, data)
         if is_window and topic != DRIVE_WINDOW and not _QUERY.fullmatch(topic.removeprefix(WINDOWS)):
             raise BadFrameError(f"after '{WINDOWS}' come a subject, a query, and its fields with their values")
@@ -836,8 +879,8 @@ class Bridge:
             if stream.offer(last, self._now):
                 self.woken.add(client.number)
 
-    def _unsubscribe(self, client: _Client, data: Mapping[str, Any]) -> None:
-        name, _ = _topic_of(data)
+    def _unsubscribe(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+        name = target.written
         if (stream := client.streams.get(name)) is None:
             raise BadFrameError(f"there is no subscription to '{name}'")
         if (key := _key(data)) is None:
@@ -850,28 +893,25 @@ class Bridge:
         else:
             self._end_stream(client, name)
 
-    def _advertise(self, client: _Client, data: Mapping[str, Any]) -> None:
-        topic = self._commanded(_topic_of(data)[1])
-        if self._old_parts(topic) is not None:
-            return  # it is taken here
-        self._declare(client, topic, self._message_on(topic, data), is_latched=data.get("latch") is True)
+    def _advertise(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+        if target.old is None:  # else it is taken here
+            message = self._message_on(target.name, data)
+            self._declare(client, target.name, message, is_latched=data.get("latch") is True)
 
-    def _unadvertise_op(self, client: _Client, data: Mapping[str, Any]) -> None:
-        name, topic = _topic_of(data)
-        topic = self._commanded(topic)
-        if self._old_parts(topic) is not None:
+    def _unadvertise_op(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+        topic = target.name
+        if target.old is not None:
             return
         if client.advertised.pop(topic, None) is None:
-            raise BadFrameError(f"'{name}' is not advertised")
+            raise BadFrameError(f"'{target.written}' is not advertised")
         if self._drive is not None and topic == self._drive.topic:
             self._halt_if(self.lease.release(client.number))  # while there is a publisher
         self._unadvertise(topic)
 
-    def _publish(self, client: _Client, data: Mapping[str, Any]) -> None:
-        name, topic = _topic_of(data)
-        topic = self._commanded(topic)
-        if (parts := self._old_parts(topic)) is not None:
-            self._publish_old(client, *parts, data.get("msg"))
+    def _publish(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+        topic = target.name
+        if target.old is not None:
+            self._publish_old(client, *target.old, data.get("msg"))
             return
         if (type_ := client.advertised.get(topic)) is None:
             type_ = self._message_on(topic, data)
@@ -882,7 +922,7 @@ class Bridge:
                 self._status(client, "warning", f"a command was dropped: it is {late * 1000:.0f} ms late")
                 return
             message = limited(message, self._drive)
-            if not self._may_drive(client, name, is_moving=moves(message)):
+            if not self._may_drive(client, target.written, is_moving=moves(message)):
                 return
         self._declare(client, topic, type_, is_latched=data.get("latch") is True)
         self._requests.append(Publish(topic, message))
@@ -911,54 +951,49 @@ class Bridge:
             self.lease.renew(client.number, self._now)
         return True
 
-    def _call_service(self, client: _Client, data: Mapping[str, Any]) -> None:
-        name, full = _service_of(data)
+    def _call_service(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
         if client.open_calls >= MOST_SUBSCRIPTIONS:
             raise BadFrameError(f"at most {MOST_SUBSCRIPTIONS} calls of a client are open")
         self._calls_so_far += 1
-        number, given = self._calls_so_far, data.get("args")
-        self._calls[number] = _Waiting(client.number, data.get("id"), name)
+        number = self._calls_so_far
+        self._calls[number] = _Waiting(client.number, data.get("id"), target.written)
         client.open_calls += 1
         try:
-            self._require(client, data)
-            api = full.removeprefix("/rosapi/")
-            values = None
-            if full in _OWN:
-                values = _OWN[full](self, client, _named(given, _DRIVE_ARGUMENTS), number)
-            elif api in rosapi.ARGUMENTS and api != full:
-                values = self._rosapi(api, _named(given, rosapi.ARGUMENTS[api]))
-            elif api in _PARAMETERS and api != full:
-                ask, names = _PARAMETERS[api]
-                ask(self, _named(given, names), number)
-            else:
-                self._call(number, full, given, data)
-            if values is not None:
-                self._respond(number, values, is_good=True)
+            self._permitted(client, target, partial(self._begin_call, client, number, data, target))
         except (BadFrameError, WrongMessageError) as error:
             self._respond(number, str(error), is_good=False)
 
-    def _call(self, number: int, service: str, given: object, data: Mapping[str, Any]) -> None:
-        known = self._graph.services().get(service)
-        if service.endswith(_CANCELS) and service.removesuffix(_CANCELS) in self._graph.actions():
-            known = "action_msgs/srv/CancelGoal"  # hidden, as in ROS 2, but pages cancel goals that others sent
-        if known is None:
-            raise BadFrameError(f"there is no service '{service}'")
-        try:
-            type_ = registry.service(known)
-        except KeyError as error:
-            raise BadFrameError(f"the type '{known}' of '{service}' is not known here") from error
+    def _begin_call(self, client: _Client, number: int, data: Mapping[str, Any], target: Target) -> None:
+        given, values = data.get("args"), None
+        if target.name in _OWN:
+            values = _OWN[target.name](self, client, _named(given, _DRIVE_ARGUMENTS), number)
+        elif target.name in _ROSAPI:
+            api = target.name.removeprefix("/rosapi/")
+            if api in _PARAMETERS:
+                ask, names = _PARAMETERS[api]
+                ask(self, _named(given, names), number)
+            else:
+                values = self._rosapi(api, _named(given, rosapi.ARGUMENTS[api]))
+        else:
+            self._call(number, target, given, data)
+        if values is not None:
+            self._respond(number, values, is_good=True)
+
+    def _call(self, number: int, target: Target, given: object, data: Mapping[str, Any]) -> None:
+        type_ = self._type_of(target.name, target.type, data.get("type"), "service")
         request = from_json(type_.Request, arguments(type_.Request, given), self._stamp)
         timeout = data.get("timeout")
         is_given = isinstance(timeout, int | float) and 0 < timeout < LONGEST_PATIENCE
-        self._requests.append(ServiceCall(number, service, type_, request, float(timeout) if is_given else PATIENCE))  # type: ignore[arg-type]
+        patience = float(timeout) if is_given else PATIENCE  # type: ignore[arg-type]
+        self._requests.append(ServiceCall(number, target.name, type_, request, patience))
 
     # Services of clients
 
-    def _advertise_service(self, client: _Client, data: Mapping[str, Any]) -> None:
-        (name, service), type_ = _service_of(data), data.get("type")
+    def _advertise_service(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+        service, type_ = target.name, data.get("type")
         if not isinstance(type_, str) or not _TYPE.fullmatch(type_):
             raise BadFrameError("'type' is the name of a type of services")
-        if service in self._graph.services() or service in self._served or service in _OWN:
+        if service in self._graph.services() or service in self._served or service in _OWN or service in _ROSAPI:
             raise BadFrameError(f"'{service}' is served already")
         if sum(served.client == client.number for served in self._served.values()) >= MOST_SUBSCRIPTIONS:
             raise BadFrameError(f"a client serves at most {MOST_SUBSCRIPTIONS} services")
@@ -966,22 +1001,21 @@ class Bridge:
             known = registry.service(type_)
         except KeyError as error:
             raise BadFrameError(f"the type '{type_}' is not known here") from error
-        self._served[service] = _Served(client.number, name, known)
+        self._served[service] = _Served(client.number, target.written, known)
         self._requests.append(Serve(service, known))
 
-    def _unadvertise_service(self, client: _Client, data: Mapping[str, Any]) -> None:
-        service = _service_of(data)[1]
+    def _unadvertise_service(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+        service = target.name
         if (served := self._served.get(service)) is None or served.client != client.number:
             raise BadFrameError(f"'{service}' is not served by this client")
         self._end_serving(service)
 
-    def _service_response(self, client: _Client, data: Mapping[str, Any]) -> None:
+    def _service_response(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
         """Pass on what a client answers to a request."""
-        service = _service_of(data)[1]
+        service = target.name
         served = self._served.get(service)
-        text = str(data.get("id")).removeprefix("request:")
-        number = int(text) if text.isdecimal() else -1
-        if served is None or served.client != client.number or number not in served.open:
+        number = next((one for one in served.open if data.get("id") == f"request:{one}"), -1) if served else -1
+        if served is None or served.client != client.number or number < 0:
             raise BadFrameError(f"there is no open request to '{service}' of this id")
         if data.get("result") is False:
             self._requests.append(ServiceAnswer(number, None, _short(data.get("values")) or "it was refused"))
@@ -997,8 +1031,8 @@ class Bridge:
 
     # Actions of clients
 
-    def _advertise_action(self, client: _Client, data: Mapping[str, Any]) -> None:
-        (name, action), type_ = _action_of(data), data.get("type")
+    def _advertise_action(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+        action, type_ = target.name, data.get("type")
         if not isinstance(type_, str) or not _TYPE.fullmatch(type_):
             raise BadFrameError("'type' is the name of a type of actions")
         if action in self._graph.actions() or action in self._served_actions:
@@ -1009,11 +1043,11 @@ class Bridge:
             known = registry.action(type_)
         except KeyError as error:
             raise BadFrameError(f"the type '{type_}' is not known here") from error
-        self._served_actions[action] = _ServedAction(client.number, name, known)
+        self._served_actions[action] = _ServedAction(client.number, target.written, known)
         self._requests.append(ServeAction(action, known))
 
-    def _unadvertise_action(self, client: _Client, data: Mapping[str, Any]) -> None:
-        action = _action_of(data)[1]
+    def _unadvertise_action(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+        action = target.name
         if (served := self._served_actions.get(action)) is None or served.client != client.number:
             raise BadFrameError(f"'{action}' is not served by this client")
         self._end_serving_action(action)
@@ -1022,14 +1056,14 @@ class Bridge:
         del self._served_actions[action]
         self._requests.append(UnserveAction(action))  # its goal is lost, and its sender learns that
 
-    def _action_feedback(self, client: _Client, data: Mapping[str, Any]) -> None:
-        served, number = self._carried_out(client, data)
+    def _action_feedback(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+        served, number = self._carried_out(client, data, target.name)
         feedback = from_json(served.type.Feedback, data.get("values") or {}, self._stamp)
         self._requests.append(GoalFeedback(number, feedback))
 
-    def _action_result(self, client: _Client, data: Mapping[str, Any]) -> None:
+    def _action_result(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
         """Take how a goal ended: by its `status`, or else by whether there is a `result`."""
-        served, number = self._carried_out(client, data)
+        served, number = self._carried_out(client, data, target.name)
         by_default = _STATUSES[Outcome.ABORTED if data.get("result") is False else Outcome.SUCCEEDED]
         status, values = data.get("status", by_default), data.get("values")
         outcome = next((outcome for outcome, known in _STATUSES.items() if known == status), None)
@@ -1040,8 +1074,7 @@ class Bridge:
         self._requests.append(GoalEnd(number, outcome, result, reason))
         served.goal = None
 
-    def _carried_out(self, client: _Client, data: Mapping[str, Any]) -> tuple[_ServedAction, int]:
-        action = _action_of(data)[1]
+    def _carried_out(self, client: _Client, data: Mapping[str, Any], action: str) -> tuple[_ServedAction, int]:
         served = self._served_actions.get(action)
         is_own = served is not None and served.client == client.number and served.goal is not None
         if served is None or served.goal is None or not is_own or data.get("id") != f"goal:{served.goal}":
@@ -1061,7 +1094,7 @@ class Bridge:
                 return {"value": text, "successful": False, "reason": f"there is no parameter '{name}'"}
             return {"value": json.dumps(_finite(found)), "successful": True, "reason": ""}
 
-        self._ask_node(number, f"{node}/get_parameters", {"names": [name]}, then)
+        self._ask_node(number, node, GetParameters, {"names": [name]}, then)
 
     def _has_param(self, given: Mapping[str, Any], number: int) -> None:
         node, name = self._parameter(given)
@@ -1069,48 +1102,57 @@ class Bridge:
         def then(response: GetParameters.Response) -> dict[str, Any]:
             return {"exists": any(value.type for value in response.values)}
 
-        self._ask_node(number, f"{node}/get_parameters", {"names": [name]}, then)
+        self._ask_node(number, node, GetParameters, {"names": [name]}, then)
 
     def _set_param(self, given: Mapping[str, Any], number: int) -> None:
         """Set a parameter, whose type decides how its value is read: JavaScript writes 2.0 as 2."""
         node, name = self._parameter(given)
+        value: Any
         try:
-            value = json.loads(text) if isinstance(text := given.get("value"), str) else text
+            value = _loaded(text) if isinstance(text := given.get("value"), str) else text
+        except BadFrameError:
+            raise
         except ValueError:
             value = text  # a text without its quotes
 
         def told(response: SetParameters.Response) -> dict[str, Any]:
-            (result,) = response.results
-            if not result.successful:
-                raise WrongMessageError(result.reason or "it was refused")
+            result = next(iter(response.results), None)
+            if result is None or not result.successful:
+                raise WrongMessageError(result.reason if result and result.reason else "it was refused")
             return {"successful": True, "reason": ""}
 
         def then(response: GetParameters.Response) -> None:
             now = parameters.from_message(response.values[0]) if response.values else None
-            wanted = float(value) if isinstance(now, float) and type(value) is int else value
-            if (message := parameters.to_message(wanted)) is None:
+            is_number = isinstance(now, float) and type(value) is int and abs(value) <= sys.float_info.max
+            if (message := parameters.to_message(float(value) if is_number else value)) is None:
                 raise WrongMessageError("no parameter can have this value")
             change = {"name": name, "value": to_json(message)}
-            self._ask_node(number, f"{node}/set_parameters", {"parameters": [change]}, told)
+            self._ask_node(number, node, SetParameters, {"parameters": [change]}, told)
 
-        self._ask_node(number, f"{node}/get_parameters", {"names": [name]}, then)
+        self._ask_node(number, node, GetParameters, {"names": [name]}, then)
 
     def _get_param_names(self, given: Mapping[str, Any], number: int) -> None:
         """List the parameters of all nodes, one after the other."""
-        left = [name for name in self._graph.services() if name.endswith("/list_parameters")]
-        found: list[str] = []
+        client, found = self._clients[self._calls[number].client], list[str]()
+        targets = (self._service_target("call_service", service) for service in self._graph.services())
+        left = [
+            target.name.removesuffix("/list_parameters")
+            for target in targets
+            if target.type == ListParameters.TYPE
+            and target.name.endswith("/list_parameters")
+            and needed(target, self._guarded) <= client.role
+        ]
 
         def ask() -> dict[str, Any] | None:
             if not left:
                 return {"names": found}
-            service = left.pop(0)
+            node = left.pop(0)
 
             def then(response: ListParameters.Response) -> dict[str, Any] | None:
-                node = service.removesuffix("/list_parameters")
                 found.extend(f"{node}:{name}" for name in response.result.names)
                 return ask()
 
-            self._ask_node(number, service, {}, then)
+            self._ask_node(number, node, ListParameters, {}, then)
             return None
 
         if (empty := ask()) is not None:
@@ -1126,46 +1168,61 @@ class Bridge:
         return node, parameter
 
     def _ask_node(
-        self, number: int, service: str, fields: Mapping[str, Any], then: Callable[[Any], dict[str, Any] | None]
+        self,
+        number: int,
+        node: str,
+        type_: type[Service[Any, Any]],
+        fields: Mapping[str, Any],
+        then: Callable[[Any], dict[str, Any] | None],
     ) -> None:
+        target = self._service_target("call_service", f"{node}/{_NODE_SERVICES[type_]}")
+        self._require(self._clients[self._calls[number].client], target)  # a guard of the node counts, too
         self._calls[number] = replace(self._calls[number], then=then)
-        self._call(number, service, fields, {})
+        self._call(number, target, fields, {"type": type_.TYPE})
 
     # Actions
 
-    def _send_goal(self, client: _Client, data: Mapping[str, Any]) -> None:
-        name, action = _action_of(data)
+    def _send_goal(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+        goal = _Goal(client.number, data.get("id"), target.written, target.name, is_old=False)
+        begin = partial(self._begin_goal, client, goal, data.get("args"), data.get("action_type"))
         try:
-            self._require(client, data)
-            wants_feedback = data.get("feedback") is True
-            goal = _Goal(client.number, data.get("id"), name, action, is_old=False)
-            self._begin_goal(client, goal, data.get("args"), wants_feedback=wants_feedback)
+            self._permitted(client, target, partial(begin, wants_feedback=data.get("feedback") is True))
         except (BadFrameError, WrongMessageError) as error:
-            refused = _Goal(client.number, data.get("id"), name, "", is_old=False)
-            self._tell(refused, "action_result", values=str(error), status=0, result=False)
+            self._tell(goal, "action_result", values=str(error), status=0, result=False)
 
-    def _begin_goal(self, client: _Client, goal: _Goal, given: object, *, wants_feedback: bool) -> None:
+    def _begin_goal(self, client: _Client, goal: _Goal, given: object, wanted: object, *, wants_feedback: bool) -> None:
         if client.open_calls >= MOST_SUBSCRIPTIONS:
             raise BadFrameError(f"at most {MOST_SUBSCRIPTIONS} calls of a client are open")
-        type_ = self._action_type(goal.action)
+        type_ = self._action_type(goal.action, wanted)
         message = from_json(type_.Goal, arguments(type_.Goal, given or {}), self._stamp)
         self._calls_so_far += 1
         self._goals[self._calls_so_far] = goal
         client.open_calls += 1
         self._requests.append(SendGoal(self._calls_so_far, goal.action, type_, message, wants_feedback))
 
-    def _action_type(self, action: str) -> type[Action[Any, Any, Any]]:
-        if (known := self._graph.actions().get(action)) is None:
-            raise BadFrameError(f"there is no action '{action}'")
-        try:
-            return registry.action(known)
-        except KeyError as error:
-            raise BadFrameError(f"the type '{known}' of '{action}' is not known here") from error
+    def _action_type(self, action: str, wanted: object = None) -> type[Action[Any, Any, Any]]:
+        found: type[Action[Any, Any, Any]] = self._type_of(action, self._graph.actions().get(action), wanted, "action")
+        return found
 
-    def _cancel_goal(self, client: _Client, data: Mapping[str, Any]) -> None:
-        """Cancel a goal of the client, by its id."""
-        wanted = data.get("id")
-        numbers = [number for number, goal in self._goals.items() if (goal.client, goal.id) == (client.number, wanted)]
+    def _type_of(self, name: str, known: str | None, wanted: object, kind: str) -> Any:
+        """Return the type of a service or an action; what a client takes it for, if it says so, must be that.
+
+        Raises:
+            BadFrameError: if there is none, or it is not known here, or another.
+        """
+        if not known:
+            raise BadFrameError(f"there is no {kind} '{name}'")
+        if wanted and (not isinstance(wanted, str) or registry.full_name(wanted, _KINDS[kind]) != known):
+            raise BadFrameError(f"'{name}' is of the type '{known}', not '{_short(wanted)}'")
+        try:
+            return registry.service(known) if kind == "service" else registry.action(known)
+        except KeyError as error:
+            raise BadFrameError(f"the type '{known}' of '{name}' is not known here") from error
+
+    def _cancel_goal(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+        """Cancel goals of the client to an action, by their id."""
+        wanted = client.number, data.get("id"), target.name
+        numbers = [number for number, goal in self._goals.items() if (goal.client, goal.id, goal.action) == wanted]
         if not numbers:
             raise BadFrameError("there is no goal of this id that has not ended")
         self._requests += map(CancelGoal, numbers)
@@ -1184,7 +1241,7 @@ class Bridge:
             if not isinstance(identity, str):
                 raise WrongMessageError("the id of a goal is a text")
             begun = _Goal(client.number, identity or f"goal {self._calls_so_far + 1}", name, action, is_old=True)
-            self._begin_goal(client, begun, goal, wants_feedback=True)
+            self._begin_goal(client, begun, goal, None, wants_feedback=True)
             self._note_old(begun, old_actions.ACTIVE)
         elif part == "cancel":
             wanted = message.get("id") or None
@@ -1216,12 +1273,12 @@ class Bridge:
         text = json.dumps(_finite(message), separators=(",", ":"))
         self._pass_on(f"{name}/{part}", _Shared(None, text), self._now)
 
-    def _set_level(self, client: _Client, data: Mapping[str, Any]) -> None:
+    def _set_level(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
         if (level := data.get("level")) not in LEVELS:
             raise BadFrameError(f"a level is one of {', '.join(LEVELS)}")
         client.level = LEVELS.index(level)
 
-    def _take_status(self, client: _Client, data: Mapping[str, Any]) -> None:
+    def _take_status(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
         """Ignore what a client reports: nobody here reads it."""
 
     # Services of the gateway
@@ -1283,10 +1340,10 @@ class Bridge:
             if not isinstance(value, _EDITED.get(key, str)):
                 raise WrongMessageError(f"'{key}' is missing, or of another type")
             request[key] = value
-        if given.get("dry_run") is True:
+        if name == "save" and given.get("dry_run") is True:
             request["dry_run"] = True
         elif name in _WRITES:
-            self._note(client, f"{_WRITES[name]} the mission {_short(request['mission'])}")
+            self._promise(client, number, f"{_WRITES[name]} the mission {_short(request['mission'])}")
         self._requests.append(EditMission(number, request))
 
     def _robot_service(self, client: _Client, given: Mapping[str, Any], number: int, name: str) -> None:
@@ -1296,21 +1353,19 @@ class Bridge:
             if not isinstance(value, kind):
                 raise WrongMessageError(f"'{key}' is missing, or of another type")
             request[key] = value
-        if given.get("dry_run") is True:
+        if name == "save" and given.get("dry_run") is True:
             request["dry_run"] = True
         elif name == "save":
-            self._note(client, f"saves {_short(request['subject'])} of the robot")
+            self._promise(client, number, f"saves {_short(request['subject'])} of the robot")
         elif name in _CHANGES:
-            self._note(client, _CHANGES[name])
+            self._promise(client, number, _CHANGES[name])
         self._requests.append(EditMission(number, request))
 
     def _rosapi(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
         """Return the answer of `/rosapi/NAME`."""
         found = rosapi.answer(name, given, self._graph, self._stamp)
         if name == "services":
-            found["services"] = sorted(
-                {*found["services"], *_OWN, *(f"/rosapi/{own}" for own in (*rosapi.ARGUMENTS, *_PARAMETERS))}
-            )
+            found["services"] = sorted({*found["services"], *_OWN, *_ROSAPI})
         return found
 
     # What they share
@@ -1419,28 +1474,31 @@ class Bridge:
         return requests
 
 
-_OPERATIONS: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any]], None]] = {
-    "advertise": Bridge._advertise,
-    "fragment": Bridge._fragment,
-    "png": Bridge._png,
-    "action_feedback": Bridge._action_feedback,
-    "action_result": Bridge._action_result,
-    "advertise_action": Bridge._advertise_action,
-    "advertise_service": Bridge._advertise_service,
-    "unadvertise_action": Bridge._unadvertise_action,
-    "unadvertise_service": Bridge._unadvertise_service,
-    "service_response": Bridge._service_response,
-    "cancel_action_goal": Bridge._cancel_goal,
-    "send_action_goal": Bridge._send_goal,
-    "auth": Bridge._auth,
-    "unadvertise": Bridge._unadvertise_op,
-    "publish": Bridge._publish,
-    "subscribe": Bridge._subscribe,
-    "unsubscribe": Bridge._unsubscribe,
-    "call_service": Bridge._call_service,
-    "set_level": Bridge._set_level,
-    "status": Bridge._take_status,
+_OPERATIONS: Mapping[str, tuple[Callable[[Bridge, _Client, Mapping[str, Any], Target], None], str]] = {
+    "advertise": (Bridge._advertise, "topic"),
+    "fragment": (Bridge._fragment, ""),
+    "png": (Bridge._png, ""),
+    "action_feedback": (Bridge._action_feedback, "action"),
+    "action_result": (Bridge._action_result, "action"),
+    "advertise_action": (Bridge._advertise_action, "action"),
+    "advertise_service": (Bridge._advertise_service, "service"),
+    "unadvertise_action": (Bridge._unadvertise_action, "action"),
+    "unadvertise_service": (Bridge._unadvertise_service, "service"),
+    "service_response": (Bridge._service_response, "service"),
+    "cancel_action_goal": (Bridge._cancel_goal, "action"),
+    "send_action_goal": (Bridge._send_goal, "action"),
+    "auth": (Bridge._auth, ""),
+    "unadvertise": (Bridge._unadvertise_op, "topic"),
+    "publish": (Bridge._publish, "topic"),
+    "subscribe": (Bridge._subscribe, "topic"),
+    "unsubscribe": (Bridge._unsubscribe, "topic"),
+    "call_service": (Bridge._call_service, "service"),
+    "set_level": (Bridge._set_level, ""),
+    "status": (Bridge._take_status, ""),
 }
+"""What carries out each operation, and the key that names what it is carried out on; no other key of a frame does."""
+_LISTENS = frozenset({"subscribe", "unsubscribe"})
+_KINDS = {"service": "srv", "action": "action"}
 _ANSWERED = frozenset({"call_service", "send_action_goal"})  # operations whose refusal is an answer of their own
 
 
@@ -1475,7 +1533,7 @@ ROBOT_TEXTS: Mapping[str, Mapping[str, tuple[type, object]]] = {
 _CHANGES = {"apply": "changes the robot to what its files say", "revert": "takes back a change of the robot"}
 _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str, Any] | None]] = {
     "/console/ask": Bridge._ask_service,
-    "/console/drive": Bridge._drive_service,
+    _DRIVES: Bridge._drive_service,
     "/console/log": Bridge._log_service,
     "/console/release": Bridge._release_service,
     "/console/save": Bridge._save_service,
@@ -1492,6 +1550,7 @@ _PARAMETERS: Mapping[str, tuple[Callable[[Bridge, Mapping[str, Any], int], None]
     "set_param": (Bridge._set_param, ("name", "value")),
 }
 """Services of rosapi that ask nodes, each with its arguments."""
+_ROSAPI = frozenset(f"/rosapi/{name}" for name in (*rosapi.ARGUMENTS, *_PARAMETERS))
 _DRIVE_ARGUMENTS = ("take", "name")
 
 
@@ -1499,14 +1558,33 @@ def _parsed(frame: str | bytes) -> dict[str, Any]:
     if len(frame) > LARGEST:
         raise BadFrameError(f"a frame has at most {LARGEST // 2**20} MiB")
     try:
-        data = json.loads(frame)
-    except RecursionError as error:
-        raise BadFrameError("the frame is nested too deeply") from error
+        data = _loaded(frame)
+    except BadFrameError:
+        raise
     except ValueError as error:
         raise BadFrameError("the frame is not JSON") from error
     if not isinstance(data, dict):
         raise BadFrameError("a frame is a map with an 'op'")
     return data
+
+
+def _loaded(text: str | bytes) -> Any:
+    """Return what a JSON text says, so flat that whatever reads it may do so level by level.
+
+    Raises:
+        BadFrameError: if it is nested too deeply.
+        ValueError: if it is not JSON.
+    """
+    try:
+        found = json.loads(text)
+    except RecursionError as error:
+        raise BadFrameError(_TOO_DEEP) from error
+    level: list[Any] = [[found]]
+    for _ in range(DEEPEST + 1):
+        inner = (value.values() if isinstance(value, dict) else value for value in level)
+        if not (level := [value for values in inner for value in values if isinstance(value, dict | list)]):
+            return found
+    raise BadFrameError(_TOO_DEEP)
 
 
 def _within(frame: str) -> dict[str, Any]:
@@ -1517,28 +1595,9 @@ def _within(frame: str) -> dict[str, Any]:
     return data
 
 
-def _topic_of(data: Mapping[str, Any]) -> tuple[str, str]:
-    """Return the name of a topic as it is written, and its full name."""
-    name = data.get("topic")
-    if not isinstance(name, str) or not _is_name(name):
-        raise BadFrameError("'topic' is the name of a topic")
-    return name, absolute(name)
-
-
-def _service_of(data: Mapping[str, Any]) -> tuple[str, str]:
-    """Return the name of a service as it is written, and its full name."""
-    name = data.get("service")
-    if not isinstance(name, str) or not _is_name(name):
-        raise BadFrameError("'service' is the name of a service")
-    return name, absolute(name)
-
-
-def _action_of(data: Mapping[str, Any]) -> tuple[str, str]:
-    """Return the name of an action as it is written, and its full name."""
-    name = data.get("action")
-    if not isinstance(name, str) or not _is_name(name):
-        raise BadFrameError("'action' is the name of an action")
-    return name, absolute(name)
+def _whole(name: str) -> str:
+    """Return the action of which a topic or service is a part; other names unchanged."""
+    return name.partition("/_action/")[0] or name
 
 
 def _is_name(name: str) -> bool:
@@ -1561,7 +1620,15 @@ def _count(data: Mapping[str, Any], key: str, most: float = 2**31) -> int:
 
 
 def _named(given: object, names: Sequence[str]) -> dict[str, Any]:
-    """Return arguments by name."""
+    """Return arguments by name.
+
+    Raises:
+        WrongMessageError: if they are neither a map nor a list, or a text in them could not be written to a file.
+    """
+    try:
+        json.dumps(given, ensure_ascii=False).encode()
+    except UnicodeEncodeError as error:
+        raise WrongMessageError("a text in 'args' has half of a pair of surrogates, which is no character") from error
     if isinstance(given, list):
         return dict(zip(names, given, strict=False))
     if not isinstance(given, dict | None):
@@ -1571,7 +1638,7 @@ def _named(given: object, names: Sequence[str]) -> dict[str, Any]:
 
 def _short(value: object) -> str:
     text = str(value) if isinstance(value, str | int | float | bool | None) else type(value).__name__
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+    return plain(text[:_SHOWN]) + ("..." if len(text) > _SHOWN else "")
 
 
 def _finite(value: object) -> object:

@@ -783,8 +783,6 @@ class GatewaySession:
     def _do(self, requests: Sequence[BusRequest]) -> None:
         for request in requests:
             self._carry_out(request)
-        while self._bridge.notes:
-            self._note(self._bridge.notes.popleft())
         self._pump()
         until = self._bridge.lease.until
         if self._lease_timer is None and math.isfinite(until):
@@ -796,6 +794,8 @@ class GatewaySession:
 
     def _pump(self) -> None:
         """Let the bus do what is due, wake the clients that it brought something, and plan when to look again."""
+        while self._bridge.notes:
+            self._note(self._bridge.notes.popleft())
         due = self._guest.pump()
         if self._pump_timer is not None:
             self._pump_timer.cancel()
