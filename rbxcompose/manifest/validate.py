@@ -336,7 +336,8 @@ def _finding(model: Any, node: tree.TreeNode, path: tree.KeyPath, loc: tree.KeyP
     span = tree.value_span(node, loc)
     is_key = error["loc"][-1:] == ("[key]",)
     place = tree.key_span(node, loc) if is_key else span
-    if "valid" not in context and (is_key or error["type"] == "string_pattern_mismatch"):
+    is_misnamed = error["type"] == "string_pattern_mismatch" or (is_key and "long" not in error["type"])
+    if "valid" not in context and is_misnamed:
         text = value.text if isinstance(value, tree.ScalarNode) and place is span else name
         help_text = "lower-case letters, digits and underscores, starting with a letter"
         near = re.sub(r"\W+", "_", text.strip("/ ")).lower()  # ROS 1 began names of topics with a slash
@@ -359,7 +360,7 @@ def _finding(model: Any, node: tree.TreeNode, path: tree.KeyPath, loc: tree.KeyP
             words, key = ("at most", "max_length") if "long" in error["type"] else ("at least", "min_length")
             one, more = ("character", "characters") if "string" in error["type"] else ("entry", "entries")
             size = context[key]
-            return OUT_OF_RANGE.at(span, f"'{name}' must have {words} {size} {one if size == 1 else more}")
+            return OUT_OF_RANGE.at(place, f"'{name}' must have {words} {size} {one if size == 1 else more}")
         case kind_of_error if kind_of_error in BOUNDS:
             words, key = BOUNDS[kind_of_error]
             dimension = dimension_at(model, loc)

@@ -62,6 +62,7 @@ MISTAKES = [
         "",
         "did you mean 'axis'?",
     ),
+    (f"parts: {{{'a' * 61}: {{speed: 1 m/s}}}}", "RBX1005", 9, f"'{'a' * 61}' must have at most 60 characters", "", ""),
     ("inner: {}", "RBX1002", 1, "'inner' of component 'it' needs the key 'speed'", "", ""),
     ("max_speed: fast", "RBX1003", 12, "'max_speed' must be a speed, such as '0.3 m/s'", "this is text", ""),
     ("max_speed: 5 s", "RBX1003", 12, "'max_speed' must be a speed, such as '0.3 m/s'", "this is a time", ""),
