@@ -17,6 +17,9 @@ profiles:
     robots: {turtlebot: {profile: tired, stop_within: 1.5 s, place: {battery: desk}}}
   broken:
     robots: {turtlebot: {on: nowhere}}
+  bare:
+    hosts: {desk: {labels: [fast]}}
+    robots: {turtlebot: !remove }
 """
 
 
@@ -45,4 +48,15 @@ def test_what_a_profile_breaks_is_reported_and_an_unknown_one_with_those_that_ex
     broken = compile_system(system, environment={}, profiles=["broken"])
     assert "RBX6100" in {finding.code for finding in broken.report}
     unknown = compile_system(system, environment={}, profiles=["hal"])
-    assert "did you mean 'hall'" in render_text(unknown.report, unknown.sources, False)
+    text = render_text(unknown.report, unknown.sources, False)
+    assert "did you mean 'hall'" in text
+    assert "1 | hal\n" in text, "the excerpt is what was typed, not the profile of a robot"
+
+
+def test_a_profile_that_removes_all_robots_is_named_at_its_place(system: str) -> None:
+    bare = compile_system(system, environment={}, profiles=["bare"])
+    (found,) = (finding for finding in bare.report if finding.code == "RBX1002")
+    assert found.message.startswith("profile 'bare' leaves no 'robots'")
+    assert found.span is not None
+    line = Path(system).read_text(encoding="utf-8").splitlines()[found.span.line - 1]
+    assert line == "    robots: {turtlebot: !remove }"

@@ -111,10 +111,10 @@ def compile_system(
     out.root = root = documents.meant(SystemFile, root)
     out.root = root = documents.placed(SystemFile, root, {**SECTIONS, **LINKS})
     documents.check(SystemFile, root)
-    out.root = root = _with_profiles(root, out, documents)
+    root, overlays = _with_profiles(root, out, documents)
     out.root = root = fill(root, names_of(_text(root, "name"), not real, environment), out.report)
     out.path, out.name, out.security = file, _text(root, "name"), _text(root, "security") or NO_SECURITY
-    sections = {key: _section(key, model, out) for key, model in SECTIONS.items()}
+    sections = {key: _section(key, model, out, overlays) for key, model in SECTIONS.items()}
     if sections["hosts"] is None or sections["robots"] is None:
         return out
     out.hosts = sections["hosts"]
@@ -196,16 +196,19 @@ def _members(robots: Mapping[str, SystemRobotModel], out: System) -> Iterator[_M
             yield _Member(f"{entry}_{number + 1}", entry, model.model_copy(update=own))
 
 
-def _with_profiles(root: MappingNode, out: System, documents: Documents) -> MappingNode:
-    """Return a system without its profiles, changed by those that were chosen, in the order of the command."""
+Overlays = list[tuple[MappingNode, str]]  # profiles, each with its name for findings
+
+
+def _with_profiles(root: MappingNode, out: System, documents: Documents) -> tuple[MappingNode, Overlays]:
+    """Return a system changed by the profiles that were chosen, in the order of the command, and these."""
     there = root.get("profiles")
     own = replace(root, entries={key: entry for key, entry in root.entries.items() if key != "profiles"})
     if there is not None and validate(PROFILES["profiles"], there, ("profiles",), out.report) is None:
-        return own
+        return own, []
     named = there.entries if isinstance(there, MappingNode) else {}
     out.known_profiles = tuple(named)
     overlays = [(node, f"profile '{name}'") for name, node in chosen_profiles(out.profiles, named, "system", documents)]
-    return compose(settled(own, out.report), overlays, out.report) if overlays else own
+    return compose(settled(own, out.report), overlays, out.report) if overlays else own, overlays
 
 
 def _text(root: MappingNode, key: str) -> str:
@@ -213,7 +216,7 @@ def _text(root: MappingNode, key: str) -> str:
     return value.text if isinstance(value, ScalarNode) else ""
 
 
-def _section(key: str, model: Any, out: System) -> Any:
+def _section(key: str, model: Any, out: System, overlays: Overlays) -> Any:
     node = out.root.get(key)
     if not isinstance(node, MappingNode) or not node.entries:
         span = key_span(out.root, (key,)) if key in out.root else out.root.span
@@ -222,7 +225,11 @@ def _section(key: str, model: Any, out: System) -> Any:
             out.report.add(WRONG_TYPE.at(span, message, label=label_of(node), help=help_with_names(node)))
             return None
         what = "the machines" if key == "hosts" else "the robots and where they run"
-        out.report.add(MISSING_KEY.at(span, f"a system needs '{key}': {what}"))
+        message = f"a system needs '{key}': {what}"
+        for overlay, name in overlays:
+            if key in overlay.entries:
+                span, message = overlay.entries[key].key.span, f"{name} leaves no '{key}', which a system needs: {what}"
+        out.report.add(MISSING_KEY.at(span, message))
         return None
     return validate(model, node, (key,), out.report)
 
@@ -292,7 +299,7 @@ class _Compiling:
     def _compiled(self, shown: str, profile: str | None, world: str, places: Mapping[str, Span]) -> Compilation:
         """Return a robot; what is wrong with what the system gives it is a finding at one of the `places`."""
         compilation = self._compile(shown, profile, world, self.outside)
-        self.out.sources.update(compilation.sources)
+        self.out.sources.update((file, text) for file, text in compilation.sources.items() if file not in places)
         known = {(one.code, one.span, one.message) for one in self.out.report}
         for finding in compilation.report:
             if finding.span is not None and finding.span.file in places:
