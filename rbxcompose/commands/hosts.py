@@ -20,11 +20,13 @@ from typing import TYPE_CHECKING, Any
 
 from rbxcompose import __version__
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import alone_in, read_regular, replace_file
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import NotDoneError, ReportedError, emit, refuse, write_report
-from rbxcompose.commands.lookup import find_robot
+from rbxcompose.commands.lookup import NOT_UP, find_robot
 from rbxcompose.commands.options import BUS, EACH, system_and_robot
+from rbxcompose.runtime.folder import made_base, system_record
 
 if TYPE_CHECKING:  # verbs that may be for a system import this module, most often for a robot
     from rbxcompose.compiler.systems.bundle import Bundle
@@ -42,7 +44,8 @@ _LOOK = 0.05  # [s] between two looks at what runs
 _ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 SSH_FAILED = 255  # exit code of ssh, if it fails itself
 _OF_SYSTEM = ("--ssh-config", "--profile")
-_FOR_ONE = ("watch", "echo", "hz", "pub", "call", "send", "static")  # they last, or are meant for one
+_LASTING = ("watch", "echo")  # actions that go on until an interrupt, which show one host alone
+_LARGEST = 16_000_000  # [B] of what is kept of a system
 _UNPACK = """set -e
 d="${XDG_CACHE_HOME:-$HOME/.cache}/rbxcompose/systems/DIGEST"
 if [ -d "$d" ]; then cat > /dev/null
@@ -198,25 +201,58 @@ def require_reachable(system: System) -> None:
         raise NotDoneError(UNREACHED.at(None, message, help=help_text))
 
 
-def compiled(path: str, arguments: argparse.Namespace) -> System:
-    """Return a system. Its warnings are for `check` and `up`.
+def compiled(path: str, arguments: argparse.Namespace, *, needs_all: bool = True) -> tuple[System, Shares]:
+    """Return a system, and where each of its shares runs. Its warnings are for `check` and `up`.
+
+    Unless a verb `needs_all`, names and hosts are enough, so that nobody who edits a file keeps others from stopping
+    robots: with errors, shares are where they were brought up from here; those of other robots may be on any host.
 
     Raises:
-        ReportedError: if it has errors.
+        ReportedError: if it has errors, and all is needed or nothing is known of its robots.
     """
     from rbxcompose.compiler.systems.reader import compile_system
 
     system = compile_system(path, environment=os.environ, profiles=arguments.profile)
-    if system.report.has_errors:
+    if not system.report.has_errors:
+        require_reachable(system)
+        return system, shares_of(system, arguments.ssh_config)
+    shares = {} if needs_all else _known_shares(path, system, arguments.ssh_config)
+    if not shares:
         write_report(system.report, system.sources)
         raise ReportedError
-    require_reachable(system)
-    return system
+    where = ", ".join(dict.fromkeys(host for host, _ in shares))
+    where += "" if system.labels else "; others that it may have are not reached"
+    sys.stderr.write(f"'{path}' has errors, which 'check' shows; its robots were brought up, or may be, on: {where}\n")
+    return system, shares
 
 
-def every_share(path: str, arguments: argparse.Namespace) -> Shares:
-    """Return where each share of a system runs."""
-    return shares_of(compiled(path, arguments), arguments.ssh_config)
+def _known_shares(path: str, system: System, config: Path | None) -> Shares:
+    """Return where robots of a system with errors were brought up, or else may be."""
+    shares = recalled(path, config)
+    lacking = system.labels.keys() - {robot for _, robot in shares}
+    remotes = [Remote(name, host, config) for name, host in system.hosts.items()]
+    return shares | {(remote.name, name): remote for name in system.labels if name in lacking for remote in remotes}
+
+
+def recalled(path: str, config: Path | None) -> dict[tuple[str, str], Remote]:
+    """Return where shares of a system were brought up from this machine since its start, as `remember` has kept it."""
+    from rbxcompose.manifest.system_file import HostModel
+
+    try:
+        made_base()  # nobody else may have written into it
+        found = json.loads(read_regular(system_record(path), _LARGEST))
+        return {(host, robot): Remote(host, HostModel.model_validate(model), config) for host, robot, model in found}
+    except (OSError, ValueError):  # nothing is kept, or not as this version does
+        return {}
+
+
+def remember(path: str, shares: Shares) -> None:
+    """Keep where shares of a system are brought up, for `compiled`."""
+    with suppress(OSError), alone_in(made_base()):  # without it they are stopped by their names
+        models = {key: share.model.model_dump() for key, share in (recalled(path, None) | dict(shares)).items()}
+        replace_file(
+            system_record(path), json.dumps([(*key, model) for key, model in models.items()]).encode(), mode=0o600
+        )
 
 
 def reached(shares: Shares, bundle: Bundle, *, needs_all: bool = True) -> dict[str, str]:
@@ -338,6 +374,12 @@ class SystemCommand:
         names = " or ".join(f"{self.path}:{robot}" for robot in self.robots)
         return refuse(WHICH.at(None, message, help=f"--robot {names}"))
 
+    def ask(self, *, tolerates: str = "") -> int:
+        """Run it for each share, as `ask_all` does; if files have errors, a robot need not be up where it may be."""
+        tolerates = NOT_UP.code if self.system.report.has_errors else tolerates
+        in_json = getattr(self.arguments, "json", False)
+        return ask_all(self.shares, self.words_for, in_json=in_json, tolerates=tolerates)
+
     def run(self, verb: object) -> int:
         """Run it where it can be answered, and return the exit code.
 
@@ -350,40 +392,37 @@ class SystemCommand:
         if len(self.shares) == 1:
             ((_, robot), remote), *_ = self.shares.items()
             return _run_there(remote, self.words_for(robot))
-        if action in _FOR_ONE or getattr(self.arguments, "follow", False):
-            return self.refuse(f"'{action}' is for one robot")
-        return ask_all(self.shares, self.words_for, in_json=getattr(self.arguments, "json", False))
+        is_for_all = getattr(verb, "ON_SYSTEM", "") == EACH or action in getattr(verb, "FOR_ALL", ())
+        is_lasting = action in _LASTING or getattr(self.arguments, "follow", False)
+        if is_lasting or (not is_for_all and len({robot for _, robot in self.shares}) > 1):
+            return self.refuse(f"'{f'{self.words[0]} {action}'.rstrip()}' is for one robot")
+        return self.ask()
 
 
 def forward(verb: object, written: str, where: str, words: Sequence[str], arguments: argparse.Namespace) -> int:
     """Run the words of a command on the hosts that can answer it; `where` is the `ON_SYSTEM` of its verb."""
     path, name = system_and_robot(written) or (written, "")
-    system = compiled(path, arguments)
-    if name and name not in system.robots:
-        return refuse(WHICH.misspelt(None, f"the system has no robot '{name}'", name, system.robots, "robots"))
-    robots = [robot for robot in system.robots.values() if name in ("", robot.name)]
-    chosen = choose(system, robots, where, arguments)
-    return SystemCommand(
-        system, path, [robot.name for robot in robots], chosen, list(_for_there(words)), written, arguments
-    ).run(verb)
+    system, every = compiled(path, arguments, needs_all=where != EACH)
+    names = list(dict.fromkeys(robot for _, robot in every))
+    if name and name not in names:
+        return refuse(WHICH.misspelt(None, f"the system has no robot '{name}'", name, names, "robots"))
+    robots = [robot for robot in names if name in ("", robot)]
+    chosen: Shares = {key: share for key, share in every.items() if key[1] in robots}
+    chosen = chosen if where == EACH else choose([system.robots[robot] for robot in robots], chosen, where)
+    return SystemCommand(system, path, robots, chosen, list(_for_there(words)), written, arguments).run(verb)
 
 
-def choose(system: System, robots: Sequence[PlacedRobot], where: str, arguments: argparse.Namespace) -> Shares:
-    """Return the shares of robots that can answer, for an `ON_SYSTEM`.
+def choose(robots: Sequence[PlacedRobot], every: Shares, where: str) -> Shares:
+    """Return those of the shares of robots that can answer, for an `ON_SYSTEM` other than `EACH`.
 
     Raises:
         NotDoneError: if none can.
     """
-    from rbxcompose.compiler.systems.share import hosts_of
-
-    every, chosen = shares_of(system, arguments.ssh_config), dict[tuple[str, str], Remote]()
+    chosen = dict[tuple[str, str], Remote]()
     for robot in robots:
-        hosts = hosts_of(system, robot)
-        if where == BUS:
-            hosts = [_reachable({host: every[host, robot.name] for host in hosts}, robot.name)]
-        elif where != EACH:
-            hosts = answering(robot, where)
-        chosen |= {(host, robot.name): every[host, robot.name] for host in hosts}
+        own = {host: share for (host, name), share in every.items() if name == robot.name}
+        hosts = [_reachable(own, robot.name)] if where == BUS else answering(robot, where)
+        chosen |= {(host, robot.name): own[host] for host in hosts}
     if not chosen:
         names = ", ".join(placed_robot.name for placed_robot in robots)
         raise NotDoneError(NOBODY_THERE.at(None, f"{names}: no component of type '{where}'"))

@@ -111,7 +111,8 @@ def _system_of(arguments: Any, where: str) -> str:
     from rbxcompose.commands.options import EACH, system_and_robot
 
     written = arguments.robot if "robot" in arguments else None
-    written = written or (arguments.path if where == EACH and "path" in arguments else None)
+    if not written and where == EACH:
+        written = arguments.path if "path" in arguments else next(iter(vars(arguments).get("names", ())), None)
     return written if written and system_and_robot(written) else ""
 
 

@@ -15,7 +15,8 @@ from rbxcompose.base.units import FREQUENCY, TIME, Dimension, UnitError, to_si
 
 EACH, BUS = "each host", "bus"
 """What a verb may have as `ON_SYSTEM`: where it runs for a robot of a system. On each host of the robot, or on any one
-that reaches its bus; any other word is the type of the component that answers."""
+that reaches its bus; any other word is the type of the component that answers. With `EACH` it is for all robots of a
+system, and needs no more of them than their names; else, for those of its actions that are in its `FOR_ALL`."""
 
 Declare = Callable[[argparse.ArgumentParser], object]  # declares some arguments
 _KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
@@ -132,10 +133,18 @@ def is_system(written: str) -> bool:
 
 def system_and_robot(written: str) -> tuple[str, str] | None:
     """Return the system's file and the robot that `FILE` or `FILE:ROBOT` names; without a robot, all are meant."""
-    if is_system(written):
-        return written, ""
     path, _, robot = written.rpartition(":")
-    return (path, robot) if path and is_system(path) else None
+    named = next((pair for pair in ((written, ""), (path, robot)) if is_system(pair[0])), None)
+    return named or next((pair for pair in ((written, ""), (path, robot)) if _was_system(pair[0])), None)
+
+
+def _was_system(path: str) -> bool:
+    """Return whether a file that is gone, or says nothing now, was that of a system when robots were brought up."""
+    if not path.endswith((".yaml", ".yml")) or kind_of(Path(path)):
+        return False
+    from rbxcompose.runtime.folder import system_record  # takes longer to import
+
+    return system_record(path).exists()
 
 
 def add_ls_options(parser: argparse.ArgumentParser) -> None:

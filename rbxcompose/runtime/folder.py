@@ -244,6 +244,26 @@ def base_folder() -> Path:
     return Path(runtime) / "rbxcompose" if runtime else Path(tempfile.gettempdir()) / f"rbxcompose-{os.getuid()}"
 
 
+def made_base() -> Path:
+    """Return the folder that holds the folders of all robots, which is made if there is none.
+
+    Raises:
+        UnsafeFolderError: if it belongs to another user or is open to others.
+    """
+    base = base_folder()
+    base.mkdir(mode=0o700, parents=True, exist_ok=True)
+    _require_private(base)
+    return base
+
+
+def system_record(path: str) -> Path:
+    """Return the file that keeps where the robots of a system were brought up, whose own file is at `path`.
+
+    It stands beside the folders of robots, whose names have no dot.
+    """
+    return base_folder() / f"{hashlib.sha256(os.path.realpath(path).encode()).hexdigest()[:32]}.system"
+
+
 def all_folders() -> list[RobotFolder]:
     """Return the folders of all robots that are up or were left behind, by name.
 

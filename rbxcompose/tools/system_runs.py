@@ -61,6 +61,9 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
     if options.is_stepped or arguments.watch:
         return misused("up", "a system runs in real time, without --rate and --watch")
     system = compiled_for(path, arguments, "up")
+    there = {one for one, host in system.hosts.items() if host.ssh or arguments.host in (None, one)}
+    shares = hosts.shares_of(system, arguments.ssh_config)
+    hosts.remember(path, {key: share for key, share in shares.items() if key[0] in there})
     if arguments.host is None and any(host.ssh for host in system.hosts.values()):
         return up_everywhere(path, system, arguments)
     if arguments.host is None and len(system.hosts) == 1:
@@ -241,6 +244,7 @@ class _SystemChange:
 
     def _carry_out(self, generations: Mapping[Key, int]) -> int:
         """Change these shares, which are in these generations, in this order."""
+        hosts.remember(self._path, self._shares)
         done: list[Key] = []
         for key, generation in generations.items():
             label = " ".join(key)

@@ -141,12 +141,17 @@ class PlacedRobot:
 
     @property
     def labels(self) -> frozenset[str]:
-        """Return what it may be called by, with others: its name, that of its instances, and its labels."""
-        return frozenset({self.name, self.entry, *self.model.labels})
+        """Return what it may be called by, with others."""
+        return labels_of(self.name, self.entry, self.model)
 
     def span(self, root: MappingNode, *keys: str | int) -> Span:
         """Return the place of a value of its entry in the system's file."""
         return value_span(root, ("robots", self.entry, *keys))
+
+
+def labels_of(name: str, entry: str, model: SystemRobotModel) -> frozenset[str]:
+    """Return what a robot may be called by, with others: its name, that of its instances, and its labels."""
+    return frozenset({name, entry, *model.labels})
 
 
 @dataclass(slots=True)
@@ -159,6 +164,7 @@ class System:
     security: str = "none"
     hosts: Mapping[str, HostModel] = field(default_factory=dict)
     links: Mapping[str, LinkModel] = field(default_factory=dict)
+    labels: Mapping[str, frozenset[str]] = field(default_factory=dict)  # of each robot, also of one with errors
     robots: dict[str, PlacedRobot] = field(default_factory=dict)
     report: Report = field(default_factory=Report)
     sources: dict[str, str] = field(default_factory=dict)

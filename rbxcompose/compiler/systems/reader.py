@@ -28,6 +28,7 @@ from rbxcompose.compiler.systems.model import (
     System,
     Wishes,
     hosts_called,
+    labels_of,
     next_port,
     place,
 )
@@ -121,6 +122,7 @@ def compile_system(
     if "links" in root:
         out.links = validate(LINKS["links"], root.entries["links"].value, ("links",), out.report) or {}
     members = list(_members(sections["robots"], out))
+    out.labels = {member.name: labels_of(member.name, member.entry, member.model) for member in members}
     members = in_one_world(members, out, real=real)
     seen: dict[str, _Member] = {}
     for member in members:

@@ -11,6 +11,7 @@ from rbxcompose.commands.options import BUS, deferred
 
 GROUP = "data"
 ON_SYSTEM = BUS
+FOR_ALL = ("ls",)
 _VERB = ("send", "send a goal, print feedback and result")
 
 

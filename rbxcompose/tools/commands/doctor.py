@@ -16,7 +16,7 @@ from rbxcompose.commands.formats.text import render_text
 from rbxcompose.commands.guest import Guest, ReceivedMessage
 from rbxcompose.commands.lookup import add_robot_option, find_robot, place_of, robots_up
 from rbxcompose.commands.messages import to_json
-from rbxcompose.commands.options import add_json_option
+from rbxcompose.commands.options import EACH, add_json_option, add_system_options
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.devices.serial_ports import latency_timers, serial_ports
@@ -26,14 +26,16 @@ from rbxcompose.tools import doctor as machine
 from rbxcompose.tools.doctor import BusFacts, ExaminationResult, HostFacts, RunningRobot, examine_all, has_errors
 
 GROUP = "system"
+ON_SYSTEM = EACH
 _LISTENING = 1.0  # [s] of listening to messages, for their stamps
 _NANOSECONDS = 1e9
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="only this robot, by name or file")
+    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="only this robot, by name or file; or a system")
     add_robot_option(parser)
+    add_system_options(parser)
     add_json_option(parser)
 
 

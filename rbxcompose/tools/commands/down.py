@@ -1,20 +1,27 @@
 """Stop a robot and end all of its processes, also those that a dead supervisor has left."""
 
+from __future__ import annotations
+
 import argparse
 import json
+from typing import TYPE_CHECKING
 
 from rbxcompose.base.requests import Refused
 from rbxcompose.commands.console import NotDoneError, emit
 from rbxcompose.commands.lookup import NO_ANSWER, NOT_UP, add_robot_option, find_robot, known_state
-from rbxcompose.commands.options import add_system_options, is_system
+from rbxcompose.commands.options import EACH, add_system_options
 from rbxcompose.runtime.control import NoAnswerError, ask, supervisor_of
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, wait_until_ended
 from rbxcompose.runtime.requests import BringDown
 from rbxcompose.runtime.supervision.leftovers import end_leftovers, kill_supervisor
 
+if TYPE_CHECKING:  # only needed for systems
+    from rbxcompose.commands.hosts import SystemCommand
+
 GROUP = "run"
 IS_COMMON = True
+ON_SYSTEM = EACH
 _ANSWER = 1.0  # [s]
 _ORDERLY = 3.0  # [s] for a supervisor to bring everything down, after it has come to rest
 
@@ -29,14 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """End the robot: orderly if its supervisor answers, else by force."""
-    wanted = arguments.robot or arguments.path
-    if wanted is not None and is_system(wanted):
-        from rbxcompose.commands.hosts import ask_all, every_share  # only needed for systems
-
-        shares = every_share(wanted, arguments)
-        options = ["--json"] if arguments.json else []  # the end on one host may end it on the others before they do
-        return ask_all(shares, lambda robot: ["down", robot, *options], in_json=arguments.json, tolerates=NOT_UP.code)
-    folder = find_robot(wanted)
+    folder = find_robot(arguments.robot or arguments.path)
     report = _end(folder)
     if arguments.json:
         emit(json.dumps({"robot": folder.path.name, "told": report}))
@@ -45,6 +45,11 @@ def run(arguments: argparse.Namespace) -> int:
         emit(text)
     emit(f"{folder.path.name} is down")
     return 0
+
+
+def run_on_system(command: SystemCommand) -> int:
+    """End robots of a system; the end on one host may end a robot on the others before they do."""
+    return command.ask(tolerates=NOT_UP.code)
 
 
 def _end(folder: RobotFolder) -> list[str]:

@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
-    """The shares of the chosen robots, and among them those that run missions."""
+    """The shares of the chosen robots; to run a mission, among them those that run missions."""
 
     shares: hosts.Shares
     executives: hosts.Shares
@@ -89,19 +89,20 @@ class Fleet:
         executives: hosts.Shares = {}
         known: set[str] = set()
         for path in paths:
-            system = hosts.compiled(path, arguments)
-            every = hosts.shares_of(system, arguments.ssh_config)
-            for robot in system.robots.values():
-                known |= {*robot.labels}
-                if not {*robot.labels} >= {*arguments.labels}:
+            needs_all = arguments.action == "run"
+            system, every = hosts.compiled(path, arguments, needs_all=needs_all)
+            for name in dict.fromkeys(robot for _, robot in every):
+                labels = system.labels.get(name, frozenset({name}))
+                known |= labels
+                if not labels >= {*arguments.labels}:
                     continue
-                own = {key: share for key, share in every.items() if key[1] == robot.name}
+                own = {key: share for key, share in every.items() if key[1] == name}
                 if own.keys() & shares.keys():
-                    message = f"two of these systems have a robot '{robot.name}' on a host of the same name"
+                    message = f"two of these systems have a robot '{name}' on a host of the same name"
                     raise NotDoneError(hosts.WHICH.at(None, message, help="name the systems in two commands"))
                 shares = {**shares, **own}
-                keys = ((host, robot.name) for host in hosts.answering(robot, MISSION))
-                executives = {**executives, **{key: every[key] for key in keys}}
+                there = hosts.answering(system.robots[name], MISSION) if needs_all else ()
+                executives = {**executives, **{(host, name): every[host, name] for host in there}}
         if not shares:
             wrong = next((label for label in arguments.labels if label not in known), "")
             message = f"no robot has the label{'s' * (len(arguments.labels) > 1)} {' and '.join(arguments.labels)}"

@@ -3,22 +3,29 @@
 A large log file is renamed to `log.jsonl.1`, and so on; the log of the previous run is `log.1.jsonl`.
 """
 
+from __future__ import annotations
+
 import argparse
 import sys
 import time
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.levels import LOG_LEVELS
 from rbxcompose.commands.console import NotDoneError, emit, has_colour
 from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, known_state
-from rbxcompose.commands.options import add_system_options, is_system
+from rbxcompose.commands.options import EACH, add_system_options
 from rbxcompose.commands.story import StoryWriter
 from rbxcompose.runtime.folder import RobotFolder, base_folder
 from rbxcompose.runtime.log import NAME, Follower, Record
 
+if TYPE_CHECKING:  # only needed for systems
+    from rbxcompose.commands.hosts import SystemCommand
+
 GROUP = "look"
 IS_COMMON = True
+ON_SYSTEM = EACH
 _PAUSE = 0.05  # [s] between checks for new records
 
 
@@ -40,8 +47,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the existing records and, if requested, new ones as they come."""
-    if arguments.names and is_system(arguments.names[0]):
-        return _of_system(arguments)
     folder, names = _addressed(arguments.robot, arguments.names)
     follower = Follower(folder.path / NAME)
     records = follower.read()
@@ -66,15 +71,11 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _of_system(arguments: argparse.Namespace) -> int:
-    from rbxcompose.commands.hosts import every_share, follow_all  # only needed for systems
+def run_on_system(command: SystemCommand) -> int:
+    """Show the logs of robots of a system, each line with its host."""
+    from rbxcompose.commands.hosts import follow_all
 
-    options = ["--level", arguments.level, *(["-f"] if arguments.follow else [])]
-    options += ["-n", str(arguments.lines)] if arguments.lines is not None else []
-    options += ["--json"] if arguments.json else []
-    system, *names = arguments.names
-    shares = every_share(system, arguments)
-    return follow_all(shares, lambda robot: ["logs", robot, *names, *options])
+    return follow_all(command.shares, command.words_for)
 
 
 def _addressed(robot: str | None, names: Sequence[str]) -> tuple[RobotFolder, Sequence[str]]:

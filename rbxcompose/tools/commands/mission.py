@@ -29,6 +29,7 @@ IS_COMMON = True
 A = TypeVar("A")
 
 ON_SYSTEM = requests.MISSION
+FOR_ALL = ("ls", "triggers", "status", "log", "pause", "cancel")
 _PERIOD = 0.2  # [s] between two requests to a robot that is followed
 _FORMATS = "text", "tree", "mermaid", "dot", "html"
 

@@ -18,6 +18,7 @@ from rbxcompose.tools.parameters.nodes import ParameterNodes
 
 GROUP = "data"
 ON_SYSTEM = options.BUS
+FOR_ALL = ("ls", "get", "describe", "history", "dump")
 _WITH_FILES = ("load", "save", "diff", "reset")
 
 

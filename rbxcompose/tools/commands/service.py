@@ -10,6 +10,7 @@ from rbxcompose.commands.options import BUS, deferred
 
 GROUP = "data"
 ON_SYSTEM = BUS
+FOR_ALL = ("ls",)
 _VERB = ("call", "send a request and print the response")
 
 

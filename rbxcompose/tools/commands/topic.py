@@ -21,6 +21,7 @@ from rbxcompose.commands.lookup import add_bus_options
 
 GROUP = "data"
 ON_SYSTEM = options.BUS
+FOR_ALL = ("ls", "show")
 _ENDS = ("publishers", "subscriptions")
 _WINDOW = 100  # messages
 _LINE_PERIOD = 1.0  # [s] between two lines

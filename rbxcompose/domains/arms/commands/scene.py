@@ -32,6 +32,7 @@ from rbxcompose.manifest.validate import validate
 GROUP = "bodies and arms"
 NO_PAIR = kind("RBX9426")
 ON_SYSTEM = scene_view.SCENE
+FOR_ALL = ("ls", "check", "distance")
 _SHOWN = "OBJECT"  # name of the object's text in findings
 Do = Callable[[argparse.Namespace], int]
 

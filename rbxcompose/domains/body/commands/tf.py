@@ -31,6 +31,7 @@ from rbxcompose.sdk.ports import Qos
 
 GROUP = "bodies and arms"
 ON_SYSTEM = options.BUS
+FOR_ALL = ("tree",)
 _DIGITS = 4  # decimal places of metres and degrees
 _TOPIC = "/tf_static"
 _LONGEST = 1000  # characters of a note

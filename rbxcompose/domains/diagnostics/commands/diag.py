@@ -26,6 +26,7 @@ from rbxcompose.runtime.folder import RobotFolder
 
 GROUP = "look"
 ON_SYSTEM = requests.TYPE
+FOR_ALL = ("tree", "history")
 _PERIOD = 0.2  # [s] between two requests to a robot that is followed
 _RESET, _FAINT = "\x1b[0m", "\x1b[2m"
 _COLOURS = {Level.OK: "\x1b[32m", Level.WARN: "\x1b[33m", Level.ERROR: "\x1b[1;31m", Level.STALE: "\x1b[35m"}

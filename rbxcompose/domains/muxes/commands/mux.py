@@ -21,6 +21,7 @@ from rbxcompose.runtime.folder import RobotFolder
 
 GROUP = "drive"
 ON_SYSTEM = requests.MUX
+FOR_ALL = ("ls", "why", "lock")
 _LOOK = 0.2  # [s] between two looks of `watch`; no change is missed between them
 
 

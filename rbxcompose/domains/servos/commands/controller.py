@@ -17,6 +17,7 @@ from rbxcompose.runtime.folder import RobotFolder
 
 GROUP = "drive"
 ON_SYSTEM = controller_manager.BUS
+FOR_ALL = ("ls",)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -28,6 +28,7 @@ from rbxcompose.msgs.nav_msgs import OccupancyGrid
 
 GROUP = "data"
 ON_SYSTEM = options.BUS
+FOR_ALL = ("show",)
 NO_MAP = kind("RBX3641")
 _TYPE = "nav_msgs/msg/OccupancyGrid"
 

@@ -1,0 +1,166 @@
+"""Verbs for robots of a system: what is for all and what for one, and whom they reach while files have errors."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.commands import hosts
+from rbxcompose.commands.console import ReportedError
+from rbxcompose.commands.hosts import Remote, SystemCommand, compiled
+from rbxcompose.commands.main import main
+from rbxcompose.commands.verbs import load, parser_of, verbs
+from rbxcompose.compiler.systems.model import System
+from rbxcompose.manifest.system_file import HostModel
+from rbxcompose.tools import system_runs
+
+ROBOT = "rbx: 1\nkind: Robot\nname: r\ncomponents: {battery: {type: battery_sim, runtime: 1 min}}\n"
+SYSTEM = """rbx: 1
+kind: System
+name: s
+hosts: {here: {}}
+robots: {a: {robot: r.yaml}, b: {robot: r2.yaml}}
+"""
+FAR = SYSTEM.replace("{here: {}}", "{far: {ssh: far, address: 10.0.0.2}, near: {ssh: near, address: 10.0.0.3}}")
+BOTH = {("here", "a"), ("here", "b")}
+FOR_ALL = (
+    "stop, ps, down, logs, doctor, mission pause, mission cancel, mission ls, mux lock, param get battery, topic ls, "
+    "diag tree, controller ls"
+)
+FOR_ONE = (
+    "release, mission resume, mission run patrol, mission step, mission log -f, param set battery.runtime=9, "
+    "param undo, diag watch, mux unlock, mux select teleop, topic pub /a std_msgs/Empty, service call /a, "
+    "controller speed arm 1, scene remove box, tf echo map odom"
+)
+
+
+@pytest.fixture(autouse=True)
+def _robots_that_repeat(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Have each host print its name and what it is asked."""
+
+    def script(self: Remote, words: Sequence[str], *, folder: str = "", has_terminal: bool = False) -> list[str]:
+        return [sys.executable, "-S", "-c", "import sys; print(*sys.argv[1:])", self.name, *words]
+
+    monkeypatch.setattr(Remote, "rbxcompose", script)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "run"))
+    monkeypatch.chdir(tmp_path)
+    for name, text in (("r.yaml", ROBOT), ("r2.yaml", ROBOT), ("s.yaml", SYSTEM)):
+        Path(name).write_text(text, encoding="utf-8")
+
+
+def told(written: str, robots: Sequence[str]) -> int:
+    """Return the exit code of a command for robots, each on a host of its own."""
+    words = [*written.split(), "--robot", "s.yaml"]
+    verb = load(name := words[0])
+    shares = {(f"host_{robot}", robot): Remote(f"host_{robot}", HostModel()) for robot in robots}
+    arguments = parser_of(name, verb).parse_args(words[1:])
+    return SystemCommand(System(), "s.yaml", robots, shares, words, "s.yaml", arguments).run(verb)
+
+
+@pytest.mark.parametrize("written", FOR_ALL.split(", "))
+def test_what_looks_or_holds_is_for_all_robots(written: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert told(written, ["a", "b"]) == 0
+    out = capfd.readouterr().out
+    assert all(f"host_{robot} {written} --robot {robot}" in out for robot in "ab")
+
+
+@pytest.mark.parametrize("written", FOR_ONE.split(", "))
+def test_what_lets_move_or_changes_or_lasts_is_for_one_robot(written: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert told(written, ["a", "b"]) == 1
+    out, error = capfd.readouterr()
+    assert "error[RBX6121]" in error
+    assert "--robot s.yaml:a or s.yaml:b" in error
+    assert not out, "nobody is asked"
+    if "watch" not in written and "-f" not in written:
+        assert told(written, ["a"]) == 0
+        assert f"host_a {written} --robot a" in capfd.readouterr().out
+
+
+def test_what_is_for_all_is_an_action_of_its_verb() -> None:
+    for name in verbs():
+        for action in getattr(verb := load(name), "FOR_ALL", ()):
+            parser_of(name, verb).parse_args([action, *(["x"] if (name, action) in NAMED else [])])
+
+
+NAMED = {("topic", "show"), ("param", "get"), ("param", "describe")}
+
+
+@pytest.mark.parametrize(
+    ("written", "asked"),
+    [
+        ("logs s.yaml:a battery -n 3", "here | here logs a battery -n 3"),
+        ("logs --robot s.yaml:a", "here | here logs --robot a"),
+        ("down s.yaml:a --json", '"text": "here down a --json"'),
+        ("down --robot s.yaml:a", "here down --robot a"),
+        ("doctor s.yaml:a", "here doctor a"),
+        ("ps s.yaml:a", "here ps a"),
+    ],
+)
+def test_a_robot_is_named_behind_a_colon(written: str, asked: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(written.split()) == 0
+    assert capfd.readouterr().out.strip().endswith((asked, f"{asked}}}}}]}}"))
+
+
+def up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bring the system up, without its processes."""
+    monkeypatch.setattr(system_runs, "run_plan", lambda *_: 0)
+    assert main(["up", "-d", "s.yaml"]) == 0
+
+
+def shares(**options: bool) -> set[tuple[str, str]]:
+    """Return the host and the robot of each share that is asked."""
+    return set(compiled("s.yaml", argparse.Namespace(profile=[], ssh_config=None), **options)[1])
+
+
+HALF, UNKNOWN = "places: {x: {\n", "places: {x: {z: 1}}\n"
+
+
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [
+        ("r.yaml", ROBOT + HALF),
+        ("r.yaml", ROBOT + UNKNOWN),
+        ("r.yaml", None),
+        ("s.yaml", SYSTEM + HALF),
+        ("s.yaml", SYSTEM.replace("robot: r2", "robt: r2")),
+        ("s.yaml", ""),
+        ("s.yaml", None),
+    ],
+)
+def test_robots_that_are_up_can_be_stopped_whatever_is_edited(
+    file: str, text: str | None, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    up(monkeypatch)
+    Path(file).unlink() if text is None else Path(file).write_text(text, encoding="utf-8")
+    assert shares(needs_all=False) == BOTH
+    with pytest.raises(ReportedError):
+        shares()
+    capfd.readouterr()
+    assert main(["stop", "--robot", "s.yaml"]) == 0
+    out, error = capfd.readouterr()
+    assert all(f"here stop --robot {robot}" in out for robot in "ab")
+    words = "'s.yaml' has errors, which 'check' shows; its robots were brought up, or may be, on: here"
+    is_readable = file == "r.yaml"
+    assert error == f"{words}{'' if is_readable else '; others that it may have are not reached'}\n"
+
+
+def test_a_robot_with_errors_that_was_not_brought_up_from_here_is_asked_for_on_each_host() -> None:
+    Path("s.yaml").write_text(FAR, encoding="utf-8")
+    Path("r.yaml").write_text(ROBOT + HALF, encoding="utf-8")
+    assert shares(needs_all=False) == {(host, robot) for host in ("far", "near") for robot in "ab"}
+
+
+def test_of_a_system_that_cannot_be_read_only_what_was_brought_up_from_here_is_known(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    remote = Remote("far", HostModel(ssh="pi@far", command="/opt/rbxcompose"))
+    hosts.remember("s.yaml", {("far", "a"): remote})
+    hosts.remember("s.yaml", {("far", "b"): remote})
+    assert hosts.recalled("s.yaml", None) == {("far", "a"): remote, ("far", "b"): remote}
+    Path("other.yaml").write_text(SYSTEM + HALF, encoding="utf-8")
+    assert main(["stop", "--robot", "other.yaml"]) == 1
+    assert "error[RBX1102]" in capfd.readouterr().err
