@@ -23,6 +23,7 @@ WHICH = kind("RBX9003")
 REFUSED = kind("RBX9004")
 NO_ANSWER = kind("RBX9005")
 UNSAFE = kind("RBX9006")
+NO_SUPERVISOR = "its supervisor has died"
 
 
 def add_robot_option(parser: argparse.ArgumentParser) -> None:
@@ -112,7 +113,7 @@ def no_answer(folder: RobotFolder) -> Finding:
     name, state = folder.path.name, known_state(folder)
     why = ""
     if state is not None and not state.is_supervised:
-        why = ": its supervisor has died, so it brakes and ends"
+        why = f": {NO_SUPERVISOR}, so it brakes and ends"
     elif state is not None and state.supervisor.is_stopped:
         why = ": its supervisor is suspended"
     return NO_ANSWER.at(

@@ -22,7 +22,7 @@ kind: System
 name: fleet
 hosts: {one: {address: 10.0.0.1, labels: [floor]}, two: {address: 10.0.0.2, ssh: two, labels: [floor]}}
 robots:
-  scout: {robot: ROOT/robots/turtlebot/robot.yaml, instances: 3, on: floor, labels: [indoor]}
+  scout: {robot: ROOT/robots/turtlebot/robot.yaml, instances: 5, on: floor, labels: [indoor]}
   other: {robot: ROOT/robots/turtlebot/robot.yaml, on: one, place: {battery: two}}
 """
 _HOST = """
@@ -34,6 +34,11 @@ elif words[1] == "scout_2":
     print("error[RBX9002]: no robot is up"); raise SystemExit(1)
 elif words[1] == "scout_3":
     print("ssh: connect: refused"); raise SystemExit(255)
+elif words[1] == "scout_4":
+    print(json.dumps({"error": "'r' does not answer: its supervisor has died, so it brakes and ends"}))
+    print("error[RBX9005]: 'r' does not answer"); raise SystemExit(1)
+elif words[1] == "scout_5":
+    print(json.dumps({"error": "the folder is open to others", "findings": []})); raise SystemExit(1)
 else:
     state = "failed" if host == "two" else "active"
     part = {"name": "battery", "state": state}
@@ -70,14 +75,15 @@ def test_each_robot_is_a_row_with_what_is_wrong(path: str, capsys: pytest.Captur
         "battery": "80 %",
     }
     assert (rows["scout_2"]["state"], rows["scout_3"]["state"]) == ("down", "unreachable")
+    assert (rows["scout_4"]["state"], rows["scout_5"]["state"]) == ("supervisor dead", "the folder is open to others")
     assert (rows["other"]["host"], rows["other"]["state"]) == ("one, two", "two battery not active")
 
 
 @pytest.mark.parametrize(
     ("labels", "robots"),
     [
-        (["indoor"], {"scout_1", "scout_2", "scout_3"}),
-        (["scout"], {"scout_1", "scout_2", "scout_3"}),
+        (["indoor"], {f"scout_{number}" for number in range(1, 6)}),
+        (["scout"], {f"scout_{number}" for number in range(1, 6)}),
         (["indoor", "scout_2"], {"scout_2"}),
         (["other"], {"other"}),
     ],

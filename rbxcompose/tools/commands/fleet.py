@@ -17,7 +17,7 @@ from rbxcompose.base.findings import kind
 from rbxcompose.base.levels import LOG_LEVELS
 from rbxcompose.commands import hosts
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, table
-from rbxcompose.commands.lookup import NOT_UP
+from rbxcompose.commands.lookup import NO_ANSWER, NO_SUPERVISOR, NOT_UP
 from rbxcompose.commands.options import add_system_options
 from rbxcompose.missions.execution.requests import MISSION
 
@@ -28,6 +28,7 @@ ShareFacts = tuple[
     str, str, dict[str, Any]
 ]  # robot, host, and what `top` reports about the share, or its `state` alone
 _UP = "up"
+_STATES = {NOT_UP.code: "down", NO_SUPERVISOR: "supervisor dead", NO_ANSWER.code: "no answer"}  # by what `top` says
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -143,8 +144,11 @@ def _facts(one: hosts.Running) -> dict[str, Any]:
         return answer
     if one.wait() == hosts.SSH_FAILED:
         return {"state": "unreachable"}
-    is_down = any(NOT_UP.code in line for line in one.lines)
-    return {"state": "down" if is_down else one.lines[-1] if one.lines else "no answer"}
+    for mark, state in _STATES.items():
+        if any(mark in line for line in one.lines):
+            return {"state": state}
+    problem = answer.get("error", "") if isinstance(answer, dict) else one.lines[-1] if one.lines else ""
+    return {"state": problem or "no answer"}
 
 
 def _row(robot: str, shares: Sequence[ShareFacts]) -> dict[str, str]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from rbxcompose.base.requests import to_data
 from rbxcompose.commands.console import NotDoneError, emit, refuse
-from rbxcompose.commands.lookup import add_robot_option, answer_of, find_robot, known_state, robots_up
+from rbxcompose.commands.lookup import NO_SUPERVISOR, add_robot_option, answer_of, find_robot, known_state, robots_up
 from rbxcompose.commands.options import EACH, add_system_options
 from rbxcompose.runtime.folder import SUSPENDED, ClockOffset, ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process
@@ -19,7 +19,7 @@ IS_COMMON = True
 ON_SYSTEM = EACH
 _COLUMNS = ("name", "type", "state", "process", "pid", "restarts")
 _ANSWER = 0.4  # [s] for a supervisor to answer; its state file is as recent, except for what died since
-_NO_SUPERVISOR = "its supervisor has died, so it brakes and ends; 'rbxcompose down {}', or the next 'up', cleans up"
+_CLEANS_UP = f"{NO_SUPERVISOR}, so it brakes and ends; 'rbxcompose down {{}}', or the next 'up', cleans up"
 _BLOCKED = "blocked"  # the state of a component that runs but cannot do its work
 
 
@@ -118,7 +118,7 @@ def _table(shown: Mapping[str, Any]) -> str:
     waiting = [f"{component['name']} waits for {component['waits_for']}, which failed" for component in blocked]
     notes = [f"{component['name']}: {component['note']}" for component in shown["components"] if "note" in component]
     clocks = [f"clock of {host}: {ClockOffset(**clock).words}" for host, clock in shown["clocks"].items()]
-    left = [] if pid else [_NO_SUPERVISOR.format(shown["robot"])]
+    left = [] if pid else [_CLEANS_UP.format(shown["robot"])]
     return "\n".join([head, *_stop_lines(shown["stop"]), *lines, *waiting, *notes, *clocks, *left])
 
 
