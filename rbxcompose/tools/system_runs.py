@@ -11,6 +11,7 @@ from typing import Any
 from rbxcompose.base.findings import Finding, Report, kind
 from rbxcompose.commands import hosts
 from rbxcompose.commands.console import FINDINGS, NotDoneError, ReportedError, emit, misused, refuse, write_report
+from rbxcompose.commands.lookup import ALREADY_UP
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.bundle import bundle_of
@@ -19,7 +20,7 @@ from rbxcompose.compiler.systems.exchange import exchange_of
 from rbxcompose.compiler.systems.model import PlacedRobot, System
 from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.compiler.systems.share import robots_on, share_of
-from rbxcompose.runtime.folder import ChosenLayers, RunOptions
+from rbxcompose.runtime.folder import ChosenLayers, RobotFolder, RunOptions
 from rbxcompose.runtime.supervision.changes import Fate
 from rbxcompose.tools.commands.security import certificate_findings
 from rbxcompose.tools.inspection.plan_text import changes_text
@@ -36,7 +37,7 @@ REFUSED_THERE = kind("RBX6128")
 def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> int:
     """Bring the files to all hosts, start all shares, and show what they write until the robots are down."""
     hosts.require_reachable(system)
-    shares = hosts.shares_of(system, arguments.ssh_config)
+    shares = _shares(system, arguments)
     bundle = bundle_of(system)
     folders = hosts.reached(shares, bundle)
     shares = {key: share for key, share in shares.items() if share.is_here or share.name in folders}
@@ -56,6 +57,19 @@ def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> i
     )
 
 
+def _shares(system: System, arguments: argparse.Namespace) -> hosts.Shares:
+    """Return where the shares of the chosen robots run.
+
+    Raises:
+        NotDoneError: if the system has no such robot.
+    """
+    if (name := arguments.robot) is not None and name not in system.robots:
+        message = f"the system has no robot '{name}'"
+        raise NotDoneError(hosts.WHICH.misspelt(None, message, name, system.robots, "robots"))
+    shares = hosts.shares_of(system, arguments.ssh_config)
+    return {key: share for key, share in shares.items() if name in (None, key[1])}
+
+
 def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> int:
     """Compile a system and run what one host of it runs; return the exit code."""
     if options.is_stepped or arguments.watch:
@@ -73,6 +87,13 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
         names = ", ".join(one.name for one in chosen)
         message = f"'{arguments.host}' runs several robots: {names}"
         return refuse(WHICH_ROBOT.at(None, message, help="add -d, or --robot NAME"))
+    down = [robot.name for robot in chosen if not RobotFolder.of(robot.name).is_held]
+    if len(down) < len(chosen) > 1:
+        up = ", ".join(f"'{robot.name}'" for robot in chosen if robot.name not in down)
+        help_text = (
+            f"add --robot {' or --robot '.join(down)}, to start what is down" if down else f"rbxcompose down {path}"
+        )
+        return refuse(ALREADY_UP.at(None, f"already up: {up}", help=help_text))
     for robot in chosen:
         plan = planned(system, robot, arguments.host)
         if not is_fit(_here(robot, arguments.host), system.sources):
@@ -181,8 +202,7 @@ def apply_system(path: str, arguments: argparse.Namespace) -> int:
     if arguments.host is not None:
         return _apply_here(system, arguments)
     hosts.require_reachable(system)
-    shares = hosts.shares_of(system, arguments.ssh_config)
-    shares = {key: share for key, share in shares.items() if arguments.robot in (None, key[1])}
+    shares = _shares(system, arguments)
     change = _SystemChange(path, system, shares, arguments)
     return change.run()
 
@@ -214,18 +234,19 @@ class _SystemChange:
         found = {key: _answer(asked[" ".join(key)]) for key in usable}
         lacks = any(key not in usable and not share.model.optional for key, share in self._shares.items())
         problems = [_refusal(key, entry) for key, entry in found.items() if isinstance(entry, str)]
+        is_refused = bool(problems) and not arguments.partial
         if arguments.json:
             emit(
                 json.dumps(
                     {"hosts": [{"host": key[0], "robot": key[1], "answer": entry} for key, entry in found.items()]}
                 )
             )
-        else:
+        elif arguments.dry_run or not is_refused:
             self._show(found)
         for problem in problems:
             refuse(problem)
         wanted = [key for key, entry in found.items() if not isinstance(entry, str) and _changes(entry)]
-        if problems and not arguments.partial:
+        if is_refused:
             return FINDINGS
         if arguments.dry_run or not wanted:
             return FINDINGS if problems or lacks else 0

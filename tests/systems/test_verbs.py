@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,6 +17,7 @@ from rbxcompose.commands.main import main
 from rbxcompose.commands.verbs import load, parser_of, verbs
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.manifest.system_file import HostModel
+from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.tools import system_runs
 
 ROBOT = "rbx: 1\nkind: Robot\nname: r\ncomponents: {battery: {type: battery_sim, runtime: 1 min}}\n"
@@ -109,6 +111,34 @@ def up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Bring the system up, without its processes."""
     monkeypatch.setattr(system_runs, "run_plan", lambda *_: 0)
     assert main(["up", "-d", "s.yaml"]) == 0
+
+
+def test_one_that_is_down_beside_others_that_are_up_is_started_by_its_name(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    up(monkeypatch)
+    (folder := RobotFolder.of("b")).make()
+    lock = folder.lock()
+    assert lock is not None
+    try:
+        assert main(["up", "-d", "s.yaml"]) == 1
+        error = capsys.readouterr().err
+        assert "error[RBX9001]: already up: 'b'\n  = help: add --robot a, to start what is down" in error
+        assert main(["up", "-d", "s.yaml", "--robot", "a"]) == 0
+    finally:
+        os.close(lock)
+
+
+def test_over_ssh_only_the_robot_that_is_named_is_started(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(hosts, "reached", lambda *_: {"far": ""})
+    Path("s.yaml").write_text(SYSTEM.replace("here: {}", "far: {ssh: far, address: 10.0.0.2}"), encoding="utf-8")
+    assert main(["up", "-d", "s.yaml", "--robot", "b"]) == 0
+    (line,) = capfd.readouterr().out.splitlines()
+    assert line.endswith("--host far --robot b -d")
+    assert main(["up", "-d", "s.yaml", "--robot", "c"]) == 1
+    assert "error[RBX6121]: the system has no robot 'c'" in capfd.readouterr().err
 
 
 def shares(**options: bool) -> set[tuple[str, str]]:

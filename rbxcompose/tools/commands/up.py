@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--watch", action="store_true", help="apply changes to its files as you edit them")
     parser.add_argument("--host", metavar="NAME", help="of a system: run what this host runs")
     add_system_options(parser, has_profile=True)
-    parser.add_argument("--robot", metavar="NAME", help="with --host: only this robot")
+    parser.add_argument("--robot", metavar="NAME", help="of a system: only this robot")
     parser.add_argument("--for", type=_duration, dest="duration", metavar="30s", help="end after this robot time")
 
 
