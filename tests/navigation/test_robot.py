@@ -448,6 +448,15 @@ def test_a_laser_sees_what_stands_at_its_height(tmp_path: Path) -> None:
     assert ahead == pytest.approx(1.9, abs=1e-6)  # over the step, to the wall
 
 
+PIT = "holes: {pit: {area: [[-3 m, -1 m], [1 m, -1 m], [1 m, 5 cm], [-3 m, 5 cm]]}}\n"
+
+
+def test_a_spawn_without_ground_concerns_only_robots_that_start_there(tmp_path: Path) -> None:
+    elsewhere = ROBOT.replace("../../room.yaml", "{file: ../../room.yaml, spawn: east}")
+    room = Room(tmp_path, elsewhere, WORLD + "  east: {x: 2 m, y: 1 m}\n" + PIT)
+    assert "RBX3611" not in room.checked.text
+
+
 @pytest.mark.parametrize(
     ("robot", "world", "said"),
     [
@@ -458,7 +467,9 @@ def test_a_laser_sees_what_stands_at_its_height(tmp_path: Path) -> None:
         (ROBOT, WORLD + "objects: {chair: {sphere: 1 m}}\n", "unknown key 'sphere'"),
         (ROBOT, WORLD + "objects: {chair: {at: {x: 1 m}}}\n", "an object has one shape"),
         (ROBOT, WORLD + "holes: {pit: {area: [[0 m, 0 m], [1 m, 0 m]]}}\n", "three corners"),
-        (ROBOT, WORLD + "holes: {pit: {area: [[-3 m, -1 m], [0 m, -1 m], [-2 m, 1 m]]}}\n", "'west' have no ground"),
+        (ROBOT, WORLD + PIT, "no ground: above the hole 'pit' of 'room'"),
+        (ROBOT.replace("25 Hz", "25 Hz, wheel_distance: 23 cm"), WORLD.replace("y: 0 m", "y: 16 cm") + PIT, "'pit'"),
+        (ROBOT, WORLD.partition("spawn")[0] + PIT, "above the hole 'pit'"),
         (ROBOT.replace("world: ../../room.yaml\n", ""), WORLD, "navigation needs a map"),
         (ROBOT.replace("../../room.yaml", "{file: ../../room.yaml, spawn: wset}"), WORLD, "did you mean 'west'?"),
         (ROBOT, WORLD.replace("-2 m", "-2.8 m"), "the robot starts 0.07 m deep in a wall of 'room'"),

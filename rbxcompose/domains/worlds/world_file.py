@@ -15,7 +15,7 @@ from rbxcompose.base.findings import Finding, Report, Span, kind
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.body.meshes import MissingLibraryError
 from rbxcompose.domains.worlds.grid_map import GridMap, MapError, read_map
-from rbxcompose.domains.worlds.ground import WorldHole, in_polygon
+from rbxcompose.domains.worlds.ground import WorldHole
 from rbxcompose.domains.worlds.shapes import ShapePath, WorldBox, WorldCylinder, WorldLight, WorldMesh, WorldShape
 from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, TAG_FAMILIES, TagSide, tag_on
 from rbxcompose.domains.worlds.world import NO_WALLS
@@ -205,14 +205,6 @@ class WorldModel(ManifestHeader):
     """Where robots may be put; the first is the default."""
     places: dict[Name, WorldPlace] = {}
     """Places that robots in it have, as in `places` of a robot."""
-
-    @model_validator(mode="after")
-    def _has_ground(self) -> WorldModel:
-        for name, pose in self.spawn.items():
-            for hole, model in self.holes.items():
-                if in_polygon(model.area, pose.x, pose.y):
-                    raise ValueError(f"robots at the spawn '{name}' have no ground: it is in the hole '{hole}'")
-        return self
 
 
 @dataclass(frozen=True, slots=True)
