@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import count
 from typing import Any, Generic, TypeVar
 
@@ -21,7 +22,7 @@ from rbxcompose.msgs.fields import require_type
 from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.types import Action, Message
 from rbxcompose.msgs.unique_identifier_msgs import UUID
-from rbxcompose.sdk.bound import Ended, Outcome, Reply
+from rbxcompose.sdk.bound import REASONS, Ended, Outcome, Reply
 from rbxcompose.sdk.ports import ORDINARY, MessageLimits, Qos
 
 STATUS_PERIOD = 0.1  # [s] between two publications of the goals' states during a flood of goals
@@ -59,7 +60,7 @@ class ServedGoal(Generic[G, R, F]):
         self._server.end(self._goal, GoalState.SUCCEEDED, result)
 
     def aborted(self, reason: str = "", result: R | None = None, /) -> None:
-        """End the goal as aborted and log the reason."""
+        """End the goal as aborted and log the reason; without a result, send that in an otherwise zero one."""
         self._server.end(self._goal, GoalState.ABORTED, result, reason)
 
     def canceled(self, result: R | None = None, /) -> None:
@@ -126,7 +127,10 @@ class ActionServer(Generic[G, R, F]):
 
     def end(self, goal: Goal[G, R], state: GoalState, result: R | None, reason: str = "") -> None:
         """End a goal that has not ended and answer all requests for its result."""
-        result = self._action.Result() if result is None else result
+        if result is None:
+            made: Any = self._action.Result()
+            told = [name for name in REASONS if isinstance(getattr(made, name, None), str)][:1]
+            result = replace(made, **dict.fromkeys(told, reason))
         require_type(result, self._action.Result, self._name)
         if not self._goals.end(goal, state, result, self._now):
             return

@@ -112,6 +112,9 @@ class Outcome(StrEnum):
     LOST = "lost"  # the server is gone
 
 
+REASONS = ("message", "error_msg", "error_string")  # fields of a result or a response that give a reason
+
+
 @dataclass(frozen=True, slots=True)
 class Ended(Generic[R]):
     """The end of a goal as its client sees it; `result` is None if none arrived."""
@@ -148,7 +151,7 @@ class ServedGoal(Protocol[G_co, R_contra, F_contra]):
         ...
 
     def aborted(self, reason: str = "", result: R_contra | None = None, /) -> None:
-        """End the goal as failed; the reason goes to the log."""
+        """End the goal as failed; the reason goes to the log, and into the result unless one is given."""
         ...
 
     def canceled(self, result: R_contra | None = None, /) -> None:

@@ -87,7 +87,7 @@ def test_a_newer_goal_replaces_the_current_one(alone: Alone, ends: Ends) -> None
     newer: Ends = []
     send(Goal(behavior_tree="corner"), newer.append)
     alone.settle()
-    assert ends == [Ended(Outcome.ABORTED, Result())]
+    assert ends == [Ended(Outcome.ABORTED, Result(error_msg="replaced by a newer goal"))]
     assert alone.log == [("base", "go_to: a goal was aborted: replaced by a newer goal")]
     old.succeeded()  # its server may not have noticed
     old.feedback(Feedback())

@@ -108,7 +108,18 @@ def test_a_newer_goal_replaces_the_current_one() -> None:
     driver.send(goal(0.0, 0.5))
     assert robot.run_until(lambda: len(driver.ended) == 2, 20.0)
     assert [end.outcome for end in driver.ended] == [Outcome.ABORTED, Outcome.SUCCEEDED]
+    assert driver.ended[0].result == NavigateToPose.Result(error_msg="replaced by a newer goal")
     assert driver.pose().distance(Pose2(0.0, 0.5)) < 0.05
+
+
+def test_a_goal_that_cannot_be_reached_ends_with_the_reason() -> None:
+    robot = Bench(instance("transforms", "transforms"), instance("go_to", "go_to"))
+    driver = Driver(robot)
+    robot.advance(0.1)
+    driver.send(goal(1.0, 0.0))
+    robot.advance(0.2)
+    why = "the position of the base is unknown in 'map'"
+    assert [end.result for end in driver.ended] == [NavigateToPose.Result(error_code=1, error_msg=why)]
 
 
 def test_a_goal_in_another_frame_is_refused() -> None:

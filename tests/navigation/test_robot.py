@@ -343,6 +343,7 @@ def test_the_tools_of_nav2_drive_it_too_and_the_newest_goal_counts(tmp_path: Pat
     room.bench.publish("/goal_pose", PoseStamped(Header(frame_id="map"), Pose(Point(-2.0, 1.0))), Qos.EVENT)
     room.bench.advance(20.0)
     assert [end.outcome for end in room.ends] == [Outcome.ABORTED]
+    assert room.ends[0].result == NavigateToPose.Result(error_code=1, error_msg="replaced by a newer goal")
     assert room.base.core.pose.distance(Pose2(-2.0, 1.0)) < 0.1
     room.bench.publish("/goal_pose", PoseStamped(Header(frame_id="map"), Pose(Point(2.0, 0.3))), Qos.EVENT)
     room.bench.advance(3.0)

@@ -9,7 +9,7 @@ from rbxcompose.missions.program.outcomes import Result
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
 from rbxcompose.missions.sources import OUTCOME, SkillSource, TopicSource, ValueSource
 from rbxcompose.msgs.std_srvs import SetBool
-from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal
+from rbxcompose.sdk.bound import REASONS, Ended, Outcome, Reply, SentGoal
 
 # Prefixes of port names.
 VALUE, PUBLISHES, CALLS = "value_", "publishes_", "calls_"
@@ -101,7 +101,6 @@ def port_name(beginning: str, topic: str) -> str:
 BACK_WITHIN = 5.0  # [s] in which a missing server must appear
 STOP_WITHIN = 0.5  # [s] in which the stop that cancelled a goal becomes known here
 LOOK_AGAIN = 0.1  # [s] between two polls of what nothing announces
-REASONS = ("message", "error_msg", "error_string")  # fields of a result or a response that give a reason
 
 WhenDone = Callable[[Result], None]
 

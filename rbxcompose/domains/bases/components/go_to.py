@@ -19,6 +19,7 @@ from rbxcompose.msgs.std_msgs import Header
 
 MAP = "map"
 FARTHEST = 100_000.0  # [m] from the origin; no map is as large
+ServedPose = sdk.ServedGoal[NavigateToPose.Goal, NavigateToPose.Result, NavigateToPose.Feedback]
 
 
 class GoToConfig(sdk.Config):
@@ -87,17 +88,16 @@ class GoTo(sdk.Component[GoToConfig]):
             self.drive(AT_REST)
             goal.canceled()
         elif pose is None:
-            self.drive(AT_REST)
-            goal.aborted(f"the position of the base is unknown in '{MAP}'")
+            self.fail(goal, f"the position of the base is unknown in '{MAP}'")
         else:
             self.follow(goal, pose, dt)
 
-    def follow(
-        self,
-        goal: sdk.ServedGoal[NavigateToPose.Goal, NavigateToPose.Result, NavigateToPose.Feedback],
-        pose: Pose2,
-        dt: float,
-    ) -> None:
+    def fail(self, goal: ServedPose, why: str) -> None:
+        """End a goal that cannot be reached."""
+        self.drive(AT_REST)
+        goal.aborted(why, NavigateToPose.Result(error_code=1, error_msg=why))
+
+    def follow(self, goal: ServedPose, pose: Pose2, dt: float) -> None:
         """Command the base for one cycle and report where it is and what remains."""
         wanted = pose_of(goal.request.pose)
         if goal is not self.driving:
@@ -108,8 +108,7 @@ class GoTo(sdk.Component[GoToConfig]):
         if done:
             goal.succeeded()
         elif self.core.stuck:
-            self.drive(AT_REST)
-            goal.aborted("the base gets no closer")
+            self.fail(goal, "the base gets no closer")
         else:
             left = least_time(pose, wanted, self.core.settings)
             at = Pose(Point(pose.x, pose.y), Quaternion(*quaternion_from_yaw(pose.heading)))

@@ -344,7 +344,7 @@ class Navigator(sdk.Component[NavigatorConfig]):
         newest = next((goal for goal in goals if goal is not self.goal), None) or (goals[0] if goals else None)
         for goal in goals:
             if goal is not newest:
-                goal.aborted("replaced by a newer goal")
+                abort(goal, "replaced by a newer goal")
         return newest
 
     def trouble(self) -> str:
@@ -514,10 +514,7 @@ class Navigator(sdk.Component[NavigatorConfig]):
         self.leave_recovery()
         self.rest()
         self.goal = None
-        if isinstance(goal.request, NavigateThroughPoses.Goal):
-            goal.aborted(why, NavigateThroughPoses.Result(error_code=1, error_msg=why))
-        else:
-            goal.aborted(why, NavigateToPose.Result(error_code=1, error_msg=why))
+        abort(goal, why)
 
     def report(self, goal: NavigatorGoal, pose: Pose2) -> None:
         """Report how far it is."""
@@ -555,6 +552,12 @@ class Navigator(sdk.Component[NavigatorConfig]):
         table[[INSCRIBED, LETHAL, NO_INFORMATION]] = 99, 100, -1
         shown = GridMap(table.astype(np.int8)[self.costs.values], self.costs.grid.resolution, self.costs.grid.origin)
         self.costmap(grid_message(shown, Header(stamp=to_time(self.stamp), frame_id=MAP_FRAME)))
+
+
+def abort(goal: NavigatorGoal, why: str) -> None:
+    """End a goal with the reason in its result."""
+    action: Any = NavigateThroughPoses if isinstance(goal.request, NavigateThroughPoses.Goal) else NavigateToPose
+    goal.aborted(why, action.Result(error_code=1, error_msg=why))
 
 
 def follower_settings(config: NavigatorConfig) -> FollowerSettings:
