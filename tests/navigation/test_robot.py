@@ -129,6 +129,7 @@ def test_a_goal_that_cannot_be_reached_fails_with_the_reason(tmp_path: Path) -> 
     assert room.reason() == "the goal is outside of the map"
     assert room.go(1.0, 0.0, frame="moon").outcome is Outcome.REJECTED
     assert room.go(math.nan, 0.0).outcome is Outcome.REJECTED
+    assert room.go(1e308, 0.0).outcome is Outcome.REJECTED
 
 
 def test_it_drives_through_poses_without_a_stop(tmp_path: Path) -> None:

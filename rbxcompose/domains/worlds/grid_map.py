@@ -20,11 +20,14 @@ from numpy.typing import ArrayLike, NDArray
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.geometry import Pose2
+from rbxcompose.base.printable import plain
+from rbxcompose.base.units import MOST
 from rbxcompose.manifest.yaml_nodes import compose
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 SOLID = 65  # a cell of at least this is a solid square, as for map_saver
 MOST_CELLS = 100_000_000
+SMALLEST = 1e-3  # [m] side of a cell
 MOST_BYTES = 450_000_000  # of a picture: so many cells as text
 MOST_TEXT = 100_000  # of the YAML [B]
 MODES = ("trinary", "scale", "raw")
@@ -48,7 +51,8 @@ class GridMap:
     """A map of square cells, as nav_msgs/OccupancyGrid has it; its cells are never changed.
 
     Raises:
-        MapError: if there are no cells or more than 100 million, or a number is not finite or not above zero.
+        MapError: if there are no cells or more than 100 million, they are smaller than 1 mm, or a number is not finite
+            and below 1e15.
     """
 
     cells: Cells
@@ -62,10 +66,11 @@ class GridMap:
         if self.cells.ndim != 2 or self.cells.dtype != np.int8:
             raise MapError(f"cells are a table of int8, not {self.cells.ndim}-dimensional {self.cells.dtype}")
         _check_size(*self.cells.shape[::-1])
-        if not 0 < self.resolution < math.inf:
-            raise MapError(f"the resolution is above 0 m, not {self.resolution}")
-        if not all(map(math.isfinite, (self.origin.x, self.origin.y, self.origin.heading))):
-            raise MapError(f"the origin is three finite numbers, not {self.origin}")
+        if not SMALLEST <= self.resolution < MOST:
+            raise MapError(f"the resolution is at least 1 mm, and below 1e15 m, not {self.resolution}")
+        origin = self.origin.x, self.origin.y, self.origin.heading
+        if not all(abs(number) < MOST for number in origin):
+            raise MapError(f"the origin is three finite numbers below 1e15, not {', '.join(map(str, origin))}")
 
     def to_cells(self, points: ArrayLike) -> Points:
         """Return points (..., 2) of `map` [m] as (column, row) counted in cells from the origin; whole at corners."""
@@ -177,11 +182,11 @@ def _read(path: Path, most: int) -> bytes:
     try:
         return read_regular(path, most)
     except (OSError, ValueError) as error:
-        raise MapError(f"cannot read {path.name}: {getattr(error, 'strerror', None) or error}") from error
+        raise MapError(f"cannot read {path.name or path}: {getattr(error, 'strerror', None) or error}") from error
 
 
 def _entries(text: str, name: str) -> dict[str, object]:
-    """Return the entries of a YAML mapping as texts and lists of texts; any other value is left out."""
+    """Return the entries of a YAML mapping as texts and lists of texts; any other value is None."""
     root, trouble = compose(text, name)
     if trouble is not None:
         raise MapError(f"{name} is not YAML: {trouble.message}")
@@ -189,10 +194,14 @@ def _entries(text: str, name: str) -> dict[str, object]:
         raise MapError(f"{name} has no entries")
     found: dict[str, object] = {}
     for key, value in root.value:
-        if isinstance(value, yaml.ScalarNode):
-            found[str(key.value)] = value.value
-        elif isinstance(value, yaml.SequenceNode):
-            found[str(key.value)] = [item.value for item in value.value]
+        if not isinstance(key, yaml.ScalarNode):
+            raise MapError(f"{name} has a key that is no name")
+        if key.value in found:
+            raise MapError(f"'{plain(key.value, 60)}' is written twice in {name}")
+        if isinstance(value, yaml.SequenceNode) and all(isinstance(item, yaml.ScalarNode) for item in value.value):
+            found[key.value] = [item.value for item in value.value]
+        else:
+            found[key.value] = value.value if isinstance(value, yaml.ScalarNode) else None
     return found
 
 

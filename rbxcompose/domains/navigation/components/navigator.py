@@ -16,7 +16,7 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
 from rbxcompose.base.printable import plain
-from rbxcompose.base.units import ANGLE, LENGTH
+from rbxcompose.base.units import ANGLE, LENGTH, MOST
 from rbxcompose.domains.navigation.costs import (
     DEAREST,
     INSCRIBED,
@@ -271,8 +271,8 @@ class Navigator(sdk.Component[NavigatorConfig]):
         frame, pose = goal.pose.header.frame_id, pose_in(goal.pose.pose)
         if frame not in ("", MAP_FRAME):
             return f"a goal must be given in '{MAP_FRAME}', not in '{frame}'"
-        is_finite = all(map(math.isfinite, (pose.x, pose.y, pose.heading)))
-        return "" if is_finite else "the goal is not a finite pose"
+        is_near = all(abs(number) < MOST for number in (pose.x, pose.y, pose.heading))
+        return "" if is_near else "the numbers of a pose are finite and below 1e15"
 
     def accept_spin(self, goal: Spin.Goal) -> str:
         """Refuse a turn during a drive, and one that is none."""
