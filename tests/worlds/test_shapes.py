@@ -60,3 +60,9 @@ def test_corners_may_be_given_in_either_direction() -> None:
     assert PolygonFootprint(points).points == points
     assert PolygonFootprint(points[::-1]) == PolygonFootprint(points[::-1])
     assert set(PolygonFootprint(points[::-1]).points) == set(points)
+
+
+def test_a_corner_on_an_edge_or_written_twice_is_none() -> None:
+    third = ((0.0, 0.0), (0.1, 0.1), (0.3, 0.3), (0.0, 1.0))  # the second is off the line by rounding
+    assert PolygonFootprint(third).points == (third[0], *third[2:])
+    assert PolygonFootprint((*third, third[0])).points == (*third[2:], third[0])

@@ -13,6 +13,7 @@ from rbxcompose.base.geometry import Pose2, Transform3, Vector3
 
 Point2 = tuple[float, float]
 FLAT = 1e-12  # an area that is none [m^2]
+STRAIGHT = 1e-9  # a turn that is none [rad]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,16 +35,19 @@ class CircleFootprint:
 
 @dataclass(frozen=True, slots=True)
 class PolygonFootprint:
-    """A convex polygon; its corners (x, y) [m] are kept so that they turn left.
+    """A convex polygon; its corners (x, y) [m] are kept so that they turn left, without those that make no corner.
 
     Raises:
-        ValueError: if it is not convex, or has fewer than three corners, or some on one line.
+        ValueError: if it is not convex, or has fewer than three corners.
     """
 
     points: tuple[Point2, ...]
 
     def __post_init__(self) -> None:
-        for points in (self.points, self.points[::-1]):
+        corners = tuple(point for i, point in enumerate(self.points) if point != self.points[i - 1])
+        around = zip((*corners[-1:], *corners), corners, (*corners[1:], *corners[:1]), strict=False)
+        corners = tuple(at for before, at, after in around if abs(_turn(before, at, after)) > STRAIGHT)
+        for points in (corners, corners[::-1]):
             turns = [_turn(points[i - 2], points[i - 1], points[i]) for i in range(len(points))]
             if len(points) > 2 and min(turns) > 0 and sum(turns) < 7:  # a star turns around twice
                 object.__setattr__(self, "points", points)
