@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rbxcompose.commands.main import main
-from rbxcompose.domains.worlds.commands.map import write_map
+from rbxcompose.domains.worlds.commands.map import base_of, write_map
 from rbxcompose.domains.worlds.grid_map import read_map
 from rbxcompose.testing.golden import Golden
 from tests.cli.live_robot import Robot
@@ -53,6 +53,11 @@ def test_what_is_no_world_is_told(capsys: pytest.CaptureFixture[str], tmp_path: 
     (tmp_path / "wrong.yaml").write_text(f"{EMPTY}map: nowhere.yaml\n")
     assert "RBX1301" in told(capsys, str(tmp_path / "wrong.yaml"), code=1)
     assert "RBX1301" in told(capsys, str(tmp_path / "none.yaml"), code=1)
+    (tmp_path / "twice.yaml").write_text(f"{EMPTY}places: {{a: {{x: 1 m}}, a: {{x: 2 m}}}}\n")
+    (tmp_path / "robot.yaml").write_text("rbx: 1\nkind: Robot\nname: r\nworld: twice.yaml\n")
+    for action in ("show", "picture"):
+        assert "RBX1104" in told(capsys, action, str(tmp_path / "twice.yaml"), code=1)
+        assert "RBX1104" in told(capsys, action, str(tmp_path / "robot.yaml"), code=1)
 
 
 def test_a_picture_has_the_form_that_its_name_says(
@@ -107,6 +112,17 @@ def test_a_map_is_shown(robot: Robot) -> None:
     shown = robot.told("map", "show")
     assert (shown["cells"], shown["resolution"], shown["unknown"]) == ([160, 120], 0.05, 0.0)
     assert robot.do("map").stdout.startswith("8 m x 6 m, 160 x 120 cells of 0.05 m")
+
+
+def test_a_map_in_a_folder_has_a_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "house").mkdir()
+    for out in ("", ".", "./", ".yaml"):
+        assert base_of(out) == Path("map")
+    assert base_of("..") == base_of("../") == Path("../map")
+    assert base_of("house") == base_of("house/") == Path("house/map")
+    assert base_of("new/") == Path("new/map")
+    assert base_of("house.yaml") == base_of("house.pgm") == Path("house")
 
 
 def test_a_map_that_cannot_be_written_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

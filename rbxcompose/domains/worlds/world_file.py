@@ -22,7 +22,7 @@ from rbxcompose.domains.worlds.world import NO_WALLS
 from rbxcompose.domains.worlds.world_mesh import world_mesh
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.fields import FileName
-from rbxcompose.manifest.files import resolve
+from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.tree import MappingNode, value_span
 from rbxcompose.manifest.validate import validate
 
@@ -219,6 +219,8 @@ class WorldFile:
     spawn: Mapping[str, Pose2]
     places: Mapping[str, Place]
     lights: Mapping[str, WorldLightModel] = field(default_factory=dict)
+    source: str = ""
+    """The file, as findings show it."""
 
 
 def read_world(path: Path, documents: Documents, span: Span) -> WorldFile | None:
@@ -243,7 +245,7 @@ def read_world(path: Path, documents: Documents, span: Span) -> WorldFile | None
         return None
     spawn = {name: pose.pose for name, pose in read.spawn.items()}
     places = {name: Place(name, place.x, place.y, place.heading, place.colour) for name, place in read.places.items()}
-    return WorldFile(read.name, file, grid, objects, read.holes, spawn, places, read.lights)
+    return WorldFile(read.name, file, grid, objects, read.holes, spawn, places, read.lights, shown_name(path))
 
 
 def _with_meshes(read: WorldModel, root: MappingNode, path: Path, report: Report) -> dict[str, WorldObjectModel] | None:

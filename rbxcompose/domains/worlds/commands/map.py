@@ -30,13 +30,15 @@ GROUP = "data"
 ON_SYSTEM = options.BUS
 FOR_ALL = ("show",)
 NO_MAP = kind("RBX3641")
+DEFAULT = "map"  # the name of a map
 _TYPE = "nav_msgs/msg/OccupancyGrid"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     topic = options.argument("--topic", default="map", metavar="TOPIC", help="the topic of the map (default: map)")
-    out = options.out_option("write NAME.yaml and NAME.pgm (default: map)", metavar="NAME", default="map")
+    words = f"write NAME.yaml and NAME.pgm (default: {DEFAULT}, also in a folder)"
+    out = options.out_option(words, metavar="NAME", default=DEFAULT)
     force = options.argument("--force", action="store_true", help="replace files that exist")
     shared = (topic, partial(options.add_timeout_option, default="5s"), add_bus_options, options.add_system_options)
     actions = (
@@ -94,11 +96,17 @@ def _show(guest: Guest, arguments: argparse.Namespace) -> int:
 
 
 def _save(guest: Guest, arguments: argparse.Namespace) -> int:
-    base = Path(arguments.out.removesuffix(".yaml").removesuffix(".pgm"))
+    base = base_of(arguments.out)
     files = [f"{base.name}.yaml", f"{base.name}.pgm"]
     if not arguments.force and (finding := taken(base.parent, files)) is not None:
         return refuse(replace(finding, help="choose another name with '--out', or say '--force'"))
     return write_map(received_map(guest, arguments.topic, arguments.timeout), base)
+
+
+def base_of(out: str) -> Path:
+    """Return where a map is written, without an ending: below that name, in a folder below its own."""
+    name = out.removesuffix(".yaml").removesuffix(".pgm")
+    return Path(name) / DEFAULT if not name or name.endswith("/") or Path(out).is_dir() else Path(name)
 
 
 def write_map(grid: GridMap, base: Path) -> int:

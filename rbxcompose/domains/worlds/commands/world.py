@@ -75,7 +75,9 @@ def world_named(arguments: argparse.Namespace) -> WorldFile:
         if found is None and not report.has_errors:
             words = f"the robot '{plain(shown_name(Path(path)))}' is in no world"
             raise NotDoneError(NO_WORLD.at(None, words, help="name one with '--world FILE', or the file itself"))
-    if found is None:
+    if found is not None:  # nothing else that is wrong with a robot concerns its world
+        report = Report([one for one in report if one.span is not None and one.span.file == found.source])
+    if found is None or report.has_errors:
         write_report(report, sources)
         raise ReportedError
     return found
