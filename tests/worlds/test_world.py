@@ -9,12 +9,17 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.base.geometry import Pose2
+from rbxcompose.base.geometry import Pose2, Transform3
+from rbxcompose.base.transforms import TransformError
 from rbxcompose.domains.worlds.contact import first_contact
 from rbxcompose.domains.worlds.grid_map import GridMap
+from rbxcompose.domains.worlds.poses import LATE, NewestMessage
 from rbxcompose.domains.worlds.ray_casting import Rays
 from rbxcompose.domains.worlds.shapes import CircleFootprint, ShapePath, WorldShape
 from rbxcompose.domains.worlds.world import SimulatedWorld
+from rbxcompose.msgs.sensor_msgs import LaserScan
+from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.std_msgs import Header
 from tests.parts.project import Project
 from tests.worlds.scenes import ANGLES, HEIGHT, grids, shapes
 
@@ -67,3 +72,32 @@ def test_a_world_with_more_things_than_a_robot_needs_is_refused_with_the_reason(
     checked = Project(tmp_path).check("world: ../../many.yaml\ncomponents:\n  base: {type: diff_drive_sim}\n")
     assert checked.compilation.plan is None
     assert "more than 1,000 keys in one map" in checked.text
+
+
+class Placed:
+    """A frame whose pose is known up to a stamp [ns]."""
+
+    known = 0
+
+    def now(self) -> Pose2:
+        return Pose2()
+
+    def transform(self, *, at: int | None = None) -> Transform3:
+        if at is not None and at > self.known:
+            raise TransformError("it is not known yet")
+        return Transform3()
+
+
+def test_a_transform_that_comes_a_little_late_is_no_problem_unless_none_comes() -> None:
+    newest, look, taken = NewestMessage[LaserScan](), Placed(), 0
+    for cycle in range(1, 41):  # a scan each 50 ms, and transforms 20 ms later, until none come any more
+        now = cycle * 0.05
+        newest.put(LaserScan(Header(stamp=to_time(round(now * 1e9)))))
+        for time in (now, now + 0.03):
+            look.known = round(min(time - 0.02, 1.0) * 1e9)
+            taken += newest.take(time, look) is not None
+            assert newest.problem == ("" if time < 1.049 + LATE else "it is not known yet")
+    assert taken == 20
+    look.known = 1 << 60
+    assert newest.take(3.0, look)
+    assert newest.problem == ""

@@ -80,7 +80,7 @@ class TagWatcher(sdk.Component[C]):
 
     def take_tags(self) -> None:
         """Take the newest tags, unless that has been done."""
-        if (placed := self.newest.take(self.bound["camera"], self.bound["base"])) is None:
+        if (placed := self.newest.take(self.now, self.bound["camera"], self.bound["base"])) is None:
             return
         message, (at, base) = placed
         self.taken = self.now

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 from rbxcompose.base.geometry import Pose2, Transform3, quaternion_from_rpy, yaw_of
@@ -40,6 +41,9 @@ def rays_of(scan: LaserScan) -> tuple[Numbers, Numbers]:
     return angles, ranges
 
 
+LATE = 0.3  # [s] that a transform may come later than what was measured at its time
+
+
 class WithHeader(Protocol):
     """A message with a header."""
 
@@ -55,13 +59,14 @@ M = TypeVar("M", bound=WithHeader)
 class NewestMessage(Generic[M]):
     """The newest message of a sensor, until it is known where that was when it measured.
 
-    Transforms of that time may come later than the message.
+    Transforms of that time may come later than the message, so that they are missing is a problem only if it lasts.
     """
 
     def __init__(self, frame: str = "", wrong: str = "it is in '{}', not in '{}'") -> None:
         """Take messages in a frame, or in any; `wrong` says what is wrong with those in another one."""
         self._frame, self._wrong = frame, wrong
         self._message: M | None = None
+        self._waits = math.inf  # since when transforms have been missing [s]
         self.problem = ""
         """Why it cannot be used so far."""
 
@@ -69,8 +74,8 @@ class NewestMessage(Generic[M]):
         """Take a message in place of the one before."""
         self._message = message
 
-    def take(self, *looks: Look) -> tuple[M, list[Transform3]] | None:
-        """Return the message with the poses of frames at its time, once; None as long as there is none."""
+    def take(self, now: float, *looks: Look) -> tuple[M, list[Transform3]] | None:
+        """Return the message with the poses of frames at its time, once; None as long as there is none [s]."""
         if (message := self._message) is None:
             return None
         frame, stamp = message.header.frame_id.lstrip("/"), to_nanoseconds(message.header.stamp) or None
@@ -80,7 +85,9 @@ class NewestMessage(Generic[M]):
         try:
             poses = [look.transform(at=stamp) for look in looks]
         except LookupError as error:
-            self.problem = str(error)
+            self._waits = min(self._waits, now)
+            if now - self._waits >= LATE:
+                self.problem = str(error)
             return None
-        self._message, self.problem = None, ""
+        self._message, self._waits, self.problem = None, math.inf, ""
         return message, poses

@@ -87,7 +87,7 @@ class Mapper(sdk.Component[MapperConfig]):
 
     def take_scan(self) -> None:
         """Take the newest scan, unless that has been done."""
-        if (placed := self.scan.take(self.bound["laser"])) is None:
+        if (placed := self.scan.take(self.now, self.bound["laser"])) is None:
             return  # diagnostics of transforms say so
         message, (at,) = placed
         try:

@@ -234,7 +234,7 @@ class Navigator(sdk.Component[NavigatorConfig]):
         """Take the newest scan, unless that has been done; one that cannot be used is as good as none."""
         if self.costs is None or "laser" not in self.bound:
             return
-        placed = self.scan.take(self.bound["laser"])
+        placed = self.scan.take(self.now, self.bound["laser"])
         self.unusable = self.scan.problem or self.unusable
         if placed is None:
             return

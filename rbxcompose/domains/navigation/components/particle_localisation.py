@@ -137,7 +137,7 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
 
     def take_scan(self) -> None:
         """Weigh the newest scan, unless that has been done."""
-        if self.filter is None or (placed := self.scan.take(self.bound["laser"], self.odometry)) is None:
+        if self.filter is None or (placed := self.scan.take(self.now, self.bound["laser"], self.odometry)) is None:
             return  # diagnostics of transforms say so
         message, (laser, base) = placed
         self.filter.move(base.to_pose2())

@@ -76,7 +76,7 @@ class PeopleTracker(TellsPeople[PeopleTrackerConfig]):
 
     def take_scan(self) -> None:
         """Take the newest scan, unless that has been done."""
-        if (placed := self.scan.take(self.bound["laser"])) is None:
+        if (placed := self.scan.take(self.now, self.bound["laser"])) is None:
             return
         message, (at,) = placed
         self.taken = self.now

@@ -152,7 +152,7 @@ class PersonFollower(sdk.Component[PersonFollowerConfig]):
         """Take the newest scan, unless that has been done or nobody is followed."""
         if self.costs is None or self.goal is None:
             return
-        placed = self.scan.take(self.bound["laser"])
+        placed = self.scan.take(self.now, self.bound["laser"])
         self.unusable = self.scan.problem or self.unusable
         if placed is None:
             return
