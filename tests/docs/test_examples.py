@@ -10,6 +10,7 @@ import pytest
 
 from rbxcompose.base.findings import Severity
 from rbxcompose.commands.verbs import load, parser_of, verbs
+from rbxcompose.tools.parameters.changes import assignments
 from tests.docs.examples import ROOT, Block, checked, page_blocks
 from tests.soak import rare
 
@@ -43,7 +44,8 @@ def commands(block: Block) -> list[list[str]]:
 def test_a_command_parses(block: Block) -> None:
     for verb, *words in commands(block):
         assert verb in verbs()
-        parser_of(verb, load(verb)).parse_args(words)
+        arguments = parser_of(verb, load(verb)).parse_args(words)
+        assert (verb, *words[:1]) != ("param", "set") or assignments(arguments.words)
 
 
 def test_the_pages_show_commands() -> None:

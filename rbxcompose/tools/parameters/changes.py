@@ -157,12 +157,7 @@ def _user() -> str:
 
 def param_set(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     """Set one parameter, or several at once."""
-    words = arguments.words
-    if len(words) == _WORDS and "=" not in words[0]:
-        pairs = [(words[0], words[1], words[2])]
-    elif all(_is_pair(word) for word in words):
-        pairs = [_pair(word) for word in words]
-    else:
+    if not (pairs := assignments(arguments.words)):
         return misused("param", "write COMPONENT PARAMETER VALUE, or COMPONENT.PARAMETER=VALUE for each")
     wanted: dict[str, list[rcl_interfaces.Parameter]] = {}
     for component, name, text in pairs:
@@ -209,6 +204,13 @@ def param_undo(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
 
 def _first(change: ParameterChange, found: Sequence[ParameterChange]) -> int:
     return min(each.number for each in found if each.component == change.component)
+
+
+def assignments(words: Sequence[str]) -> list[tuple[str, str, str]]:
+    """Return component, parameter and value of each change that the words of `param set` mean; none if they do not."""
+    if len(words) == _WORDS and "=" not in words[0]:
+        return [(words[0], words[1], words[2])]
+    return [_pair(word) for word in words] if all(map(_is_pair, words)) else []
 
 
 def _is_pair(word: str) -> bool:
