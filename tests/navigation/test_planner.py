@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from itertools import pairwise
 
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.navigation import planner
-from rbxcompose.domains.navigation.costs import CostSettings, CostZone, LayeredCosts
+from rbxcompose.domains.navigation.costs import INSCRIBED, CostSettings, CostZone, LayeredCosts
 from rbxcompose.domains.navigation.planner import NoPathError, plan
 from tests.navigation.houses import HOUSE, ONE_WALL, SIDE, room
 
@@ -67,6 +68,25 @@ def test_a_goal_in_an_obstacle_is_reached_within_the_tolerance() -> None:
 
 def test_a_robot_that_touches_something_may_leave_it() -> None:
     assert plan(LayeredCosts(ONE_WALL, SETTINGS), Pose2(-0.2, 0.0), Pose2(-2.0, 0.0), 0.1).length > 1.7
+
+
+@given(PLACES, PLACES)
+@settings(max_examples=40, deadline=None)
+def test_on_its_way_out_it_touches_nothing_more_than_at_first(start: Pose2, goal: Pose2) -> None:
+    costs = LayeredCosts(HOUSE, CostSettings(radius=0.9, inflation=1.0))
+    assume(costs.is_blocked(start.x, start.y) and not costs.is_wall(start.x, start.y))
+    with suppress(NoPathError):
+        for pose in plan(costs, start, goal, 0.1).poses:
+            cell = costs.cell_of(pose.x, pose.y)
+            at_first = costs.away[costs.cell_of(start.x, start.y)]
+            assert costs.values[cell] < INSCRIBED or costs.away[cell] >= at_first - SIDE
+
+
+@pytest.mark.parametrize("radius", [6.0, 1e9])
+def test_a_robot_that_fits_nowhere_finds_no_way_for_ever(radius: float) -> None:
+    with pytest.raises(NoPathError, match="the robot fits nowhere on the map: it covers a circle with") as trouble:
+        plan(LayeredCosts(room(), CostSettings(radius, inflation=radius)), Pose2(), Pose2(1.0, 0.0), 0.1)
+    assert trouble.value.is_final
 
 
 def test_a_large_map_is_searched_roughly_first_with_the_same_result(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,8 @@ import pytest
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.bases.components.diff_drive_sim import DiffDriveSim
+from rbxcompose.domains.navigation.components.navigator import Navigator
+from rbxcompose.domains.navigation.planner import PlannedPath
 from rbxcompose.domains.worlds.grid_map import map_files
 from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.msgs.builtin_interfaces import Duration, Time
@@ -241,6 +243,24 @@ def test_recoveries_are_a_mission_that_users_may_replace(tmp_path: Path) -> None
     assert texts.count("and nothing that was tried has helped") > 1
     assert all(f"recover: {did}: success" in texts for did in ("spin 90 deg", "back_up 20 cm"))
     assert room.contacts == []
+
+
+def test_what_is_driven_to_and_fro_is_no_progress(tmp_path: Path) -> None:
+    navigator = Room(tmp_path).bench.component("go_to")
+    assert isinstance(navigator, Navigator)
+    path = PlannedPath((Pose2(-2.0, 1.0), Pose2(2.0, 1.0)))
+    navigator.poses = [path.poses[-1], Pose2(2.0, 2.0)]
+
+    def attempts_at(*distances: float) -> int:
+        for navigator.follower.left in distances:
+            navigator.get_on(path)
+        return navigator.attempts
+
+    assert attempts_at(4.0, 3.0) == 0
+    navigator.attempts = 1
+    assert attempts_at(3.5, 2.8, 3.5, 2.8) == 1
+    assert attempts_at(2.6) == 0
+    assert navigator.least == 3.6  # with the way to the next pose
 
 
 def test_manoeuvres_are_skills_of_their_own_and_stop_before_something(tmp_path: Path) -> None:

@@ -307,6 +307,11 @@ class LayeredCosts:
         """Return which cells something is in."""
         return self._lasting | self._marks
 
+    @property
+    def has_room(self) -> bool:
+        """Return whether the map and its zones leave room for the robot anywhere."""
+        return float(_distances(self._lasting).max() - 1) * self.grid.resolution > self.settings.radius
+
     def cell_of(self, x: float, y: float) -> tuple[int, int]:
         """Return the row and the column of a point of `map` [m], which may be beside it."""
         column, row = np.floor(self.grid.to_cells((x, y))).astype(int).tolist()
@@ -331,7 +336,7 @@ class LayeredCosts:
         middles = _distances(solid)[inner]
         self._away[rows, columns] = middles * side
         away = (middles - 1) * side  # from any place of a cell to the edge of an obstacle
-        found = DEAREST * np.exp(-settings.decay * (away - settings.radius))
+        found = DEAREST * np.exp(-settings.decay * np.maximum(away - settings.radius, 0.0))
         found[away > settings.inflation] = 0.0
         found = np.where(away <= settings.radius, INSCRIBED, np.minimum(found, DEAREST))
         found[(found < INSCRIBED) & self._unknown[rows, columns] & ~self._marks[rows, columns]] = NO_INFORMATION

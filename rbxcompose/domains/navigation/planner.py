@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, wrap_angle
+from rbxcompose.base.units import LENGTH, format_quantity
 from rbxcompose.domains.navigation.costs import DEAREST, INSCRIBED, LETHAL, NO_INFORMATION, LayeredCosts
 from rbxcompose.domains.navigation.lattice import margin, search
 from rbxcompose.domains.worlds.shapes import PolygonFootprint
@@ -68,6 +69,9 @@ def plan(costs: LayeredCosts, start: Pose2, goal: Pose2, tolerance: float) -> Pl
     if not _is_in(last, weights):
         raise NoPathError("the goal is outside of the map", is_final=True)
     if weights[first] < 0:
+        if not (weights > 0).any() and not costs.has_room:
+            size = f"it covers a circle with a radius of {format_quantity(costs.settings.radius, LENGTH)}"
+            raise NoPathError(f"the robot fits nowhere on the map: {size}", is_final=True)
         _open_around(costs, weights, first)
     if costs.settings.outline is not None:
         return _plan_for(costs.settings.outline, costs, weights, start, goal, tolerance)
@@ -143,10 +147,11 @@ def _weights(costs: LayeredCosts) -> Grid:
 
 
 def _open_around(costs: LayeredCosts, weights: Grid, at: Cell) -> None:
-    """Let a robot that touches something leave it, on the shortest way: through what is near, not through obstacles."""
-    reach = math.ceil(costs.settings.radius / costs.grid.resolution) + 1
+    """Let a robot that touches something leave it, on the shortest way: through what is near, but not nearer to it."""
+    side = costs.grid.resolution
+    reach = math.ceil(costs.settings.radius / side) + 1
     near = tuple(slice(max(0, index - reach), index + reach + 1) for index in at)
-    weights[near][costs.values[near] == INSCRIBED] = TOUCHED
+    weights[near][(costs.values[near] == INSCRIBED) & (costs.away[near] >= costs.away[at] - side)] = TOUCHED
     weights[at] = TOUCHED
 
 

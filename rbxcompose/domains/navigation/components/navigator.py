@@ -52,7 +52,7 @@ BACK_UP_SPEED = 0.1  # [m/s]
 BASE, RUN = "base", "run_mission"
 TURN_ACCELERATION = 1.5  # [rad/s^2]
 NEAR_CORNERS = 0.1  # [m]
-PROGRESS = 0.3  # moving this far counts as progress [m]
+PROGRESS = 0.3  # moving this far counts as progress, towards the goal once something has been tried [m]
 SHOWN = 1.0  # [s] between two costmaps
 SPUN = math.radians(3600)  # the largest turn [rad]
 BACKED = 2.0  # the farthest that it backs up [m]
@@ -190,6 +190,7 @@ class Navigator(sdk.Component[NavigatorConfig]):
         self.approaches = False  # whether the way ends near a goal where something is
         self.yields = -math.inf  # until when it stands after a recovery [s]
         self.came = math.inf  # how near to it such ways have led [m]
+        self.least = math.inf  # how far it was to the last pose when it got on last [m]
         wrong = "it is in '{}', not in '{}': set 'frame' of 'obstacles'"
         self.scan = NewestMessage[LaserScan](self.config.scan_frame, wrong)
         self.unusable = ""  # why the newest scan cannot be used
@@ -198,7 +199,7 @@ class Navigator(sdk.Component[NavigatorConfig]):
         self.recovery: sdk.SentGoal | None = None  # that runs
         self.manoeuvre: Manoeuvre | None = None
         self.manoeuvred: ManoeuvreGoal | None = None  # its goal
-        self.mark = Pose2()  # where it was when it got on last, at the time `waits`
+        self.mark = Pose2()  # where it was when it moved last, at the time `waits`
 
     def activate(self) -> None:
         """Show the zones."""
@@ -320,7 +321,7 @@ class Navigator(sdk.Component[NavigatorConfig]):
             return
         if goal is not self.goal:
             self.goal, self.path, self.recoveries, self.attempts = goal, None, 0, 0
-            self.approaches, self.came, self.yields = False, math.inf, -math.inf
+            self.approaches, self.came, self.least, self.yields = False, math.inf, math.inf, -math.inf
             self.poses = poses_of(goal.request)
             self.mark = Pose2(math.inf, math.inf)
             self.began = self.waits = self.now
@@ -362,7 +363,7 @@ class Navigator(sdk.Component[NavigatorConfig]):
     def drive_on(self, goal: NavigatorGoal, pose: Pose2, costs: LayeredCosts, dt: float) -> None:
         """Plan if that is necessary, and follow the way."""
         if self.mark.distance(pose) > PROGRESS:
-            self.mark, self.waits, self.attempts = pose, self.now, 0
+            self.mark, self.waits = pose, self.now
         if len(self.poses) > 1 and pose.distance(self.poses[0]) <= self.config.look_ahead:
             self.aim_at_next()
         if self.now - self.looked >= AGAIN:
@@ -374,6 +375,7 @@ class Navigator(sdk.Component[NavigatorConfig]):
                 self.recover(goal)
             return
         velocity, state = self.follower.update(pose, costs, dt)
+        self.get_on(self.path)
         if state in (FollowState.BLOCKED, FollowState.STUCK):
             self.path, self.reason = None, "something is in the way" if state is FollowState.BLOCKED else "it is stuck"
             self.recover(goal)
@@ -390,6 +392,15 @@ class Navigator(sdk.Component[NavigatorConfig]):
             self.fail(goal, self.reason or "it gets no further")
         else:
             self.report(goal, pose)
+
+    def get_on(self, path: PlannedPath) -> None:
+        """Note how far it is to the goal; what is driven to and fro, after a recovery, is no progress."""
+        stops = path.poses[-1], *self.poses
+        left = self.follower.left + sum(before.distance(after) for before, after in pairwise(stops))
+        if self.attempts and left < self.least - PROGRESS:
+            self.attempts = 0
+        if not self.attempts or math.isinf(self.least):
+            self.least = left
 
     def aim_at_next(self) -> None:
         """Drive on to the next pose, without a stop."""
