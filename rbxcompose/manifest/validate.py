@@ -342,7 +342,7 @@ def _finding(model: Any, node: tree.TreeNode, path: tree.KeyPath, loc: tree.KeyP
         help_text = "lower-case letters, digits and underscores, starting with a letter"
         near = re.sub(r"\W+", "_", text.strip("/ ")).lower()  # ROS 1 began names of topics with a slash
         help_text += f", such as '{near}'" if re.fullmatch(r"[a-z][a-z0-9_]{0,59}", near) else ""
-        return BAD_NAME.at(place, f"'{text}' is not a valid name", help=help_text)
+        return BAD_NAME.at(place, f"'{text}' is not a valid name", help=str(context.get("help", help_text)))
     match error["type"]:
         case "missing" if loc and isinstance(loc[-1], int):
             return WRONG_TYPE.at(tree.value_span(node, loc[:-1]), f"{where((*path, *loc[:-1]))} needs another item")

@@ -132,6 +132,10 @@ def test_capabilities_are_those_of_any_other_base() -> None:
         ),
         ({"command": [""]}, "'command': a command begins with an executable (such as [./program])"),
         (
+            {"environment": {"B=C": "x"}},
+            "'B=C' is not a valid name (a variable's name has one character or more, and no '=')",
+        ),
+        (
             {"ready": {"output": "a("}},
             "'output': is not a regular expression: missing ), unterminated subpattern at position 1",
         ),

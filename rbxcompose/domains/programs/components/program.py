@@ -111,6 +111,17 @@ def _is_pattern(text: str) -> str:
 
 
 Pattern = Annotated[str, Field(min_length=1, max_length=500), AfterValidator(_is_pattern)]
+
+
+def _is_variable(name: str) -> str:
+    if not name or set("=\0") & set(name):
+        raise PydanticCustomError(
+            "variable", "no name", {"help": "a variable's name has one character or more, and no '='"}
+        )
+    return name
+
+
+Variable = Annotated[str, AfterValidator(_is_variable)]
 CommandWords = Annotated[
     tuple[str, ...], BeforeValidator(_words, json_schema_input_type=tuple[str, ...]), Field(min_length=1)
 ]
@@ -171,9 +182,9 @@ class LevelsModel(Config):
 class RunConfig(DeclaredPorts):
     """How a program is run, whatever kind it is of."""
 
-    environment: dict[str, str] = {}
+    environment: dict[Variable, str] = {}
     """Variables of its environment, besides those of `up`."""
-    secrets: dict[str, Secret] = {}
+    secrets: dict[Variable, Secret] = {}
     """The same for what nobody else may see, such as `{TOKEN: "${secret.token}"}`."""
     ready: ReadyModel | None = None
     """When it is ready; without it, as soon as it runs."""
