@@ -56,10 +56,29 @@ def test_a_file_that_may_not_be_run_is_told_with_what_makes_it_so(tmp_path: Path
     ]
 
 
-def test_a_script_needs_what_runs_it(tmp_path: Path) -> None:
-    executable(tmp_path / "driver", "#!/opt/no/python3 -u\n")
-    ((words, _, _),) = findings(tmp_path, command=["./driver"])
-    assert words == "'p' cannot be started: driver is to be run by /opt/no/python3, which is not there"
+NO_LINE = "driver: the first line of a script names what runs it: '#!/bin/sh'"
+CR_LF = "the lines of driver end with CR LF; Linux needs LF alone"
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("#!/opt/no/python3 -u\n", "driver is to be run by /opt/no/python3, which is not there"),
+        ("#! \t/bin/sh\t-e \n", ""),
+        ("#!/bin/sh\r\ntrue\r\n", CR_LF),
+        ("#!/usr/bin/env sh\r\ntrue\r\n", CR_LF),
+        ("#!/bin/sh -e\n\r\n", ""),
+        ("", NO_LINE),
+        ("#!\ntrue\n", NO_LINE),
+        ("echo hello\n", NO_LINE),
+        ("\x7fELF\2\1\1\0", ""),
+    ],
+)
+def test_a_script_needs_what_runs_it(tmp_path: Path, text: str, why: str) -> None:
+    executable(tmp_path / "driver", text)
+    assert [words for words, _, _ in findings(tmp_path, command=["./driver"])] == (
+        [f"'p' cannot be started: {why}"] if why else []
+    )
 
 
 def test_a_name_is_looked_for_in_the_path_that_the_program_gets(tmp_path: Path) -> None:

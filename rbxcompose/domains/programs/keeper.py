@@ -8,7 +8,6 @@ it ends the program as well. What happens, it writes to a descriptor, a line of 
 from __future__ import annotations
 
 import ctypes
-import errno
 import json
 import math
 import os
@@ -110,8 +109,7 @@ def _become(wanted: ProgramOrder, keeper: int) -> None:
         os.chdir(folder)
         os.execve(file, command, environment)  # noqa: S606 -- what a user wants to run, without a shell
     except OSError as error:
-        why = "the first line of a script names what runs it: '#!/bin/sh'" if error.errno == errno.ENOEXEC else ""
-        raise CannotRunError(f"{file}: {why or error.strerror}") from error
+        raise CannotRunError(f"{file}: {error.strerror}") from error
 
 
 def _limit(name: str, apply: Callable[[], object]) -> None:
@@ -143,19 +141,24 @@ def obstacle(word: str, folder: str, path: str) -> str:
         return f"there is no file {file}"
     if not os.access(file, os.X_OK):
         return f"{file} is not executable"
-    interpreter = _interpreter(file)
-    return f"{file} is to be run by {interpreter}, which is not there" if not os.path.exists(interpreter) else ""
+    return _obstacle_in(file)
 
 
-def _interpreter(file: str) -> str:
-    """Return what runs a script by its first line; of anything else, the file itself."""
+def _obstacle_in(file: str) -> str:
+    """Return why Linux cannot run an executable by what it begins with: the name of an interpreter, or a binary."""
     try:
         with open(file, "rb") as script:
-            first = script.readline(256)
+            start = script.read(256)
     except OSError:
-        return file  # it may be run, but not read
-    words = first[2:].split() if first.startswith(b"#!") else []
-    return os.fsdecode(words[0]) if words else file
+        return ""  # it may be run, but not read
+    words = start[2:].partition(b"\n")[0].replace(b"\t", b" ").strip(b" ").split(b" ")  # a CR belongs to a word
+    interpreter = os.fsdecode(words[0]) if start.startswith(b"#!") else ""
+    if not interpreter:
+        return "" if b"\0" in start else f"{file}: the first line of a script names what runs it: '#!/bin/sh'"
+    name = words[-1] if len(words) == 2 and interpreter.endswith("/env") else words[0]
+    if name.endswith(b"\r"):
+        return f"the lines of {file} end with CR LF; Linux needs LF alone"
+    return f"{file} is to be run by {interpreter}, which is not there" if not os.path.exists(interpreter) else ""
 
 
 def keep(wanted: ProgramOrder, child: int, ended: int, report: Report) -> None:
