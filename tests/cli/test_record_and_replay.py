@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import resource
 import signal
 import socket
@@ -289,7 +290,17 @@ def test_a_file_that_is_there_is_not_overwritten(
     path.write_bytes(b"mine")
     assert "error[RBX9203]" in refused(["record", "--router", router, "-o", str(path)], capsys)
     assert path.read_bytes() == b"mine"
-    assert "error[RBX9203]" in refused(["record", "--router", router, "-o", str(tmp_path / "no/a.mcap")], capsys)
+    for gone in ("no/a.mcap", "no/"):
+        assert "error[RBX9203]" in refused(["record", "--router", router, "-o", f"{tmp_path}/{gone}"], capsys)
+
+
+@pytest.mark.parametrize("end", ["", "/"])
+def test_a_recording_goes_into_a_folder_that_is_named(tmp_path: Path, router: str, end: str) -> None:
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    assert command.main(["record", "--router", router, "--for", "0.01s", "-o", f"{folder}{end}"]) == 0
+    (file,) = tmp_path.rglob("*.mcap")
+    assert re.fullmatch(r"runs/recording-\d{8}-\d{6}\.mcap", str(file.relative_to(tmp_path)))
 
 
 def test_without_a_router_nothing_is_left_behind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

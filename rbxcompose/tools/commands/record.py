@@ -54,7 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_bus_options(parser)
     add_selection_options(parser)
     add_json_option(parser)
-    out_option("the file, else ROBOT-DATE-TIME.mcap; or the folder of the data set", "--output", type=Path)(parser)
+    about = "the file, or the folder of ROBOT-DATE-TIME.mcap (default: this one); or the folder of the data set"
+    out_option(about, "--output")(parser)
     parser.add_argument("--for", type=seconds, dest="duration", metavar="30s", help="end after this time")
     parser.add_argument(
         "--split", type=_split, default=Split(), metavar="SIZE|TIME", help="start a new file after 500MB, or 10min"
@@ -95,7 +96,7 @@ def _record_dataset(arguments: argparse.Namespace) -> int:
     place = None if arguments.recordings else find_place(arguments)
     is_named = place is not None and not arguments.router
     robot = find_robot(arguments.robot).path.name if is_named else arguments.robot
-    folder: Path = arguments.out or Path(f"{robot or 'recording'}-{datetime.now():%Y%m%d-%H%M%S}")
+    folder = Path(arguments.out or f"{robot or 'recording'}-{datetime.now():%Y%m%d-%H%M%S}")
     topics = EpisodeTopics(tuple(arguments.topics), tuple(arguments.classes))
     wanted = WantedDataset(folder, arguments.task or folder.name, arguments.fps, robot, topics, arguments.append)
     if (problem := wanted.problem()) is not None:
@@ -172,11 +173,12 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: b
 
 
 def _path(arguments: argparse.Namespace) -> Path:
-    wanted: Path | None = arguments.out
-    if wanted is not None:
-        return wanted if wanted.suffix == ENDING else wanted.with_name(wanted.name + ENDING)
+    wanted: str = arguments.out or ""
+    path = Path(wanted)
+    if wanted and not wanted.endswith("/") and not path.is_dir():
+        return path if path.suffix == ENDING else path.with_name(path.name + ENDING)
     name = "recording" if arguments.router else find_robot(arguments.robot).path.name
-    return Path(f"{name}-{datetime.now():%Y%m%d-%H%M%S}{ENDING}")
+    return path / f"{name}-{datetime.now():%Y%m%d-%H%M%S}{ENDING}"
 
 
 def _reason(error: OSError) -> str:
