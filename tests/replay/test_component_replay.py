@@ -103,7 +103,7 @@ def test_another_speed_is_told_with_time_field_and_both_values(
 def test_the_command_tells_that_nothing_differs(recording: Recording, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["replay", str(recording.path), "--into", "battery", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert (told["component"], told["difference"]) == ("battery", None)
+    assert (told["component"], told["difference"], told["damage"]) == ("battery", None, "")
     assert told["equal"] > 0
 
 
@@ -160,6 +160,19 @@ def test_a_recording_that_was_cut_is_compared_up_to_there(recording: Recording) 
     found = recording.again("go_to", half)
     assert found.difference is None
     assert 0 < found.equal < recording.again("go_to").equal
+
+
+@pytest.mark.parametrize(("kept", "code"), [(0.5, 0), (0.001, 1)])
+def test_a_recording_that_was_cut_is_told_as_damaged(
+    recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str], kept: float, code: int
+) -> None:
+    whole = recording.path.read_bytes()
+    (cut := tmp_path / "cut.mcap").write_bytes(whole[: int(kept * len(whole))])
+    assert command.main(["replay", str(cut), "--into", "battery", "--json"]) == code
+    shown = capsys.readouterr()
+    assert "warning[RBX9202]" in shown.err
+    assert ("lacks the robot's plan, since it is damaged" in shown.err) == (code == 1)
+    assert code == 1 or json.loads(shown.out)["damage"] == "it ends in the middle"
 
 
 def test_inputs_that_are_not_in_the_recording_are_named(

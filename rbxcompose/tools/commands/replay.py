@@ -12,7 +12,6 @@ its recorded inputs, and compares its outputs with the recording. The settings a
 import argparse
 import json
 import math
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -118,12 +117,11 @@ def run(arguments: argparse.Namespace) -> int:
         recover_in(path.parent)
     if path.name.endswith(PART) and not path.exists():
         path = path.with_name(path.name.removesuffix(PART))
+    reader, summary = _look_through(path)
     if arguments.into is not None:
-        with opened(path) as reader:
-            return run_again(arguments, path, reader)
-    summary = _look_through(path)
+        return run_again(arguments, path, reader)
     if arguments.info:
-        emit(json.dumps(_fields(summary)) if arguments.json else _text(path, summary))
+        emit(json.dumps(_fields(summary, reader.damage)) if arguments.json else _text(path, summary))
         return 0
     return _replay(arguments, path, summary)
 
@@ -140,13 +138,14 @@ def _misused(arguments: argparse.Namespace) -> str:
     return "--write needs --into" if arguments.write and not arguments.into else ""
 
 
-def _look_through(path: Path) -> RecordingSummary:
+def _look_through(path: Path) -> tuple[RecordingReader, RecordingSummary]:
+    """Read a recording to its end, and warn if it is damaged; the reader knows its topics and attachments."""
     with opened(path) as reader:
         summary = summary_of(reader.messages())
     if reader.damage:
         place = f"after {summary.messages:,} messages"
         warn(codes.DAMAGED.at(None, f"'{plain(str(path))}' is damaged {place}: {reader.damage}"))
-    return summary
+    return reader, summary
 
 
 def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary) -> int:
@@ -227,7 +226,7 @@ def _text(path: Path, summary: RecordingSummary) -> str:
     return f"{head}\n{count_table(summary.counts)}" if summary.counts else head
 
 
-def _fields(summary: RecordingSummary) -> dict[str, object]:
+def _fields(summary: RecordingSummary, damage: str) -> dict[str, object]:
     topics = [
         {
             "name": topic.name,
@@ -243,6 +242,7 @@ def _fields(summary: RecordingSummary) -> dict[str, object]:
         "start": summary.start,
         "end": summary.end,
         "duration": summary.duration,
+        "damage": damage,
         "topics": topics,
     }
 
@@ -301,10 +301,11 @@ def _own_router() -> Iterator[str]:
 def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader) -> int:
     """Run the component that `--into` names and report the first difference; return 0 if there is none.
 
+    `reader` has read the recording to its end.
+
     Raises:
         NotDoneError: if the recording lacks something needed, or the outputs cannot be written.
     """
-    deque(reader.messages(), maxlen=0)  # the index of a truncated recording has no attachments
     plan = _plan(arguments, path, reader)
     instance = _instance(plan, arguments.into)
     if missing := missing_topics(plan, instance, reader.topics):
@@ -312,14 +313,17 @@ def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader
         raise NotDoneError(
             codes.NOT_ENOUGH.at(None, f"'{plain(str(path))}' lacks inputs of '{instance.name}': {names}")
         )
-    with opened(path) as reader, _kept(arguments.write) as keep:
-        found = replayed(plan, instance, reader.messages(), keep)
-    return _report(arguments, instance.name, found)
+    with opened(path) as again, _kept(arguments.write) as keep:
+        found = replayed(plan, instance, again.messages(), keep)
+    return _report(arguments, instance.name, found, reader.damage)
 
 
 def _plan(arguments: argparse.Namespace, path: Path, reader: RecordingReader) -> Plan:
     if PLAN not in reader.attachments:
-        message = f"'{plain(str(path))}' was not recorded within a stepped run"
+        why = (
+            "lacks the robot's plan, since it is damaged" if reader.damage else "was not recorded within a stepped run"
+        )
+        message = f"'{plain(str(path))}' {why}"
         raise NotDoneError(codes.NOT_ENOUGH.at(None, message, help=HOW))
     if arguments.robot is not None:
         compilation = compiled(arguments.robot, arguments)
@@ -379,11 +383,12 @@ def _kept(path: Path | None) -> Iterator[Callable[[Recorded], None] | None]:
         raise NotDoneError(codes.UNWRITABLE.at(None, f"'{plain(str(path))}' cannot be written: {reason}")) from error
 
 
-def _report(arguments: argparse.Namespace, name: str, found: ReplayResult) -> int:
+def _report(arguments: argparse.Namespace, name: str, found: ReplayResult, damage: str) -> int:
     for text in found.errors:
         emit(plain(text))
     if arguments.json:
-        emit(json.dumps({"component": name, "equal": found.equal, "difference": to_data(found.difference)}))
+        told = {"component": name, "equal": found.equal, "difference": to_data(found.difference), "damage": damage}
+        emit(json.dumps(told))
     elif found.difference is None:
         emit(f"'{name}' sends the same as recorded: {found.equal:,} messages")
     else:
