@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import shutil
 import socket
 import subprocess
@@ -11,6 +12,8 @@ from typing import Any
 
 import pytest
 import yaml
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from rbxcompose import __version__
 from rbxcompose.commands.main import main
@@ -126,6 +129,43 @@ def test_what_a_pod_of_kubernetes_mounts_is_there_and_the_files_are_those_of_the
     assert set(made["kustomization.yaml"]["resources"]) == made.keys() - {"kustomization.yaml"}
 
 
+NAMES = st.from_regex(r"[a-c][a-c_]{0,3}", fullmatch=True) | st.sampled_from([f"{letter * 59}_" for letter in "ab"])
+
+
+@given(first=st.tuples(NAMES, NAMES), other=st.tuples(NAMES, NAMES))
+@example(first=("a_b", "c"), other=("a", "b_c"))
+def test_each_share_has_a_name_of_its_own_that_every_program_takes(
+    first: tuple[str, str], other: tuple[str, str]
+) -> None:
+    names = [ExportedShare("lab", *each, ("up",), (), 1.0).name for each in (first, other)]
+    assert (names[0] == names[1]) == (first == other)
+    assert all(re.fullmatch(r"[a-z]([-a-z0-9]{0,61}[a-z0-9])?", name) for name in names)
+
+
+def test_names_that_kubernetes_does_not_take_are_written_in_another_way() -> None:
+    paths = ["a map.yaml", "a_map.yaml", "é.yaml", "ü.yaml", "a/b.yaml", "a..b.yaml", "a/.b", "a./b", "x" * 300]
+    share = ExportedShare("lab_", "r" * 70, "bench_", ("up",), (), 1.0, secrets=("key_",))
+    files = {path: path.encode() for path in paths}
+    made = kubernetes.manifests([share], system="lab_", file="a", files=files, image="i")
+    whole = {name: yaml.safe_load(text) for name, text in made.items()}
+    data, deployment = whole["files.yaml"]["data"], whole[f"{share.name}.yaml"]
+    pod = deployment["spec"]["template"]["spec"]
+    assert {item["path"]: data[item["key"]] for item in pod["volumes"][0]["configMap"]["items"]} == {
+        path: path for path in paths
+    }
+    assert all(re.fullmatch(r"[-._a-zA-Z0-9]{1,253}", key) for key in data)
+    labels = [*deployment["metadata"]["labels"].values(), *pod["nodeSelector"].values()]
+    labels += whole[kubernetes.KUSTOMIZATION]["labels"][0]["pairs"].values()
+    assert all(re.fullmatch(r"[a-zA-Z0-9]([-\w.]{0,61}[a-zA-Z0-9])?", label) for label in labels)
+    secret = pod["containers"][0]["env"][-1]["valueFrom"]["secretKeyRef"]["name"]
+    objects = [secret, *(one["metadata"]["name"] for one in whole.values() if "metadata" in one)]
+    assert all(re.fullmatch(r"[a-z0-9]([-a-z0-9.]*[a-z0-9])?", name) for name in objects)
+    assert (
+        f"kubectl label node NODE rbxcompose/host={pod['nodeSelector']['rbxcompose/host']}"
+        in made[f"{share.name}.yaml"]
+    )
+
+
 def test_kustomize_accepts_the_manifests(found: list[ExportedShare], tmp_path: Path) -> None:
     kubectl = tool("kubectl")
     for name, text in k8s(found).items():
@@ -163,8 +203,8 @@ def test_the_schemas_of_kubernetes_accept_the_manifests(found: list[ExportedShar
 def test_secrets_are_named_and_never_written_down() -> None:
     text = k8s([SECRET])["arm-bench.yaml"]
     container = (pod := yaml.safe_load(text)["spec"]["template"]["spec"])["containers"][0]
-    assert "# kubectl create secret generic arm-bench-api-key --from-file=value=secrets/api_key" in text
-    assert container["env"][-1]["valueFrom"] == {"secretKeyRef": {"name": "arm-bench-api-key", "key": "value"}}
+    assert "# kubectl create secret generic arm-bench.api-key --from-file=value=secrets/api_key" in text
+    assert container["env"][-1]["valueFrom"] == {"secretKeyRef": {"name": "arm-bench.api-key", "key": "value"}}
     certificates = {volume["name"]: volume for volume in pod["volumes"]}["certificates"]
     assert certificates["secret"]["secretName"] == "arm-bench-certificates"
     composed = yaml.safe_load(compose.compose_file([SECRET], system="lab", file=PATH))

@@ -32,7 +32,7 @@ def compose_file(shares: Iterable[exported_share.ExportedShare], *, system: str,
     """Return the Compose file; `file` is that of the system in the project. Routers need the network of the host."""
     given = list(shares)
     made: dict[str, Any] = {
-        "name": system.replace("_", "-"),
+        "name": exported_share.joined_name(system),
         "services": {share.name: _service(share, f"{PROJECT}/{file}") for share in given},
     }
     if secrets := {name: {"file": path} for share in given for name, path, _ in _certificates(share)}:

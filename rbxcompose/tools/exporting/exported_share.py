@@ -1,5 +1,6 @@
 """What every export needs to know of a share: where it runs, the command that runs it, and what it opens."""
 
+import hashlib
 from collections.abc import Iterator, Mapping
 
 from rbxcompose.base.config import Config, Secret
@@ -19,6 +20,22 @@ MEMORY, PROCESSES = "1G", 500  # of a share at most; a robot with an arm needs a
 CERTIFICATES = (AUTHORITY, CERTIFICATE, KEY)
 CONFIGURATION = "/run/config"  # in a container: where `CERTIFICATES` are, as in `~/.config`
 FILE = "{file}"
+LONGEST = 63  # characters of a label in Kubernetes, or of a name there
+_DIGITS = 8
+
+
+def joined_name(*names: str) -> str:
+    """Return names joined to one that other programs take: of small letters, digits and '-' within.
+
+    Other names make another one. Since '-' stands between names and for '_', that is so only if no name but the first
+    has a '_'; else a number is added that depends on all of them, as to a name that is cut.
+    """
+    whole = "-".join(names)
+    made = whole.replace("_", "-")
+    if "_" not in "".join(names[1:]) and not made.endswith("-") and len(made) <= LONGEST:
+        return made
+    number = int(hashlib.sha256(whole.encode()).hexdigest(), 16) % 10**_DIGITS
+    return f"{made[: LONGEST - _DIGITS - 1].rstrip('-')}-{number:0{_DIGITS}}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +54,7 @@ class ExportedShare:
     @property
     def name(self) -> str:
         """Return a name that no other share of the system has."""
-        return f"{self.robot}-{self.host}".replace("_", "-")
+        return joined_name(self.robot, self.host)
 
     @property
     def certificates(self) -> str:

@@ -4,6 +4,8 @@ A Kustomize base, so that each robot of a fleet is an overlay with a name, an im
 and other secrets are objects of the kind Secret, which the manifests name and do not contain.
 """
 
+import hashlib
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -11,10 +13,20 @@ import yaml
 
 from rbxcompose.manifest.secrets import VARIABLE
 from rbxcompose.tools.exporting.compose import PROJECT
-from rbxcompose.tools.exporting.exported_share import CERTIFICATES, CONFIGURATION, FILE, GRACE, MEMORY, ExportedShare
+from rbxcompose.tools.exporting.exported_share import (
+    CERTIFICATES,
+    CONFIGURATION,
+    FILE,
+    GRACE,
+    LONGEST,
+    MEMORY,
+    ExportedShare,
+    joined_name,
+)
 
-LARGEST = 1_000_000  # [bytes] of a ConfigMap, which etcd limits
+MOST_BYTES = 1_000_000  # of a ConfigMap, which etcd limits
 KUSTOMIZATION = "kustomization.yaml"
+ROBOT, HOST = "rbxcompose/robot", "rbxcompose/host"  # labels
 USER, DIALOUT = 1000, 20  # numbers of the image's user, and of the group that opens serial ports
 
 
@@ -26,9 +38,9 @@ def manifests(
     Raises:
         ValueError: if the files are too large for a ConfigMap, or one is no text.
     """
-    if sum(map(len, files.values())) > LARGEST:
-        raise ValueError(f"its files have more than {LARGEST:,} bytes, the limit of a ConfigMap")
-    name = system.replace("_", "-")
+    if sum(map(len, files.values())) > MOST_BYTES:
+        raise ValueError(f"its files have more than {MOST_BYTES:,} bytes, the limit of a ConfigMap")
+    name = joined_name(system)
     found: dict[str, Any] = {"files.yaml": _config_map(name, files)}
     found |= {f"{share.name}.yaml": _deployment(share, name, file, sorted(files), image) for share in shares}
     found[KUSTOMIZATION] = {
@@ -44,7 +56,8 @@ def manifests(
 
 
 def _needed(share: ExportedShare) -> Iterator[str]:
-    """Yield what to type so that its secrets exist; they are never written to a file of ours."""
+    """Yield what to type so that its node and its secrets exist; these are never written to a file of ours."""
+    yield f"kubectl label node NODE {HOST}={_label(share.host)}"
     if share.has_certificates:
         files = " ".join(f"--from-file=$HOME/.config/{share.certificates}/{name}" for name in CERTIFICATES)
         yield f"kubectl create secret generic {share.name}-certificates {files}"
@@ -53,7 +66,7 @@ def _needed(share: ExportedShare) -> Iterator[str]:
 
 
 def _secret(share: ExportedShare, name: str) -> str:
-    return f"{share.name}-{name}".replace("_", "-").lower()
+    return f"{share.name}.{joined_name(name.lower())}"  # no other share has this one: names have no dots
 
 
 def _variable(share: ExportedShare, name: str) -> dict[str, Any]:
@@ -61,9 +74,17 @@ def _variable(share: ExportedShare, name: str) -> dict[str, Any]:
     return {"name": f"{VARIABLE}{name.upper()}", "valueFrom": {"secretKeyRef": reference}}
 
 
+def _label(name: str) -> str:
+    """Return a name as the value of a label, which may have a '_' within."""
+    return name if name[-1].isalnum() and len(name) <= LONGEST else joined_name(name)
+
+
 def _key(path: str) -> str:
-    """Return the key of a file in a ConfigMap, which takes no slashes."""
-    return path.replace("/", "..")
+    """Return the key of a file in a ConfigMap, which takes neither slashes nor all characters of paths."""
+    key = re.sub(r"[^-.\w]", "_", path.replace("/", ".."), flags=re.ASCII)
+    if re.fullmatch(r"[-.\w/]{1,200}", path, re.ASCII) and not re.search(r"[./]\.|\./", path):
+        return key
+    return f"{hashlib.sha256(path.encode()).hexdigest()[:16]}-{key[-200:]}"  # else another path could have the same
 
 
 def _config_map(name: str, files: Mapping[str, bytes]) -> dict[str, Any]:
@@ -72,7 +93,7 @@ def _config_map(name: str, files: Mapping[str, bytes]) -> dict[str, Any]:
 
 
 def _deployment(share: ExportedShare, system: str, file: str, files: list[str], image: str) -> dict[str, Any]:
-    labels = {"app.kubernetes.io/name": share.name, "rbxcompose/robot": share.robot, "rbxcompose/host": share.host}
+    labels = {"app.kubernetes.io/name": share.name, ROBOT: _label(share.robot), HOST: _label(share.host)}
     return {
         "apiVersion": "apps/v1",
         "kind": "Deployment",
@@ -99,7 +120,7 @@ def _pod(share: ExportedShare, system: str, file: str, files: list[str], image: 
         volumes.append({"name": "certificates", "secret": secret})
     volumes += [{"name": f"device-{n}", "hostPath": {"path": path}} for n, path in enumerate(share.devices)]
     return {
-        "nodeSelector": {"rbxcompose/host": share.host},
+        "nodeSelector": {HOST: _label(share.host)},
         "hostNetwork": True,  # its router listens at the address of the host
         "dnsPolicy": "ClusterFirstWithHostNet",
         "automountServiceAccountToken": False,
