@@ -16,6 +16,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from rbxcompose.base import units
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import need
 from rbxcompose.base.units import Dimension, to_si
 
 FieldDocs = Mapping[str, str]
@@ -340,13 +341,26 @@ FOLDER, CONTENTS = "folder", "contents"
 """By which validators of a component know the folder of the manifest's file, and the contents of its sections."""
 
 
-def _in_folder(value: object, info: pydantic.ValidationInfo) -> object:
+def in_folder(value: object, info: pydantic.ValidationInfo) -> object:
+    """Return a path relative to the folder of the manifest's file as a whole one."""
     there = (info.context or {}).get(FOLDER)
     return os.path.normpath(os.path.join(str(there), value)) if there and isinstance(value, str) and value else value
 
 
-LocalPath = Annotated[str, pydantic.BeforeValidator(_in_folder)]
+def bring(path: str, info: pydantic.ValidationInfo) -> str:
+    """Let a file, or all that is in a folder, travel to other hosts with the manifest; return the path.
+
+    What is not there, or not in the project, is expected on the host.
+    """
+    if there := (info.context or {}).get(FOLDER):
+        need(str(there), os.path.relpath(path, str(there)))
+    return path
+
+
+LocalPath = Annotated[str, pydantic.BeforeValidator(in_folder)]
 """A field that names a file or a folder, relative to that of the manifest's file; it holds the whole path."""
+LocalFiles = Annotated[LocalPath, pydantic.AfterValidator(bring)]
+"""The same, for a file that travels to other hosts with the manifest, or a folder with all that is in it."""
 PlaceName = Annotated[Place, Refers(PLACE)]
 """A field that names one of the robot's `places` and holds the place itself."""
 LinkName = Annotated[str, Refers(LINK)]

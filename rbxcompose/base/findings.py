@@ -23,12 +23,17 @@ T = TypeVar("T")
 GUESSES = 4_000_000  # units of work, each about 0.1 us
 
 
+NeededFile = tuple[str, str]
+"""A file beside manifests, or a folder with all that is in it: a folder of the project, and the path from there."""
+
+
 @dataclass(slots=True)
 class _Memory:
     """What one compile has found out, by function and arguments, and what it may still spend on guesses."""
 
     known: dict[tuple[object, ...], object] = field(default_factory=dict)
     left: int = GUESSES
+    needed: set[NeededFile] = field(default_factory=set)
 
 
 _MEMORY: ContextVar[_Memory | None] = ContextVar("memory", default=None)
@@ -42,6 +47,18 @@ def one_compile() -> Iterator[None]:
         yield
     finally:
         _MEMORY.reset(token)
+
+
+def need(folder: str, path: str) -> None:
+    """Note what this compile's robot needs beside the manifests that are read: it travels to other hosts with them."""
+    if (memory := _MEMORY.get()) is not None:
+        memory.needed.add((folder, path))
+
+
+def needed() -> frozenset[NeededFile]:
+    """Return what this compile has noted."""
+    memory = _MEMORY.get()
+    return frozenset(memory.needed) if memory is not None else frozenset()
 
 
 def once(function: Callable[P, T]) -> Callable[P, T]:

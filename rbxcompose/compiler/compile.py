@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Related, Report, Severity, Span, kind, one_compile
+from rbxcompose.base.findings import Finding, NeededFile, Related, Report, Severity, Span, kind, needed, one_compile
 from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.base.rules import Rule
 from rbxcompose.compiler.check_runner import findings_of, run_checks
@@ -39,6 +39,7 @@ class Compilation:
     plan: Plan | None = None
     report: Report = field(default_factory=Report)
     sources: dict[str, str] = field(default_factory=dict)
+    needed: frozenset[NeededFile] = frozenset()  # beside these texts
 
 
 @one_compile()
@@ -102,6 +103,7 @@ def compile_robot(
         registry.choose(out.robot.manifest.messages)  # profiles may have had others
     if out.robot is not None and not out.report.has_errors:
         out.plan = build_plan(out.robot)
+    out.needed = needed()
     return out
 
 

@@ -5,7 +5,7 @@ import re
 from itertools import islice
 from pathlib import Path
 
-from rbxcompose.base.findings import Finding, Span, kind, once, replacement
+from rbxcompose.base.findings import Finding, Span, kind, need, once, replacement
 from rbxcompose.base.printable import plain
 from rbxcompose.manifest.reader import UNREADABLE
 
@@ -68,7 +68,12 @@ def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
                 span, message, help="did you mean " + " or ".join(f"'{namesake}'" for namesake in namesakes) + "?"
             )
         return OUTSIDE.at(span, message, help=f"the project is {where}: move the file there, or use what 'rbx:' has")
-    return path if path.is_file() else _missing(written, path, span, writer)
+    if not path.is_file():
+        return _missing(written, path, span, writer)
+    folder = str(_real(writer).parent)
+    is_folder = path.name == ROBOT_FILE and os.path.isdir(os.path.join(folder, written))
+    need(folder, os.path.join(written, ROBOT_FILE) if is_folder else written)
+    return path
 
 
 def folder_named(written: str, writer: Path, span: Span) -> Path | Finding:

@@ -14,7 +14,7 @@ from rbxcompose.commands.console import FINDINGS, NotDoneError, ReportedError, e
 from rbxcompose.commands.lookup import ALREADY_UP
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
-from rbxcompose.compiler.systems.bundle import bundle_of
+from rbxcompose.compiler.systems.bundle import NOT_EXPORTED, Bundle, bundle_of
 from rbxcompose.compiler.systems.certificates import NO_SECURITY, common_name, folder_of, tls_of
 from rbxcompose.compiler.systems.exchange import exchange_of
 from rbxcompose.compiler.systems.model import PlacedRobot, System
@@ -34,11 +34,18 @@ WHICH_ROBOT = kind("RBX6112")
 REFUSED_THERE = kind("RBX6128")
 
 
+def _bundle(system: System) -> Bundle:
+    try:
+        return bundle_of(system)
+    except ValueError as error:
+        raise NotDoneError(NOT_EXPORTED.at(None, f"the files of '{system.name}' cannot travel: {error}")) from error
+
+
 def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> int:
     """Bring the files to all hosts, start all shares, and show what they write until the robots are down."""
     hosts.require_reachable(system)
     shares = _shares(system, arguments)
-    bundle = bundle_of(system)
+    bundle = _bundle(system)
     folders = hosts.reached(shares, bundle)
     shares = {key: share for key, share in shares.items() if share.is_here or share.name in folders}
     options = [*(["-d"] if arguments.detach else []), *(["--real"] if arguments.real else [])]
@@ -226,7 +233,7 @@ class _SystemChange:
 
     def run(self) -> int:
         """Ask all hosts, then a person, then change one host after another."""
-        bundle, arguments = bundle_of(self._system), self._arguments
+        bundle, arguments = _bundle(self._system), self._arguments
         self._folders = hosts.reached(self._shares, bundle, needs_all=not arguments.partial)
         self._file = bundle.system
         usable = {key: share for key, share in self._shares.items() if share.is_here or share.name in self._folders}

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from rbxcompose import __version__
 from rbxcompose.commands.main import main
-from rbxcompose.compiler.systems.bundle import files_of
+from rbxcompose.compiler.systems.bundle import BundledFile, files_of
 from rbxcompose.compiler.systems.certificates import folder_of
 from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.runtime.supervision.supervisor import ALIVE, READY, ServiceManager
@@ -145,7 +145,7 @@ def test_each_share_has_a_name_of_its_own_that_every_program_takes(
 def test_names_that_kubernetes_does_not_take_are_written_in_another_way() -> None:
     paths = ["a map.yaml", "a_map.yaml", "é.yaml", "ü.yaml", "a/b.yaml", "a..b.yaml", "a/.b", "a./b", "x" * 300]
     share = ExportedShare("lab_", "r" * 70, "bench_", ("up",), (), 1.0, secrets=("key_",))
-    files = {path: path.encode() for path in paths}
+    files = {path: BundledFile(path.encode()) for path in paths}
     made = kubernetes.manifests([share], system="lab_", file="a", files=files, image="i")
     whole = {name: yaml.safe_load(text) for name, text in made.items()}
     data, deployment = whole["files.yaml"]["data"], whole[f"{share.name}.yaml"]

@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Report, Span
+from rbxcompose.base.findings import NeededFile, Report, Span
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.traffic import Crossing, TopicEnd, crossings, ends_of
@@ -168,6 +168,7 @@ class System:
     robots: dict[str, PlacedRobot] = field(default_factory=dict)
     report: Report = field(default_factory=Report)
     sources: dict[str, str] = field(default_factory=dict)
+    needed: frozenset[NeededFile] = frozenset()  # beside these texts
     profiles: tuple[str, ...] = ()  # those that were chosen
     known_profiles: tuple[str, ...] = ()
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from rbxcompose import __version__
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Span, kind
+from rbxcompose.base.findings import Finding, Span, kind, needed, one_compile
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.composition.layers import chosen_profiles
 from rbxcompose.compiler.composition.overlay import SET, compose, settled
@@ -88,6 +88,7 @@ def joined(parts: Iterable[Outside]) -> Outside:
 _APART = 1000  # from the port of a robot's links to that of what it shares
 
 
+@one_compile()
 def compile_system(
     path: str,
     *,
@@ -136,6 +137,7 @@ def compile_system(
         if (robot := _placed_robot(member, out, compiling)) is not None:
             out.robots[member.name] = robot
     with_others(out.robots)
+    out.needed |= needed()
     if len(out.robots) == len(members):
         out.report.extend(system_findings(out))
     return out
@@ -302,6 +304,7 @@ class _Compiling:
         """Return a robot; what is wrong with what the system gives it is a finding at one of the `places`."""
         compilation = self._compile(shown, profile, world, self.outside)
         self.out.sources.update((file, text) for file, text in compilation.sources.items() if file not in places)
+        self.out.needed |= compilation.needed
         known = {(one.code, one.span, one.message) for one in self.out.report}
         for finding in compilation.report:
             if finding.span is not None and finding.span.file in places:

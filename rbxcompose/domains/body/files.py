@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import open_regular
-from rbxcompose.base.findings import Finding, Related, Span, kind
+from rbxcompose.base.findings import Finding, Related, Span, kind, need
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.xacro import Expanded, XacroFile, expand_all
@@ -135,7 +135,10 @@ class BodyFile:
     def meshes(self, root: XmlElement) -> dict[str, Path]:
         """Return the mesh files that exist, by their names in the URDF; they lie in the project or in a package."""
         found = {name: mesh for name in set(mesh_names(root)) if (mesh := self._mesh(name)) is not None}
-        return {name: mesh for name, mesh in found.items() if self._is_ours(mesh)}
+        ours = {name: mesh for name, mesh in found.items() if self._is_ours(mesh)}
+        for name, mesh in ours.items():
+            need(str(self.path.parent), str(mesh) if name.startswith(PACKAGE) else name.removeprefix("file://"))
+        return ours
 
     def respelt_meshes(self, root: XmlElement) -> dict[str, str]:
         """Return, for each mesh that is not there, the name of a file that differs only in its capitals."""
@@ -200,6 +203,7 @@ def _expanded(
 ) -> ReadFile | Finding:
     for path in used:  # so that findings can show their lines
         read_source(path, shown_name(path), sources, URDF_BYTES, "a xacro file")
+        need(str(file.path.parent), str(path))
     if isinstance(expanded, Finding):
         return expanded
     root = read_urdf(expanded.located, shown_name(file.path))

@@ -14,7 +14,7 @@ SpeechProgram = Literal["auto", "espeak-ng", "piper", "log"]
 PER_WORD = 0.4  # [s] per word of unhurried speech
 LONGEST = 2000  # characters of what is said at once
 _RATE = "22050"  # [Hz] of the samples that piper writes with most of its voices
-_MODEL = ".onnx"
+MODEL = ".onnx"
 _REASON = 200  # characters of what a program complains of
 
 Pipeline = Sequence[Sequence[str]]
@@ -30,11 +30,11 @@ def pipeline_of(
     engine: SpeechProgram, voice: str, find: Callable[[str], str | None] = shutil.which
 ) -> tuple[Pipeline, str]:
     """Return the commands that speak with a voice, and why there are none."""
-    has_model = voice.endswith(_MODEL)
+    has_model = voice.endswith(MODEL)
     if engine == "log":
         return (), ""
     if engine == "piper" and not has_model:
-        return (), f"piper needs the file of a voice that ends in {_MODEL}, not '{plain(voice)}'"
+        return (), f"piper needs the file of a voice that ends in {MODEL}, not '{plain(voice)}'"
     if engine == "piper" or (engine == "auto" and has_model):
         if missing := [name for name in ("piper", "aplay") if find(name) is None]:
             return (), f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not installed"

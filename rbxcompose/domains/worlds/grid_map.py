@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
+from rbxcompose.base.findings import need
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import MOST
@@ -159,6 +160,7 @@ def read_map(path: Path) -> GridMap:
     except UnicodeDecodeError:
         raise MapError(f"{path.name} is not text") from None
     picture = path.parent / _entry(entries, "image")
+    need(str(path.parent), _entry(entries, "image"))
     if (negate := YES_OR_NO.get(_entry(entries, "negate").lower())) is None:
         raise MapError("'negate' is 0 or 1")
     origin = entries.get("origin")

@@ -17,12 +17,12 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from rbxcompose import __version__
-from rbxcompose.base.findings import Finding, Report, kind
+from rbxcompose.base.findings import Finding, Report
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.options import is_system, out_option
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.plan.model import Plan
-from rbxcompose.compiler.systems.bundle import files_of
+from rbxcompose.compiler.systems.bundle import NOT_EXPORTED, BundledFile, files_of
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.tools.commands.needs import requirements
@@ -32,7 +32,6 @@ from rbxcompose.tools.exporting.foxglove import foxglove_layout
 from rbxcompose.tools.exporting.rviz import rviz_config
 
 GROUP = "system"
-NOT_EXPORTED = kind("RBX6115")
 SRDF, ROS2, RVIZ, FOXGLOVE, BT = "srdf", "ros2", "rviz", "foxglove", "bt"
 PROGRAMS = ("systemd", "compose", "k8s", ROS2, SRDF, RVIZ, FOXGLOVE, BT)
 _OF_ROBOTS: Mapping[str, Callable[[Sequence[Plan]], dict[str, str]]] = {
@@ -97,7 +96,7 @@ def _export_robots(arguments: argparse.Namespace, made: Callable[[Sequence[Plan]
     return _finish(arguments, _encoded(made(plans)))
 
 
-def _finish(arguments: argparse.Namespace, made: Mapping[str, bytes]) -> int:
+def _finish(arguments: argparse.Namespace, made: Mapping[str, BundledFile]) -> int:
     if (problem := _write(Path(arguments.out), made)) is not None:
         return refuse(problem)
     for name in made:
@@ -128,7 +127,7 @@ def _export_mission(arguments: argparse.Namespace) -> int:
     return _finish(arguments, _encoded(made)) if made else FINDINGS
 
 
-def _made(system: System, arguments: argparse.Namespace) -> dict[str, bytes]:
+def _made(system: System, arguments: argparse.Namespace) -> dict[str, BundledFile]:
     found, (file, files) = list(shares(system, arguments.host)), files_of(system)
     match arguments.program:
         case "systemd":
@@ -142,24 +141,25 @@ def _made(system: System, arguments: argparse.Namespace) -> dict[str, bytes]:
             text = compose.compose_file(found, system=system.name, file=file)
             needed = requirements([placed.robot for placed in system.robots.values()], __version__)
             made = {"Dockerfile": compose.dockerfile(needed), "compose.yaml": text}
-            return {**_encoded(made), **{f"project/{name}": data for name, data in files.items()}}
+            return {**_encoded(made), **{f"project/{name}": one for name, one in files.items()}}
         case _:
             made = kubernetes.manifests(found, system=system.name, file=file, files=files, image=arguments.image)
     return _encoded(made)
 
 
-def _encoded(texts: Mapping[str, str]) -> dict[str, bytes]:
-    return {name: text.encode() for name, text in texts.items()}
+def _encoded(texts: Mapping[str, str]) -> dict[str, BundledFile]:
+    return {name: BundledFile(text.encode()) for name, text in texts.items()}
 
 
-def _write(folder: Path, made: Mapping[str, bytes]) -> Finding | None:
+def _write(folder: Path, made: Mapping[str, BundledFile]) -> Finding | None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
             return NOT_EXPORTED.at(None, f"the folder '{folder}' is not empty", help="name a new one")
-        for name, data in made.items():
+        for name, one in made.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_bytes(data)
+            (folder / name).touch(one.mode)
+            (folder / name).write_bytes(one.data)
     except OSError as error:
         return NOT_EXPORTED.at(None, f"'{folder}' cannot be written: {error.strerror}")
     return None

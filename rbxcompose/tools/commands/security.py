@@ -86,15 +86,15 @@ def _init(system: System, arguments: argparse.Namespace) -> int:
 
 def _bring(system: System, host: str, folder: Path, arguments: argparse.Namespace) -> Finding | None:
     from rbxcompose.commands.hosts import Remote  # starts programs, which `audit` does not need
-    from rbxcompose.compiler.systems.bundle import archive_of
+    from rbxcompose.compiler.systems.bundle import BundledFile, archive_of
 
     remote = Remote(host, system.hosts[host], arguments.ssh_config)
     script = _RECEIVE.replace("NAME", system.name).replace("HOST", host)
     files = {
-        name: read_regular(folder / name, certificates.LARGEST)
+        name: BundledFile(read_regular(folder / name, certificates.LARGEST), 0o600)
         for name in (certificates.AUTHORITY, certificates.CERTIFICATE, certificates.KEY)
     }
-    done = subprocess.run(remote.ssh(script), input=archive_of(files, mode=0o600), capture_output=True, check=False)
+    done = subprocess.run(remote.ssh(script), input=archive_of(files), capture_output=True, check=False)
     if done.returncode == 0:
         return None
     reason = done.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no reason given"]

@@ -4,6 +4,7 @@ A Kustomize base, so that each robot of a fleet is an overlay with a name, an im
 and other secrets are objects of the kind Secret, which the manifests name and do not contain.
 """
 
+import base64
 import hashlib
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,6 +12,7 @@ from typing import Any
 
 import yaml
 
+from rbxcompose.compiler.systems.bundle import BundledFile
 from rbxcompose.manifest.secrets import VARIABLE
 from rbxcompose.tools.exporting.compose import PROJECT
 from rbxcompose.tools.exporting.exported_share import (
@@ -31,18 +33,18 @@ USER, DIALOUT = 1000, 20  # numbers of the image's user, and of the group that o
 
 
 def manifests(
-    shares: Sequence[ExportedShare], *, system: str, file: str, files: Mapping[str, bytes], image: str
+    shares: Sequence[ExportedShare], *, system: str, file: str, files: Mapping[str, BundledFile], image: str
 ) -> dict[str, str]:
     """Return the manifests by file name; `files` are those of the system by their paths, `file` is its own.
 
     Raises:
-        ValueError: if the files are too large for a ConfigMap, or one is no text.
+        ValueError: if the files are too large for a ConfigMap.
     """
-    if sum(map(len, files.values())) > MOST_BYTES:
+    if sum(len(one.data) for one in files.values()) > MOST_BYTES:
         raise ValueError(f"its files have more than {MOST_BYTES:,} bytes, the limit of a ConfigMap")
     name = joined_name(system)
     found: dict[str, Any] = {"files.yaml": _config_map(name, files)}
-    found |= {f"{share.name}.yaml": _deployment(share, name, file, sorted(files), image) for share in shares}
+    found |= {f"{share.name}.yaml": _deployment(share, name, file, files, image) for share in shares}
     found[KUSTOMIZATION] = {
         "apiVersion": "kustomize.config.k8s.io/v1beta1",
         "kind": "Kustomization",
@@ -87,12 +89,20 @@ def _key(path: str) -> str:
     return f"{hashlib.sha256(path.encode()).hexdigest()[:16]}-{key[-200:]}"  # else another path could have the same
 
 
-def _config_map(name: str, files: Mapping[str, bytes]) -> dict[str, Any]:
-    data = {_key(path): text.decode("utf-8") for path, text in sorted(files.items())}
-    return {"apiVersion": "v1", "kind": "ConfigMap", "metadata": {"name": f"{name}-files"}, "data": data}
+def _config_map(name: str, files: Mapping[str, BundledFile]) -> dict[str, Any]:
+    parts: dict[str, dict[str, str]] = {"data": {}, "binaryData": {}}
+    for path, one in sorted(files.items()):
+        try:
+            parts["data"][_key(path)] = one.data.decode("utf-8")
+        except UnicodeDecodeError:
+            parts["binaryData"][_key(path)] = base64.b64encode(one.data).decode()
+    filled = {part: entries for part, entries in parts.items() if entries}
+    return {"apiVersion": "v1", "kind": "ConfigMap", "metadata": {"name": f"{name}-files"}, **filled}
 
 
-def _deployment(share: ExportedShare, system: str, file: str, files: list[str], image: str) -> dict[str, Any]:
+def _deployment(
+    share: ExportedShare, system: str, file: str, files: Mapping[str, BundledFile], image: str
+) -> dict[str, Any]:
     labels = {"app.kubernetes.io/name": share.name, ROBOT: _label(share.robot), HOST: _label(share.host)}
     return {
         "apiVersion": "apps/v1",
@@ -107,8 +117,8 @@ def _deployment(share: ExportedShare, system: str, file: str, files: list[str], 
     }
 
 
-def _pod(share: ExportedShare, system: str, file: str, files: list[str], image: str) -> dict[str, Any]:
-    items = [{"key": _key(path), "path": path} for path in files]
+def _pod(share: ExportedShare, system: str, file: str, files: Mapping[str, BundledFile], image: str) -> dict[str, Any]:
+    items = [{"key": _key(path), "path": path, "mode": one.mode} for path, one in sorted(files.items())]
     volumes: list[dict[str, Any]] = [
         {"name": "files", "configMap": {"name": f"{system}-files", "items": items}},
         {"name": "run", "emptyDir": {"medium": "Memory"}},

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 
+from pydantic import ValidationInfo, field_validator
+
 from rbxcompose import sdk
+from rbxcompose.base.config import bring, in_folder
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import plain
-from rbxcompose.domains.devices.speech import LONGEST, SpeechProgram, Utterance, duration_of, pipeline_of
+from rbxcompose.domains.devices.speech import LONGEST, MODEL, SpeechProgram, Utterance, duration_of, pipeline_of
 from rbxcompose.msgs.rbxcompose_msgs import Say
 
 _SLOWEST = 3.0  # times the usual duration, and as many seconds, after which a program is taken for stuck
@@ -20,7 +23,17 @@ class VoiceConfig(sdk.Config):
     engine: SpeechProgram = "auto"
     """The program that speaks: `auto` is piper if `voice` is a file, else espeak-ng. With `log` nobody hears it."""
     voice: str = "en"
-    """A voice of espeak-ng, such as `en` or `de+f3`, or the file of one of piper, which ends in `.onnx`."""
+    """A voice of espeak-ng, such as `en` or `de+f3`, or the file of one of piper, which ends in `.onnx`: relative to
+    the manifest's file."""
+
+    @field_validator("voice", mode="before")
+    @classmethod
+    def _is_a_local_file(cls, given: object, info: ValidationInfo) -> object:
+        if not isinstance(given, str) or not given.endswith(MODEL):
+            return given
+        voice = bring(str(in_folder(given, info)), info)
+        bring(f"{voice}.json", info)  # piper reads it, too
+        return voice
 
 
 @sdk.component("voice")

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import Field, ValidationInfo, field_validator
 
 from rbxcompose import sdk
-from rbxcompose.base.config import LocalPath
+from rbxcompose.base.config import LocalFiles
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.policies.core import AnswerLimits, PolicyCore
 from rbxcompose.domains.policies.network import PolicyNetwork, PolicyNetworkError
@@ -80,7 +80,7 @@ class PolicyCommandsConfig(sdk.Config):
 class PolicyConfig(sdk.Config):
     """The network, what it is given, and what its answers command."""
 
-    model: LocalPath = Field(min_length=1)
+    model: LocalFiles = Field(min_length=1)
     """The network, a file in ONNX: relative to the robot's file, or a whole path on the robot's computer."""
     rate: sdk.Frequency = Field(10.0, gt=0, le=200)
     """How often it is asked."""

@@ -7,9 +7,9 @@ import signal
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
-from rbxcompose.base.config import Config, LocalPath
+from rbxcompose.base.config import Config, LocalPath, bring
 from rbxcompose.base.requests import OutsideError
 from rbxcompose.domains.programs.child import StartOrder
 from rbxcompose.domains.programs.components.program import ProgramLimits, RunConfig, Runner
@@ -55,6 +55,12 @@ class MountModel(Config):
     """Its path here, relative to the manifest's file."""
     writable: bool = False
     """Whether the container may write there."""
+
+    @model_validator(mode="after")
+    def _travels(self, info: ValidationInfo) -> MountModel:
+        if not self.writable:
+            bring(self.folder, info)
+        return self
 
 
 EngineWord = Annotated[str, AfterValidator(_is_word)]

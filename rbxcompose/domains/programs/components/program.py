@@ -21,7 +21,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, fie
 from pydantic_core import PydanticCustomError
 
 from rbxcompose.base.clock import MonotonicClock, SteppedClock
-from rbxcompose.base.config import Config, LocalPath, Secret, Time
+from rbxcompose.base.config import Config, LocalFiles, LocalPath, Secret, Time, bring
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import OutsideError
@@ -121,10 +121,24 @@ def _is_variable(name: str) -> str:
     return name
 
 
-Variable = Annotated[str, AfterValidator(_is_variable)]
+VariableName = Annotated[str, AfterValidator(_is_variable)]
 CommandWords = Annotated[
     tuple[str, ...], BeforeValidator(_words, json_schema_input_type=tuple[str, ...]), Field(min_length=1)
 ]
+
+
+def _is_there(path: str) -> str:
+    if not os.path.exists(path):
+        raise ValueError(f"there is no '{path}'")
+    return path
+
+
+def bring_command(command: Iterable[str] | None, folder: str, info: ValidationInfo) -> str:
+    """Let the files that a command names travel with the manifest; return the folder where it runs."""
+    for file in (os.path.join(folder, word) for word in command or ()):
+        if os.path.isfile(file):
+            bring(file, info)
+    return folder
 
 
 class ReadyModel(Config):
@@ -182,9 +196,9 @@ class LevelsModel(Config):
 class RunConfig(DeclaredPorts):
     """How a program is run, whatever kind it is of."""
 
-    environment: dict[Variable, str] = {}
+    environment: dict[VariableName, str] = {}
     """Variables of its environment, besides those of `up`."""
-    secrets: dict[Variable, Secret] = {}
+    secrets: dict[VariableName, Secret] = {}
     """The same for what nobody else may see, such as `{TOKEN: "${secret.token}"}`."""
     ready: ReadyModel | None = None
     """When it is ready; without it, as soon as it runs."""
@@ -192,6 +206,9 @@ class RunConfig(DeclaredPorts):
     """How it is stopped."""
     limits: ProgramLimits = ProgramLimits()
     """What it may use."""
+    files: tuple[Annotated[LocalFiles, AfterValidator(_is_there)], ...] = ()
+    """Files and folders of the project that it needs beside the files that its command names; they travel to other
+    hosts with the manifest."""
     levels: LevelsModel = LevelsModel()
     """How its output is read."""
 
@@ -667,6 +684,11 @@ class ProgramConfig(RunConfig):
     reads them."""
     folder: LocalPath = Field(".", validate_default=True)
     """Where it runs, relative to the manifest's file."""
+
+    @field_validator("folder")
+    @classmethod
+    def _brings_what_it_names(cls, folder: str, info: ValidationInfo) -> str:
+        return bring_command(info.data.get("command"), folder, info)
 
 
 @component("program")

@@ -6,9 +6,9 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
-from rbxcompose.base.config import COMPONENT, CONTENTS, LocalPath, Name, Refers
+from rbxcompose.base.config import COMPONENT, CONTENTS, LocalFiles, LocalPath, Name, Refers
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.requests import OutsideError
 from rbxcompose.bus.names import resolve
@@ -16,7 +16,14 @@ from rbxcompose.domains.programs.bridge import ros_bridge
 from rbxcompose.domains.programs.bridge.ends import BridgedEnd, ends_of, parameters_of
 from rbxcompose.domains.programs.bridge.installation import RosInstallation, RosModel, installation_of
 from rbxcompose.domains.programs.child import StartOrder
-from rbxcompose.domains.programs.components.program import CommandWords, RunConfig, Runner, StopModel, order_of
+from rbxcompose.domains.programs.components.program import (
+    CommandWords,
+    RunConfig,
+    Runner,
+    StopModel,
+    bring_command,
+    order_of,
+)
 from rbxcompose.domains.programs.sections.ros2 import ros2
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.sdk import Capability, component
@@ -57,7 +64,7 @@ class Ros2NodeConfig(RunConfig):
     """Names that it uses, each with the name in its place."""
     parameters: dict[str, Parameter] = {}
     """Its parameters."""
-    parameter_files: tuple[LocalPath, ...] = ()
+    parameter_files: tuple[LocalFiles, ...] = ()
     """Files with more of them; `parameters` count before these."""
     folder: LocalPath = Field(".", validate_default=True)
     """Where it runs, relative to the manifest's file."""
@@ -67,6 +74,11 @@ class Ros2NodeConfig(RunConfig):
         default_factory=dict, validate_default=True
     )
     """Its ROS 2, where that is another one than the section `ros2` says."""
+
+    @field_validator("folder")
+    @classmethod
+    def _brings_what_it_names(cls, folder: str, info: ValidationInfo) -> str:
+        return bring_command([*(info.data.get("command") or ()), *info.data.get("arguments", ())], folder, info)
 
     @model_validator(mode="after")
     def _is_one(self) -> Ros2NodeConfig:
