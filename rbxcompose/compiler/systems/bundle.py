@@ -18,7 +18,7 @@ from rbxcompose.manifest.files import PREFIX, project_of, shown_name
 from rbxcompose.manifest.secrets import FOLDER
 
 NOT_EXPORTED = kind("RBX6115")
-LARGEST = 512 * 1024 * 1024  # [B] of a file
+LARGEST = 512 * 1024 * 1024  # [B] of all files
 MOST = 10_000  # files
 CACHE = "__pycache__"
 _PLAIN, _EXECUTABLE = 0o644, 0o755
@@ -63,6 +63,8 @@ def files_of(system: System) -> tuple[str, dict[str, BundledFile]]:
     shown = [Path(name).resolve() for name in system.sources if not name.startswith(PREFIX)]
     own = {path for path in (system.path, *shown) if path.is_file() and path.is_relative_to(root)}
     paths = _with_needed({_within(path, root): path for path in own}, system.needed, root)
+    if sum(map(os.path.getsize, paths.values())) > LARGEST:
+        raise ValueError(f"its files have more than {LARGEST // 2**20} MiB")
     return _within(system.path, root), {name: _read(path) for name, path in paths.items()}
 
 
