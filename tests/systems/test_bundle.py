@@ -120,5 +120,5 @@ def test_a_link_never_leads_out_of_the_project_or_to_a_secret(tmp_path: Path) ->
 def test_a_file_that_cannot_travel_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     system = compiled(project(tmp_path))
     monkeypatch.setattr("rbxcompose.compiler.systems.bundle.LARGEST", 300)
-    with pytest.raises(ValueError, match=r"robot.yaml: it is larger than 300 bytes"):
+    with pytest.raises(ValueError, match=r"its files have more than"):
         files_of(system)
