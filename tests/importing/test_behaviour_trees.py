@@ -379,6 +379,11 @@ WRONG: Mapping[str, tuple[str, str, list[tuple[str, int]]]] = {
     "no time": ('<Timeout msec="-5"><A/></Timeout>', "", [("RBX2265", 3)]),
     "a threshold too high": ('<Parallel success_count="3"><A/><B/></Parallel>', "", [("RBX2265", 3)]),
     "a threshold in words": ('<Parallel failure_count="any"><A/><B/></Parallel>', "", [("RBX2265", 3)]),
+    "a threshold of an entry": (
+        '<ParallelAll max_failures="{n}"><A/><B/></ParallelAll>',
+        "",
+        [("RBX2266", 2), ("RBX2265", 3)],
+    ),
     "an unknown attribute": ('<A _skipIF="true"/>', "", [("RBX2264", 3)]),
     "bits": ('<ScriptCondition code="(a &amp; 4) == 4"/>', "", [("RBX2265", 3)]),
     "a choice in a script": ('<Script code="a := b ? 1 : 2"/>', "", [("RBX2265", 3)]),

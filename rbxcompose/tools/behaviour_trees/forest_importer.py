@@ -752,6 +752,8 @@ class _TreeImporter:
 
     def parallel_all(self, element: XmlElement) -> ImportedStep:
         many, most = len(element.children), self.threshold(element, "max_failures", "1")
+        if isinstance(most, str) and most != "all":
+            raise ScriptError("'max_failures' must be a whole number")
         most = many if most == "all" else most
         if most == 1:
             return self.branches(element, {"wait_for_all": True})
@@ -761,6 +763,8 @@ class _TreeImporter:
 
     def threshold(self, element: XmlElement, port: str, default: str) -> Any:
         text, many = element.attributes.get(port, default), len(element.children)
+        if nodes.entry_of(text, port):
+            return nodes.COUNT.read(text, self.our)
         if not re.fullmatch(r"-?\d{1,6}", text.strip()):
             raise ScriptError(f"'{port}' must be a whole number, not '{plain(text, 30)}'")
         count = int(text)

@@ -429,20 +429,22 @@ class _Exporter:
         else:
             found.children = self.steps(branches)
         many = len(found.children)
-        words = {"all": -1, "any": 1}
+        words = {"all": "-1", "any": "1"}
         succeed, fail = options.get("succeed_when", "all"), options.get("fail_when", "any")
-        wanted = words[succeed] if succeed in words else int(nodes.COUNT.write(succeed))
-        fails = many if fail == "all" else words[fail] if fail in words else int(nodes.COUNT.write(fail))
-        if wanted > many or fails > many:
+        wanted = words.get(succeed) or nodes.COUNT.write(succeed)
+        fails = str(many) if fail == "all" else words.get(fail) or nodes.COUNT.write(fail)
+        if any(count.isdecimal() and int(count) > many for count in (wanted, fails)):
             raise _CannotError(key.span, f"there are only {many} branches")
         if options.get("wait_for_all") == "true":
-            if not (wanted == -1 and fails == 1) and wanted != many - fails + 1:
-                words_ = "a '<ParallelAll>' succeeds whenever it does not fail"
-                help_text = f"write 'succeed_when: {many - fails + 1}'"
-                raise _CannotError(key.span, words_, help_text)
-            found.name, found.attributes = "ParallelAll", {"max_failures": str(fails)}
+            words_ = "a '<ParallelAll>' succeeds whenever it does not fail"
+            if not fails.isdecimal():
+                raise _CannotError(key.span, words_, "write a number as 'fail_when', or leave out 'wait_for_all'")
+            needed = many - int(fails) + 1
+            if (wanted, fails) != ("-1", "1") and wanted != str(needed):
+                raise _CannotError(key.span, words_, f"write 'succeed_when: {needed}'")
+            found.name, found.attributes = "ParallelAll", {"max_failures": fails}
         else:
-            found.attributes = {"success_count": str(wanted), "failure_count": str(fails)}
+            found.attributes = {"success_count": wanted, "failure_count": fails}
         return found
 
     # skills and other missions
