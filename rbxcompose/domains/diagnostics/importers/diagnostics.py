@@ -150,6 +150,10 @@ def _analyzer(name: str, entries: ForeignMap) -> ForeignAnalyzer | None:
     analyzer.expected, analyzer.stripped = _texts(entries, "expected"), _texts(entries, "find_and_remove_prefix")
     analyzer.removed = _texts(entries, "remove_prefix")
     analyzer.timeout, analyzer.discards = entries.number("timeout"), entries.flag("discard_stale")
+    if analyzer.timeout and analyzer.timeout.value <= 0 and analyzer.discards and analyzer.discards.value:
+        words = f"'discard_stale' of {entries.what} is not carried over: it has no effect, since nothing is ever stale"
+        entries.add(NOT_CARRIED_OVER.at(analyzer.discards.span, words))
+        analyzer.discards = None
     analyzer.count = entries.whole("num_items", -1, _MOST)
     below = _analyzers(entries.node) if type_ == "group" else {}
     if type_ == "group":
