@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -113,6 +114,19 @@ def test_the_costmap_on_which_ways_are_planned_counts_and_the_other_one_is_told(
     found = nav2(tmp_path, costmap("local_costmap", 0.2, 0.3) + costmap("global_costmap", 0.2, 0.5))
     assert navigation(found)["costs"] == {"inflation": {"radius": "500 mm"}}
     assert ("RBX2230", 1) in found.told
+
+
+LISTED = 'plugins: [{name: o, type: "costmap_2d::VoxelLayer"}, {name: i, type: "costmap_2d::InflationLayer"}], '
+
+
+@pytest.mark.parametrize(("listed", "names"), [(LISTED, "oi"), ("", ("obstacle_layer", "inflation_layer"))])
+def test_only_a_layer_that_inflates_says_how_far(listed: str, names: Sequence[str], tmp_path: Path) -> None:
+    layers = ", ".join(
+        f"{name}: {{inflation_radius: {radius}}}" for name, radius in zip(names, (0.2, 0.7), strict=True)
+    )
+    found = nav2(tmp_path, f"global_costmap: {{robot_radius: 0.2, {listed}{layers}}}\n")
+    assert navigation(found)["costs"] == {"inflation": {"radius": "700 mm"}}
+    assert ("RBX2230", 1) in found.told, "the other radius is told"
 
 
 @pytest.mark.parametrize(

@@ -279,6 +279,7 @@ def _costmap(out: ForeignNavigation, given: ForeignMap, *, plans: bool = True) -
     if not _footprint(out, given):
         out.take_number("footprint", given, ["robot_radius"], _circle)
     used, filters = _names(given, "plugins", "plugin_names"), _names(given, "filters") or []
+    types = _types(given)
     _layer(out, given, plans=plans)
     for name, layer in _below(given).items():
         if name in filters:
@@ -288,8 +289,9 @@ def _costmap(out: ForeignNavigation, given: ForeignMap, *, plans: bool = True) -
         elif (is_on := layer.flag("enabled")) is not None and not is_on.value:
             out.leave(layer.span, name, "it is not enabled")
         else:
+            type_ = types.get(name) or _plugin(layer)
             layer.what = f"{layer.what}{_plugin(layer)} of {given.what}"
-            _layer(out, layer, plans=plans)
+            _layer(out, layer, plans=plans, inflates="InflationLayer" in type_ if type_ else "inflation" in name)
             out.leave_rest(layer)
     out.leave_rest(given)
 
@@ -333,8 +335,9 @@ def _corners(node: TreeNode) -> list[tuple[float, float]] | None:
         return None
 
 
-def _layer(out: ForeignNavigation, given: ForeignMap, *, plans: bool) -> None:
-    out.take_number("costs.inflation.radius", given, ["inflation_radius"], length)
+def _layer(out: ForeignNavigation, given: ForeignMap, *, plans: bool, inflates: bool = True) -> None:
+    if inflates:  # others may have such a parameter, too, and ignore it
+        out.take_number("costs.inflation.radius", given, ["inflation_radius"], length)
     if plans and (tracks := given.flag("track_unknown_space")) is not None:
         out.take("tracks", tracks.value, "", tracks.span, "track_unknown_space")
     names = given.text("observation_sources")
@@ -394,6 +397,16 @@ def _below(given: ForeignMap, names: Collection[str] | None = None) -> dict[str,
     }
     given.places(*nodes)
     return dict(maps_in(MappingNode(nodes), "plug-in", given.report))
+
+
+def _types(given: ForeignMap) -> dict[str, str]:
+    """Return the types of layers by their names, as files of ROS 1 list them."""
+    node = given.node.get("plugins")
+    listed = [item for item in node.items if isinstance(item, MappingNode)] if isinstance(node, SequenceNode) else []
+    named = ((item.get("name"), item.get("type")) for item in listed)
+    return {
+        name.text: type_.text for name, type_ in named if isinstance(name, ScalarNode) and isinstance(type_, ScalarNode)
+    }
 
 
 def _names(given: ForeignMap, *keys: str) -> list[str] | None:
