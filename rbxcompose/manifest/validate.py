@@ -19,6 +19,7 @@ from rbxcompose.base.units import NUMBER, Quantity, UnitError, format_quantity, 
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.foreign_words import CHOICES as FOREIGN_CHOICES
 from rbxcompose.manifest.foreign_words import FOREIGN
+from rbxcompose.manifest.reader import UNREADABLE
 from rbxcompose.manifest.scalars import describe, is_empty, number_trouble, plain_value
 from rbxcompose.manifest.shapes import alternatives, dimension_at, field_types, keys_at, models_at
 from rbxcompose.manifest.slip_registry import RefusedValue, value_slip
@@ -354,6 +355,8 @@ def _finding(model: Any, node: tree.TreeNode, path: tree.KeyPath, loc: tree.KeyP
             return not_a_choice(span, name, value, ["".join(choice) for choice in choices])
         case "value_error" if isinstance(cause := context.get("error"), UnitError):
             return unit_finding(cause, value or node, name)
+        case "unreadable":
+            return UNREADABLE.at(span, error["msg"])
         case "value_error":
             return WRONG_TYPE.at(span, f"'{name}': {context.get('error')}")
         case "string_too_long" | "too_long" | "string_too_short" | "too_short":

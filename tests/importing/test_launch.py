@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.base import processes
 from rbxcompose.commands import main as command
+from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.domains.programs.launch_files.evaluation import _KNOWN
 from rbxcompose.domains.programs.launch_files.substitutions import UnknownValueError, evaluated, read_launch_text
 from rbxcompose.testing.golden import Golden
@@ -147,6 +148,40 @@ def test_arguments_come_from_the_command_line(
     assert "arguments: [/dev/x]" in captured.out
     assert command.main(["import", "launch", "cart.launch.xml", "port:=1", "prot:=2"]) == 1
     assert "did you mean 'port'?" in capsys.readouterr().err
+
+
+def test_names_that_a_robot_has_itself_and_that_ros_does_not_take_are_changed(tmp_path: Path) -> None:
+    nodes = "".join(f'<node pkg="a" exec="b" name="{name}"/>' for name in ("mission", "start", "console", "Robot-Node"))
+    found = launch(tmp_path, f'<launch>{nodes}<node pkg="a" exec="ros2" namespace="left-1"/></launch>')
+    assert [(name, one.get("name")) for name, one in components(found).items()] == [
+        ("mission_2", "mission"), ("start_2", "start"), ("console_2", "console"), ("robot_node", None), ("ros2_2", None)
+    ]  # fmt: skip
+    assert [code for code, _ in found.told if code == "RBX2230"] == ["RBX2230"] * 2, found.words
+    assert not compiled(tmp_path, found.text).report.has_errors
+
+
+def compiled(folder: Path, text: str) -> Compilation:
+    (folder / "robot.yaml").write_text(text, encoding="utf-8")
+    return compile_robot(str(folder), environment={})
+
+
+def test_paths_lead_from_the_new_file_to_files_that_check_asks_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("p.yaml").write_text("/**: {ros__parameters: {a: 1}}\n", encoding="utf-8")
+    text = '<node pkg="a" exec="b"><param from="p.yaml"/></node><executable cmd="true" cwd="."/>'
+    Path("cart.launch.xml").write_text(f"<launch>{text}</launch>", encoding="utf-8")
+    assert command.main(["import", "launch", "cart.launch.xml", "-o", "robots/cart"]) == 0
+    made = yaml.safe_load(Path("robots/cart/robot.yaml").read_text(encoding="utf-8"))["components"]
+    assert made["b"]["parameter_files"] == ["../../p.yaml"]
+    assert made["true"]["folder"] == "../.."
+    found = compile_robot("robots/cart", environment={})
+    assert "p.yaml" in found.sources, "it travels with the robot"
+    assert not found.report.has_errors
+    Path("p.yaml").unlink()
+    assert command.main(["check", "robots/cart"]) == 1
+    assert "error[RBX1301]: 'p.yaml' does not exist\n  --> robots/cart/robot.yaml:" in capsys.readouterr().out
 
 
 def test_packages_are_found_and_files_included_with_arguments(

@@ -187,3 +187,12 @@ def test_whatever_a_file_says_what_is_written_can_be_read(
     if found.text:
         told = set(check_text(found.text, folder).codes)
         assert not told & {"RBX1001", "RBX1002", "RBX1003", "RBX1004", "RBX1005", "RBX1102", "RBX3130", "RBX3138"}
+
+
+def test_two_topics_stay_two_also_if_one_cannot_keep_its_name(tmp_path: Path) -> None:
+    topics = {"a": "joy-vel", "b": "joy_vel", "c": "/Joy_Vel", "d": "/joy-vel"}
+    entries = [f"{{name: {name}, topic: {topic}, timeout: 0.5, priority: 1}}" for name, topic in topics.items()]
+    found = mux(tmp_path, f"topics: [{', '.join(entries)}]\n")
+    [made] = found.data["muxes"].values()
+    assert [one["topic"] for one in made["inputs"].values()] == ["joy_vel_2", "joy_vel", "/joy_vel_3", "/joy_vel_2"]
+    assert "the topic 'joy-vel' becomes 'joy_vel_2'" in found.words

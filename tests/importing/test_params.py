@@ -76,6 +76,13 @@ def test_a_name_that_is_written_in_two_ways_disagrees(tmp_path: Path) -> None:
     assert found.told == [("RBX2232", 1)]
 
 
+def test_flags_and_octal_numbers_are_what_ros_takes_them_for(tmp_path: Path) -> None:
+    found = params(tmp_path, "a: [yes, Off]\nb: on\nc: 'yes'\nd: 010\ne: 089\nuse_sim_time: no\n")
+    assert [entry["type"] for entry in found.data["args"].values()] == ["list", "flag", "text", "count"]
+    assert defaults(found) | {"c": "yes"} == {"a": [True, False], "b": True, "c": "yes", "d": 8}
+    assert found.told == [("RBX2230", 5)]
+
+
 def test_a_node_is_a_component_only_if_all_fits(tmp_path: Path) -> None:
     whole = {
         "max_speed": 0.4,

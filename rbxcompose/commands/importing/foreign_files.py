@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from dataclasses import field
 from pathlib import Path
 from typing import Generic, TypeVar
@@ -33,17 +33,18 @@ _PLAIN_TAGS = frozenset(
         *(f"{_PYTHON}{text}" for text in _OF_PYTHON),
     }
 )
-_OCTAL = re.compile(r"[-+]?0[0-9]+")
-_FLAGS = {
+OCTAL = re.compile(r"[-+]?0[0-9]+")
+FLAGS = {
     **dict.fromkeys(("yes", "on", "true", "y"), True),
     **dict.fromkeys(("no", "off", "false", "n"), False),
 }  # of YAML 1.1, in any case
 
 
 class FreeNames:
-    """Gives names that manifests may have, each once."""
+    """Gives names that manifests may have, each once, and none that `is_reserved`."""
 
-    def __init__(self) -> None:
+    def __init__(self, is_reserved: Callable[[str], bool] = lambda _: False) -> None:
+        self._is_reserved = is_reserved
         self._taken: set[str] = set()
         self._counts: dict[str, int] = {}  # how often each was wanted that was taken
 
@@ -51,7 +52,7 @@ class FreeNames:
         """Return the name that is most like a wanted one and not taken; `otherwise` if none is like it."""
         name = first = name_like(wanted) or otherwise
         count = self._counts.get(first, 1)
-        while name in self._taken:
+        while name in self._taken or self._is_reserved(name):
             count += 1
             end = f"_{count}"
             name = f"{first[: LONGEST_NAME - len(end)]}{end}"
@@ -75,7 +76,7 @@ class Given(Generic[T]):
 class ForeignFile:
     """A file of another program: its name in findings, its tree if it is YAML, its text, and its path.
 
-    `arguments` are those that were given with it.
+    `arguments` are those that were given with it, and `out` is the folder of the manifest if it becomes a file.
     """
 
     name: str
@@ -83,6 +84,7 @@ class ForeignFile:
     text: str = ""
     path: Path | None = None
     arguments: Mapping[str, str] = field(default_factory=dict)
+    out: Path | None = None
 
 
 def read_files(paths: Iterable[Path], report: Report, sources: MutableMapping[str, str]) -> list[ForeignFile]:
@@ -253,7 +255,7 @@ def _is_refused(text: str) -> bool:
 
 
 def _is_octal(node: TreeNode) -> bool:
-    return isinstance(node, ScalarNode) and node.plain and bool(_OCTAL.fullmatch(node.text))
+    return isinstance(node, ScalarNode) and node.plain and bool(OCTAL.fullmatch(node.text))
 
 
 def _value(node: TreeNode, wanted: type[T]) -> T | None:
@@ -262,7 +264,7 @@ def _value(node: TreeNode, wanted: type[T]) -> T | None:
         return None
     value: object = plain_value(node)
     if wanted is bool and node.plain:
-        value = _FLAGS.get(node.text.lower(), value)
+        value = FLAGS.get(node.text.lower(), value)
     if wanted is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
     if wanted is int and isinstance(value, float) and value.is_integer():

@@ -8,7 +8,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Span
 from rbxcompose.base.printable import FORBIDDEN
 from rbxcompose.base.units import MOST
-from rbxcompose.commands.importing.foreign_files import ForeignFile, Given
+from rbxcompose.commands.importing.foreign_files import FLAGS, OCTAL, ForeignFile, Given
 from rbxcompose.commands.importing.manifest_text import flag, flow_list, key, number, word
 from rbxcompose.manifest.scalars import number_trouble, plain_value
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
@@ -16,6 +16,7 @@ from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNod
 ParameterData = bool | int | float | str | list[bool | int | float | str]
 _LONGEST = 10_000  # items of a list, as a manifest has them
 ROS_2 = "ros__parameters"
+_OF_OCTAL = frozenset("+-01234567")
 _DUMPED = "dictitems"  # what Python's classes of maps are written as
 _GROUPS = "groups"
 _OF_A_GROUP = frozenset({"id", "name", "parameters", "parent", "state", "type"})
@@ -47,7 +48,9 @@ def value_of(node: TreeNode) -> Given[ParameterData] | None:
 def _scalar(node: TreeNode) -> bool | int | float | str | None:
     if not isinstance(node, ScalarNode) or was_refused(node):
         return None
-    value = plain_value(node)
+    if node.plain and OCTAL.fullmatch(node.text):
+        return int(node.text, 8) if _OF_OCTAL.issuperset(node.text) else None
+    value = FLAGS.get(node.text.lower(), plain_value(node)) if node.plain else node.text
     if isinstance(value, int | float) and not isinstance(value, bool) and not abs(value) < MOST:
         return None
     return value

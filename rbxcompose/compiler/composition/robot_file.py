@@ -144,11 +144,17 @@ def _placed_names(contents: Contents, section: Section[Any, Any]) -> Iterator[st
             yield name
 
 
+def is_own_name(name: str) -> bool:
+    """Return whether a robot itself has this name: a section, or a component that every robot runs."""
+    section = registry.section_named(name)
+    return name in (*RESERVED, *ALWAYS_THERE) or (section is not None and ROBOT in section.files)
+
+
 def _own_name(name: str, section: Section[Any, Any]) -> str:
     """Return why a user must not use a name, or nothing."""
-    if name in RESERVED or ((other := registry.section_named(name)) is not None and ROBOT in other.files):
-        return f"a {section.entry} cannot be named like the section '{name}'"
-    return f"every robot already runs a component '{name}'" if name in ALWAYS_THERE else ""
+    if name in ALWAYS_THERE:
+        return f"every robot already runs a component '{name}'"
+    return f"a {section.entry} cannot be named like the section '{name}'" if is_own_name(name) else ""
 
 
 def _other_owner(

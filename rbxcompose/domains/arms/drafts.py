@@ -11,6 +11,7 @@ from itertools import takewhile
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.commands.importing.foreign_files import FreeNames
 from rbxcompose.commands.importing.manifest_text import Row, angle, flow, flow_list, key, length, row, section, word
+from rbxcompose.compiler.composition.robot_file import is_own_name
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.srdf import OuterJoint
 
@@ -142,7 +143,7 @@ def proposed_arms(body: Body) -> list[ArmDraft]:
 
 class _Proposals:
     def __init__(self, body: Body) -> None:
-        self.body, self.names = body, FreeNames()
+        self.body, self.names = body, FreeNames(is_own_name)
         self.below: dict[str, list[BodyJoint]] = {"": []}  # moving joints by the one that carries them
         for joint in body.joints_downwards:
             if joint.moves:

@@ -46,7 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
     given = [word.split(":=", 1) for word in arguments.files if has_arguments and _ARGUMENT.match(word)]
     paths = [Path(word) for word in arguments.files if not (has_arguments and _ARGUMENT.match(word))]
     name = _name(arguments.name, paths)
-    files = [replace(file, arguments=dict(given)) for file in read_files(paths, report, sources)]
+    folder = out.parent.resolve() if out is not None else None
+    files = [replace(file, arguments=dict(given), out=folder) for file in read_files(paths, report, sources)]
     made = imported(arguments.program, files, name, report)
     sources.update(made.included)
     if out is not None and out != Path(arguments.out):  # a folder

@@ -14,9 +14,9 @@ from rbxcompose.commands.importing.foreign_files import ForeignFile, FreeNames, 
 from rbxcompose.commands.importing.importer import CLOCK, DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM, importer
 from rbxcompose.commands.importing.manifest_text import Row, header, place, quantity, row, section
 from rbxcompose.compiler.composition.dump import exact
-from rbxcompose.manifest.scalars import plain_value
+from rbxcompose.compiler.composition.robot_file import is_own_name
 from rbxcompose.manifest.shapes import alternatives, field_types
-from rbxcompose.manifest.tree import MappingNode, ScalarNode
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.sdk.registry import component_type, usable_names
 
 GUESSED_TYPE = kind("RBX2293", Severity.WARNING)
@@ -142,12 +142,12 @@ def _add(known: GivenValues, node: ros_parameters.NodeParameters, report: Report
     """Add the parameters of a node; report those that cannot be carried over, and those that disagree."""
     for path, entry in ros_parameters.scalars_of(node.root):
         shown = f"'{plain(ros_parameters.shown_name(path), 60)}' of '{plain(node.node, 60)}'"
-        if path[0] in _OF_ROS and not (isinstance(entry.value, ScalarNode) and plain_value(entry.value) is False):
+        value = ros_parameters.value_of(entry.value)
+        if path[0] in _OF_ROS and not (value is not None and value.value is False):
             words = f"{shown} is not carried over: {_OF_ROS[path[0]]}"
             report.add(NOT_CARRIED_OVER.at(entry.key.span, words))
         if path[0] in _OF_ROS:
             continue
-        value = ros_parameters.value_of(entry.value)
         if value is None and ros_parameters.was_refused(entry.value):
             continue
         if value is None:
@@ -176,7 +176,7 @@ def _argument_rows(nodes: dict[str, tuple[ros_parameters.NodeParameters, GivenVa
 
 
 def _component_rows(components: Iterable[KnownComponent]) -> Iterator[Row]:
-    names, is_first = FreeNames(), True
+    names, is_first = FreeNames(is_own_name), True
     for component in components:
         if is_first:
             yield row(0, "components:")

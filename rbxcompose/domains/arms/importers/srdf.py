@@ -12,6 +12,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.commands.importing.foreign_files import ForeignFile, FreeNames
 from rbxcompose.commands.importing.importer import NOT_CARRIED_OVER, OTHER_PROGRAM, ImportedFiles, importer
 from rbxcompose.commands.importing.manifest_text import flow, flow_list, header, key
+from rbxcompose.compiler.composition.robot_file import is_own_name
 from rbxcompose.domains.arms.drafts import ArmDraft, GripperDraft, manifest_of
 from rbxcompose.domains.arms.motion.groups import carrying, chain
 from rbxcompose.domains.body.description import BodyPart, Description, VirtualKind, describe
@@ -132,7 +133,7 @@ class _Drafts:
 
     def __init__(self, said: Semantics, body: Body, report: Report, span: Span) -> None:
         self.said, self.body, self.report, self.span = said, body, report, span
-        self.names = FreeNames()
+        self.names = FreeNames(is_own_name)
         self.hands = {effector.group: effector for effector in said.effectors if self._is_hand(effector)}
         self.named: dict[str, str] = {}
 

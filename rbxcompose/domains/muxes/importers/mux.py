@@ -19,6 +19,7 @@ from rbxcompose.commands.importing.importer import (
 )
 from rbxcompose.commands.importing.manifest_text import Row, flow, header, place, quantity, row, section
 from rbxcompose.commands.importing.ros_parameters import NodeParameters, parameters_with, topic_name
+from rbxcompose.compiler.composition.robot_file import is_own_name
 from rbxcompose.domains.muxes.config import OWN_NAMES
 from rbxcompose.manifest.tree import MappingNode, SequenceNode
 from rbxcompose.manifest.validate import OUT_OF_RANGE, WRONG_TYPE, label_of
@@ -168,30 +169,31 @@ def mux(files: Sequence[ForeignFile], name: str, report: Report) -> str:
     muxes = joined([foreign_mux for ones in found.values() for foreign_mux in ones], report)
     if not muxes:
         return ""
-    names = FreeNames()
-    rows = [line for foreign_mux in muxes for line in _rows(foreign_mux, names, report)]
+    names = FreeNames(is_own_name)
+    topics = _TopicNames(muxes, report)
+    rows = [line for foreign_mux in muxes for line in _rows(foreign_mux, names, topics, report)]
     made_from = [file for file, ones in found.items() if ones]
     return f"{header('mux', made_from, 'Robot', name)}\n{section([row(0, 'muxes:'), *rows])}"
 
 
-def _rows(foreign_mux: ForeignMux, names: FreeNames, report: Report) -> Iterator[Row]:
+def _rows(foreign_mux: ForeignMux, names: FreeNames, topics: _TopicNames, report: Report) -> Iterator[Row]:
     program = "yocs_cmd_vel_mux" if foreign_mux.program == YOCS else TWIST_MUX
     node = f", '{plain(foreign_mux.node, 60)}'" if foreign_mux.node else ""
-    yield row(1, f"{names.take(_output(foreign_mux, report), _USUAL)}:", f"{place(foreign_mux.span)}{node}")
+    yield row(1, f"{names.take(_output(foreign_mux, topics, report), _USUAL)}:", f"{place(foreign_mux.span)}{node}")
     yield row(2, f"profile: {foreign_mux.program}", f"the rules of {program}, to the letter")
     own = FreeNames()
     yield row(2, "inputs:")
-    yield from _mux_sources(foreign_mux, foreign_mux.inputs, own, report)
+    yield from _mux_sources(foreign_mux, foreign_mux.inputs, own, topics)
     if foreign_mux.locks:
         yield row(2, "locks:")
-        yield from _mux_sources(foreign_mux, foreign_mux.locks, own, report)
+        yield from _mux_sources(foreign_mux, foreign_mux.locks, own, topics)
 
 
-def _output(foreign_mux: ForeignMux, report: Report) -> str:
+def _output(foreign_mux: ForeignMux, topics: _TopicNames, report: Report) -> str:
     """Return the topic of the output, which is the name of the mux."""
     if foreign_mux.output is not None:
         written = foreign_mux.output.value.lstrip("/")
-        name = _topic(foreign_mux.output, foreign_mux, report).lstrip("/").replace("/", "_")
+        name = topics.name(foreign_mux.output, foreign_mux).lstrip("/").replace("/", "_")
         if name != written and "/" in written:
             words = f"the output '{plain(written, 60)}' becomes '{name}'"
             report.add(RENAMED_TOPIC.at(foreign_mux.output.span, words, help="the base must listen there"))
@@ -205,21 +207,39 @@ def _output(foreign_mux: ForeignMux, report: Report) -> str:
     return name
 
 
-def _topic(given: Given[str], one: ForeignMux, report: Report) -> str:
-    """Return a topic as a manifest may have it; private ones are below the name of the node."""
-    written = given.value.strip()
-    topic = f"{one.node.lstrip('/') or one.program}/{written[1:].lstrip('/')}" if written.startswith("~") else written
-    name = topic_name(topic)
-    if name == topic:
+class _TopicNames:
+    """Gives topics the names that manifests may have: those that have one keep it, and no two get the same one."""
+
+    def __init__(self, muxes: Sequence[ForeignMux], report: Report) -> None:
+        sources = ((each, one) for one in muxes for each in (*one.inputs.values(), *one.locks.values()))
+        given = [(each.topic, one) for each, one in sources] + [(one.output, one) for one in muxes if one.output]
+        topics = {_whole(topic, one).lstrip("/") for topic, one in given}
+        self._names = {topic: topic for topic in topics if topic_name(topic) == topic}
+        self._report = report
+
+    def name(self, given: Given[str], one: ForeignMux) -> str:
+        """Return the name of a topic, after a finding if it is another one."""
+        whole = _whole(given, one)
+        topic = whole.lstrip("/")
+        if topic not in self._names:
+            wanted = topic_name(topic)
+            free = (wanted, *(f"{wanted}_{number}" for number in range(2, len(self._names) + 3)))
+            self._names[topic] = next(name for name in free if name not in self._names.values())
+        name = f"{'/' if whole.startswith('/') else ''}{self._names[topic]}"
+        if name != whole and (one.output is None or given is not one.output or "/" not in topic):
+            words = f"the topic '{plain(given.value.strip(), 60)}' becomes '{name}'"
+            self._report.add(RENAMED_TOPIC.at(given.span, words, help="whoever sends there must use this name"))
         return name
-    if one.output is None or given is not one.output or "/" not in topic.lstrip("/"):
-        words = f"the topic '{plain(written, 60)}' becomes '{name}'"
-        report.add(RENAMED_TOPIC.at(given.span, words, help="whoever sends there must use this name"))
-    return name
+
+
+def _whole(given: Given[str], one: ForeignMux) -> str:
+    """Return a topic with the name of the node above it if it is a private one."""
+    written = given.value.strip()
+    return f"{one.node.lstrip('/') or one.program}/{written[1:].lstrip('/')}" if written.startswith("~") else written
 
 
 def _mux_sources(
-    foreign_mux: ForeignMux, sources: Mapping[str, ForeignSource], names: FreeNames, report: Report
+    foreign_mux: ForeignMux, sources: Mapping[str, ForeignSource], names: FreeNames, topics: _TopicNames
 ) -> Iterator[Row]:
     for source in sources.values():
         name = names.take(source.name, "source")
@@ -231,7 +251,7 @@ def _mux_sources(
             + ([plain(source.about, 80)] if source.about else [])
         )
         entry = {
-            "topic": _topic(source.topic, foreign_mux, report),
+            "topic": topics.name(source.topic, foreign_mux),
             "priority": str(source.priority.value),
             "timeout": quantity(source.timeout.value, "s"),
         }

@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
 
 from rbxcompose.base.config import COMPONENT, CONTENTS, LocalFiles, LocalPath, Name, Refers
 from rbxcompose.base.files import replace_file
@@ -25,6 +36,8 @@ from rbxcompose.domains.programs.components.program import (
     order_of,
 )
 from rbxcompose.domains.programs.sections.ros2 import ros2
+from rbxcompose.manifest.files import shown_name
+from rbxcompose.manifest.reader import read_source
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.sdk import Capability, component
 from rbxcompose.sdk.capabilities import RunsRosNode, Setting
@@ -39,6 +52,20 @@ def _from_section(value: Any, info: ValidationInfo) -> Any:
     if not isinstance(value, Mapping) or whole is None:
         return value
     return {**whole.model_dump(), **value}
+
+
+def _read(value: Any, whole: ValidatorFunctionWrapHandler, info: ValidationInfo) -> str:
+    """Read a file beside the manifest, which then belongs to the robot; a whole path is one on its computer."""
+    path: str = whole(value)
+    contents = (info.context or {}).get(CONTENTS)
+    if contents is None or os.path.isabs(value):
+        return path
+    text, findings = read_source(
+        Path(path), shown_name(Path(path)), contents.documents.sources, what="a parameter file"
+    )
+    if text is None:
+        raise PydanticCustomError("unreadable", "{reason}", {"reason": findings[0].message})
+    return path
 
 
 class Ros2NodeConfig(RunConfig):
@@ -64,7 +91,7 @@ class Ros2NodeConfig(RunConfig):
     """Names that it uses, each with the name in its place."""
     parameters: dict[str, Parameter] = {}
     """Its parameters."""
-    parameter_files: tuple[LocalFiles, ...] = ()
+    parameter_files: tuple[Annotated[LocalFiles, WrapValidator(_read)], ...] = ()
     """Files with more of them; `parameters` count before these."""
     folder: LocalPath = Field(".", validate_default=True)
     """Where it runs, relative to the manifest's file."""

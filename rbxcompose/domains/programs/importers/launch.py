@@ -22,6 +22,7 @@ from rbxcompose.commands.importing.manifest_text import (
     section,
     word,
 )
+from rbxcompose.compiler.composition.robot_file import is_own_name
 from rbxcompose.domains.programs.launch_files.evaluation import Evaluation, LaunchedProgram, Parameter
 from rbxcompose.manifest.validate import UNKNOWN_KEY
 
@@ -32,7 +33,7 @@ _WIDEST = 100  # columns of a map in one line
 def launch(files: Sequence[ForeignFile], name: str, report: Report) -> str | ImportedFiles:
     """Return a robot with a component for each program that the files start."""
     prefixes = tuple(Path(each) for each in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if each)
-    found = Evaluation(prefixes, os.environ, report)
+    found = Evaluation(prefixes, os.environ, report, files[0].out)
     for file in files:
         found.run(file)
     for given in files[0].arguments:
@@ -49,11 +50,12 @@ def launch(files: Sequence[ForeignFile], name: str, report: Report) -> str | Imp
         report.add(LEFT_OPEN.at(nodes[0].span, words, help=help_text))
     if not found.programs:
         return ImportedFiles("", included=found.sources)
-    text = f"{header('launch', [file.name for file in files], 'Robot', name)}\n{section(_rows(found))}"
+    rows = _rows(found, is_placed=files[0].out is not None)
+    text = f"{header('launch', [file.name for file in files], 'Robot', name)}\n{section(rows)}"
     return ImportedFiles(text, included=found.sources)
 
 
-def _rows(found: Evaluation) -> Iterator[Row]:
+def _rows(found: Evaluation, *, is_placed: bool) -> Iterator[Row]:
     if found.arguments:
         yield row(0, "", "Arguments are filled in with these values; 'NAME:=VALUE' behind FILE gives others.")
     for name, argument in found.arguments.items():
@@ -61,10 +63,10 @@ def _rows(found: Evaluation) -> Iterator[Row]:
         yield row(0, "", f"  {plain(name, 60)}:={plain(argument.value)} ({place(argument.span)}{about})")
     if any(program.package for program in found.programs):
         yield row(0, "", "The topics of each 'ros2_node' are still open: see 'publishes' and 'subscribes'.")
-    if any(program.files or program.folder for program in found.programs):
+    if not is_placed and any(program.files or program.folder for program in found.programs):
         yield row(0, "", "Relative paths begin in the folder of the first FILE.")
     yield row(0, "components:")
-    names = FreeNames()
+    names = FreeNames(is_own_name)
     for program in found.programs:
         name = names.take(program.wanted, "program")
         yield row(1, f"{key(name)}:", place(program.span))

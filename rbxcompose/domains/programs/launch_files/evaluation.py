@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -89,6 +91,8 @@ _WHY = {
 _INTEGERS = 1 << 63
 _BODY = "in the place of 'robot_description', write 'body: {xacro: FILE}'"
 
+_NODE_NAME, _NAMESPACE = re.compile(r"([A-Za-z_]\w*)?", re.ASCII), re.compile(r"(/[A-Za-z_]\w*)*", re.ASCII)
+
 
 @dataclass(slots=True)
 class LaunchedProgram:
@@ -140,14 +144,20 @@ class _Scope:
 
 
 class Evaluation:
-    """The programs that launch files start, and the arguments that they declare; `sources` has what they include."""
+    """The programs that launch files start, and the arguments that they declare; `sources` has what they include.
 
-    def __init__(self, prefixes: tuple[Path, ...], environment: Mapping[str, str], report: Report) -> None:
+    Relative paths begin in `folder`; without it, in that of the first file.
+    """
+
+    def __init__(
+        self, prefixes: tuple[Path, ...], environment: Mapping[str, str], report: Report, folder: Path | None = None
+    ) -> None:
         self.programs: list[LaunchedProgram] = []
         self.arguments: dict[str, LaunchArgument] = {}
         self.outputs: list[Span] = []
         self.sources: dict[str, str] = {}
         self._prefixes, self._environment, self._report = prefixes, environment, report
+        self._folder = folder
         self._unset: set[str] = set()
         self._left, self._python, self._depth = _MOST_ENTITIES, _MOST_PYTHON, 0
         self._open: list[Path] = []
@@ -172,6 +182,7 @@ class Evaluation:
     def run(self, file: ForeignFile) -> None:
         """Add what a file starts."""
         path = file.path or Path(file.name).absolute()
+        self._folder = self._folder or path.resolve().parent
         context = SubstitutionContext(path, self._prefixes, dict(file.arguments), dict(self._environment))
         self._file(file, path, _Scope(context))
 
@@ -381,11 +392,12 @@ class Evaluation:
             return
         name = self._text(entity, "name", scope) or ""
         wanted = name or self._text(entity, "exec_name", scope) or PurePath(executable).stem
+        name = self._ros_name(_NODE_NAME, name, entity)
         program = LaunchedProgram(wanted, entity.span, package, executable, name, words=words)
         if ros := self._words(replace(entity, children=()), "ros_args", scope):
             program.words += ["--ros-args", *ros, "--"]
         given = self._text(entity, "namespace", scope) or ""
-        program.namespace = _namespace(scope.namespace, given)
+        program.namespace = self._ros_name(_NAMESPACE, _namespace(scope.namespace, given), entity)
         if "cwd" in entity.attributes:
             self._leave(entity.attributes["cwd"].span, "'cwd' of 'node'", "a node runs in the folder of the robot")
         program.remaps = dict(scope.remaps)
@@ -394,6 +406,13 @@ class Evaluation:
         self._parameters(program, entity, scope)
         self._common(program, entity, scope)
         self._report_rest_of(program, entity, scope)
+
+    def _ros_name(self, pattern: re.Pattern[str], name: str, entity: LaunchEntity) -> str:
+        """Return a name, or nothing after a finding if no node can have it."""
+        if pattern.fullmatch(name):
+            return name
+        self._leave(entity.span, f"the name '{plain(name, 60)}'", "names in ROS 2 have letters, digits and '_' only")
+        return ""
 
     def _report_rest_of(self, program: LaunchedProgram, entity: LaunchEntity, scope: _Scope) -> None:
         """Report what a node needs beside its process."""
@@ -462,13 +481,12 @@ class Evaluation:
         return words
 
     def _path(self, entity: LaunchEntity, name: str, scope: _Scope) -> str | None:
-        """Return a path as a manifest beside the first file has it, if it lies below that folder."""
+        """Return a path as the manifest has it: relative if it lies below the folder of the given file."""
         text = self._text(entity, name, scope)
         if text is None:
             return None
-        base = self._open[0].parent
         path = scope.context.file.parent.resolve() / text
-        return str(path.relative_to(base)) if path.is_relative_to(base) else str(path)
+        return os.path.relpath(path, self._folder) if path.is_relative_to(self._open[0].parent) else str(path)
 
     def _parameters(self, program: LaunchedProgram, entity: LaunchEntity, scope: _Scope) -> None:
         program.parameters = dict(scope.parameters)
@@ -482,7 +500,7 @@ class Evaluation:
             path = self._path(param, "from", scope)
             if path is None:
                 continue
-            if not (self._open[0].parent / path).is_file():
+            if not Path(os.path.normpath(os.path.join(self._folder or "", path))).is_file():
                 self._report.add(NOT_KNOWN.at(span, f"there is no file of parameters '{plain(path)}'"))
                 continue
             program.files.append(path)

@@ -19,6 +19,7 @@ from rbxcompose.commands.importing import manifest_text as out
 from rbxcompose.commands.importing.foreign_files import ForeignFile, ForeignMap, FreeNames, Given
 from rbxcompose.commands.importing.importer import DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM, importer
 from rbxcompose.commands.importing.manifest_text import key as yaml_key
+from rbxcompose.compiler.composition.robot_file import is_own_name
 from rbxcompose.domains.servos.models import ServoModel, servo_models
 from rbxcompose.domains.servos.sections.actuators import ONE_ID
 from rbxcompose.domains.servos.sections.controllers import NOT_DRIVEN
@@ -591,7 +592,7 @@ class ArbotixManifest:
 
     def __init__(self, robot: ArbotixRobot) -> None:
         self._robot = robot
-        self._names, actuators = FreeNames(), FreeNames()
+        self._names, actuators = FreeNames(is_own_name), FreeNames()
         self._buses = {port: self._names.take("servos", "") for port, line in robot.lines.items() if line.joints}
         self._actuators = {
             name: actuators.take(f"{name.removesuffix('_joint')}_servo", "servo") for name in robot.joints
