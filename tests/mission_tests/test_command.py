@@ -157,6 +157,15 @@ def test_traces_coverage_and_junit(
     assert (kept["ways"], len(kept["missing"])) == (7, 3)
 
 
+def test_results_that_cannot_be_written_are_told_before_any_test_runs(
+    repository: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "reports/out.xml"
+    assert command(["test", PATROL, "--junit", str(file)]) == 2
+    told = capsys.readouterr()
+    assert (told.out, told.err) == ("", f"rbxcompose test: '{file}' cannot be written: No such file or directory\n")
+
+
 def test_a_damaged_file_of_what_was_tested_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     assert read_tested("rover", "look") is None

@@ -52,6 +52,11 @@ def run(arguments: argparse.Namespace) -> int:
     files = tests_of(arguments.paths)
     if not files:
         return misused("test", f"no tests ('kind: Test') in {plain(', '.join(map(str, arguments.paths)))}")
+    if arguments.junit:
+        try:
+            arguments.junit.open("a").close()  # now, and not after all tests have run
+        except OSError as error:
+            return misused("test", f"'{plain(str(arguments.junit))}' cannot be written: {error.strerror}")
     reading = TrialReader(os.environ, unsaved_of(arguments))
     coverage, writer = Coverage(), TrialWriter(has_colour(sys.stdout))
     outcomes: list[FileOutcome] = []
