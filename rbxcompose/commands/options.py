@@ -20,6 +20,8 @@ system, and needs no more of them than their names; else, for those of its actio
 
 Declare = Callable[[argparse.ArgumentParser], object]  # declares some arguments
 _KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
+_KEY = re.compile(rb"^['\"]?(\w+)['\"]?[ \t]*:", re.MULTILINE)
+_MANIFEST = re.compile(rb"(?:^|[{,])[ \t]*['\"]?rbx['\"]?[ \t]*:", re.MULTILINE)
 _HEAD = 4096  # bytes at the start of a file that contain its kind
 
 
@@ -119,6 +121,20 @@ def kind_of(path: Path) -> str:
     except OSError:
         return ""
     return found[1].decode() if found else ""
+
+
+def is_manifest(path: Path) -> bool:
+    """Return whether a file without a kind is meant as a manifest, by its name or its keys."""
+    try:
+        with open_regular(path) as file:
+            head = file.read(_HEAD)
+    except OSError:
+        return True
+    if path.stem == "robot" or _MANIFEST.search(head):
+        return True
+    from rbxcompose.manifest.registry import robot_keys  # takes longer to import
+
+    return len({key.decode() for key in _KEY.findall(head)}.intersection(robot_keys())) > 1
 
 
 def is_system(written: str) -> bool:

@@ -12,11 +12,11 @@ from typing import TypedDict
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Severity, Span, kind
 from rbxcompose.commands.console import NotDoneError
-from rbxcompose.commands.options import is_system, kind_of, unsaved_of
+from rbxcompose.commands.options import is_manifest, is_system, kind_of, unsaved_of
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import PREFIX, ROBOT_FILE, find, project_of, shown_name
-from rbxcompose.manifest.section import SYSTEM, TEST
+from rbxcompose.manifest.section import OVERLAY, ROBOT, SYSTEM, TEST
 from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.sdk.capabilities import NeedsExtra
 
@@ -32,9 +32,13 @@ NO_EXTRA = kind("RBX2253")
 
 @dataclass(slots=True)
 class Targets:
-    """What to check: `robots`, `tests` of missions, `systems`; and `users`, but only if they use one of `files`."""
+    """What to check: `robots`, `tests` of missions, `systems`; and `users`, but only if they use one of `files`.
+
+    `overlays` are checked on the robots beside them, which stand before them.
+    """
 
     robots: list[str] = field(default_factory=list)
+    overlays: list[tuple[str, str]] = field(default_factory=list)
     users: list[str] = field(default_factory=list)
     files: list[str] = field(default_factory=list)
     tests: list[str] = field(default_factory=list)
@@ -46,7 +50,7 @@ class Targets:
         for file in self.files:
             if file not in known:
                 message, how = f"no robot of the project uses '{file}'", _USE
-                if kind_of(Path(file)) == "Overlay":
+                if kind_of(Path(file)) == OVERLAY:
                     message = f"'{file}' is an overlay, and does not say for which robot"
                     how = f"name the robot, too: 'rbxcompose check ROBOT -f {file}'"
                 yield UNUSED.at(Span(file, 1, 1, 1, 2), message, help=how)
@@ -56,7 +60,7 @@ def targets(paths: Iterable[str]) -> Targets:
     """Return the targets that command-line paths name.
 
     A path is a robot's file or folder, `rbx:robots/NAME`, a folder with robots or else tests below it, or any other
-    manifest, which means the robots of its project that use it.
+    manifest, which means the robots of its project that use it. Other files mean the robot in whose folder they are.
     """
     out = Targets()
     for written in paths:
@@ -72,12 +76,16 @@ def targets(paths: Iterable[str]) -> Targets:
             systems = systems_of(path)
             out.systems += systems
             out.robots += robots if robots or tests or systems else [written]
-        elif kind_of(path) in ("Robot", ""):
+        elif kind_of(path) == ROBOT or (kind_of(path) == "" and is_manifest(path)):
             out.robots.append(written)
+        elif kind_of(path) == OVERLAY and (beside := path.parent / ROBOT_FILE).is_file():
+            out.overlays.append((str(beside), written))
         elif kind_of(path) == TEST:
             out.tests.append(written)
         elif kind_of(path) == SYSTEM:
             out.systems.append(written)
+        elif kind_of(path) == "" and (robot := _robot_around(path)):
+            out.robots.append(robot)
         else:
             out.files.append(shown_name(path.resolve()))
             out.users += robots_below(project_of(path))
@@ -86,11 +94,18 @@ def targets(paths: Iterable[str]) -> Targets:
     return out
 
 
+def _robot_around(path: Path) -> str:
+    """Return the robot in whose folder a file is, at any depth; nothing if there is none in the project."""
+    path = path.resolve()
+    folders = (folder for folder in path.parents if folder.is_relative_to(project_of(path)))
+    return next((shown_name(folder / ROBOT_FILE) for folder in folders if (folder / ROBOT_FILE).is_file()), "")
+
+
 def robots_below(folder: Path) -> list[str]:
     """Return the robot files of a project, or of a folder of robots; at most two folders deep."""
     base = folder / _ROBOTS if (folder / _ROBOTS).is_dir() else folder
     files = (path for depth in ("", "*/", "*/*/") for pattern in _MANIFESTS for path in base.glob(depth + pattern))
-    return sorted(shown_name(path.resolve()) for path in files if kind_of(path) == "Robot")
+    return sorted(shown_name(path.resolve()) for path in files if kind_of(path) == ROBOT)
 
 
 def systems_of(folder: Path) -> list[str]:
@@ -219,9 +234,11 @@ def chosen_layers(arguments: argparse.Namespace) -> ChosenLayers:
     return ChosenLayers(tuple(arguments.profile), overlays, tuple(arguments.sets), arguments.real)
 
 
-def compiled(robot: str, arguments: argparse.Namespace, *, tries_profiles: bool = False) -> Compilation:
-    """Compile a robot with all layers that a command puts over its file."""
-    return compile_robot(robot, **layers_of(arguments), tries_profiles=tries_profiles)
+def compiled(robot: str, arguments: argparse.Namespace, *overlays: str, tries_profiles: bool = False) -> Compilation:
+    """Compile a robot with all layers that a command puts over its file, and more `overlays`."""
+    layers = layers_of(arguments)
+    layers["overlays"] = [*layers["overlays"], *overlays]
+    return compile_robot(robot, **layers, tries_profiles=tries_profiles)
 
 
 def missing_extras(robot: Robot) -> Iterator[Finding]:

@@ -86,6 +86,45 @@ def test_an_overlay_alone_is_told_to_name_a_robot(project: Path, capsys: pytest.
     assert "is fine" in output(capsys, "-f", "careful.yaml", str(ROBOT), "careful.yaml", code=0)
 
 
+def test_an_overlay_is_checked_on_the_robot_beside_it(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    night = ROBOT.with_name("night.yaml")
+    night.write_text("rbx: 1\nkind: Overlay\nname: night\ncomponents:\n  batery: {warn: 40 %}\n")
+    told = output(capsys, str(night), str(ROBOT), code=1)
+    assert "error[RBX1302]" in told
+    assert f"{night}:5:3" in told
+    change(night, "batery", "battery")
+    assert "is fine" in output(capsys, str(night), "--strict", code=0)
+    assert "fixed" not in output(capsys, str(night), "--fix", code=0)
+
+
+DATA = {
+    "config/params.yaml": "/**:\n  ros__parameters: {start: 1}\n",
+    "lab.yaml": "image: lab.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n",
+}
+MEANT = {
+    "robots/bot/second.yaml": "rbx: 1\nname: second\n",
+    "robots/third.yaml": "name: third\ncomponents: {}\n",
+    "robots/new/robot.yaml": "a: 1\n",
+}
+
+
+def test_data_in_the_folder_of_a_robot_mean_the_robot(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name, text in DATA.items():
+        (project / "robots/bot" / name).parent.mkdir(exist_ok=True)
+        (project / "robots/bot" / name).write_text(text)
+    paths = [f"robots/bot/{name}" for name in DATA]
+    assert len(output(capsys, *paths, "--strict", code=0).splitlines()) == 1
+    change(project / ROBOT, "type: charger", "type: chargr")
+    assert "chargr" in output(capsys, paths[0], code=1)
+
+
+@pytest.mark.parametrize("name", MEANT)
+def test_a_robot_without_its_kind_is_told(name: str, project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (project / name).parent.mkdir(exist_ok=True)
+    (project / name).write_text(MEANT[name])
+    assert "needs the key 'kind'" in output(capsys, name, code=1)
+
+
 def test_a_robot_that_is_named_twice_is_told_once(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     change(project / MISSION, "go_to: dock", "go_to: harbour")
     assert "1 error\n" in output(capsys, str(ROBOT), str(ROBOT), str(MISSION), code=1)

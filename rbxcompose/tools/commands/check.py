@@ -1,8 +1,8 @@
 """Report every error of a robot before a motor moves.
 
 PATH is a robot's file or folder, a folder with robots or tests below it, a test, a system, or a mission or part: it
-checks the robots of the project that use it. Check an overlay on a robot: check ROBOT -f FILE. Exit codes: 0 fine, 1
-errors found (with --strict also warnings), 2 wrong usage.
+checks the robots of the project that use it. An overlay is checked on the robot beside it, else: check ROBOT -f FILE.
+Exit codes: 0 fine, 1 errors found (with --strict also warnings), 2 wrong usage.
 """
 
 import argparse
@@ -82,6 +82,10 @@ def _check(wanted: Targets, arguments: argparse.Namespace) -> CheckedRobots:
     checked = CheckedRobots()
     for robot in wanted.robots:
         checked.add(compiled(robot, arguments, tries_profiles=True))
+    for robot, overlay in wanted.overlays:
+        one = compiled(robot, arguments, overlay, tries_profiles=True)
+        one.report = _new(one.report, checked.report)
+        checked.add(one)
     for robot in wanted.users:
         one = compiled(robot, arguments, tries_profiles=True)
         if any(file in one.sources for file in wanted.files):
@@ -90,9 +94,16 @@ def _check(wanted: Targets, arguments: argparse.Namespace) -> CheckedRobots:
         _check_tests(wanted.tests, arguments, checked)
     for path in wanted.systems:
         _check_system(path, arguments, checked)
-    projects = projects_of([*wanted.robots, *wanted.users, *wanted.tests, *wanted.systems])
+    on_robots = [robot for robot, _ in wanted.overlays]
+    projects = projects_of([*wanted.robots, *on_robots, *wanted.users, *wanted.tests, *wanted.systems])
     checked.report = Report([*only_ours(checked.report, checked.sources, projects), *wanted.unused(checked.sources)])
     return checked
+
+
+def _new(report: Report, before: Report) -> Report:
+    """Return a report without what was found before."""
+    known = {(each.code, each.span, each.message) for each in before}
+    return Report([each for each in report if (each.code, each.span, each.message) not in known])
 
 
 def _check_tests(tests: list[str], arguments: argparse.Namespace, checked: CheckedRobots) -> None:
@@ -122,8 +133,7 @@ def _check_system(path: str, arguments: argparse.Namespace, checked: CheckedRobo
     tried = [] if arguments.profile else [(name,) for name in system.known_profiles]
     all_ = [system, *map(compiled_with, tried)]
     for one in all_:
-        known = {(each.code, each.span, each.message) for each in checked.report}
-        checked.report.extend(each for each in one.report if (each.code, each.span, each.message) not in known)
+        checked.report.extend(_new(one.report, checked.report))
         checked.sources.update(one.sources)
     if not any(one.report.has_errors for one in all_):
         checked.systems.append(f"{system.name} is fine: {system_extent(system)}")

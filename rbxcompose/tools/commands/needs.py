@@ -95,9 +95,9 @@ def _robots(arguments: argparse.Namespace, report: Report, sources: dict[str, st
     from rbxcompose.compiler.systems.reader import compile_system  # only needed for systems
 
     wanted = targets(arguments.paths)
-    for path in (*wanted.robots, *wanted.users):
-        compilation = compiled(path, arguments)
-        if path in wanted.users and not any(file in compilation.sources for file in wanted.files):
+    for path, *overlays in (*((path,) for path in (*wanted.robots, *wanted.users)), *wanted.overlays):
+        compilation = compiled(path, arguments, *overlays)
+        if path in wanted.users and not overlays and not any(file in compilation.sources for file in wanted.files):
             continue
         report.extend(compilation.report)
         sources.update(compilation.sources)

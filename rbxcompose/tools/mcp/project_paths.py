@@ -90,5 +90,5 @@ class ProjectPaths:
 
 def _named(found: Targets) -> Iterator[str]:
     """Yield the files of a project that targets mean."""
-    for paths in (found.robots, found.users, found.files, found.tests, found.systems):
+    for paths in (found.robots, *found.overlays, found.users, found.files, found.tests, found.systems):
         yield from (path for path in paths if not path.startswith(PREFIX))
