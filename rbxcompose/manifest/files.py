@@ -60,6 +60,9 @@ def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
     """Return the file that a manifest names, or the finding that says why it must not or cannot be used."""
     path = _absolute(written, _real(writer).parent)
     is_inside = path and any(path.is_relative_to(root) for root in (project_of(writer), library_root()))
+    if path is not None and not is_inside and _is_named_inside(written, writer):
+        message, leads_to = f"'{plain(written)}' leads through a link out of the project", plain(shown_name(path))
+        return OUTSIDE.at(span, message, help=f"it leads to '{leads_to}': put a copy of that file in its place")
     if path is None or not is_inside or _DRIVE.match(written):
         message, folder = f"'{plain(written)}' is outside the project", plain(shown_name(project_of(writer)))
         where = f"'{folder}'" if folder != "." else "this folder"
@@ -74,6 +77,12 @@ def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
     is_folder = path.name == ROBOT_FILE and os.path.isdir(os.path.join(folder, written))
     need(folder, os.path.join(written, ROBOT_FILE) if is_folder else written)
     return path
+
+
+def _is_named_inside(written: str, writer: Path) -> bool:
+    """Return whether a path lies in the writer's project if links are not followed."""
+    named = Path(os.path.normpath(_real(writer).parent / written))
+    return not written.startswith(PREFIX) and named.is_relative_to(project_of(writer))
 
 
 def folder_named(written: str, writer: Path, span: Span) -> Path | Finding:

@@ -60,6 +60,13 @@ def test_a_path_that_leads_out_of_the_project_is_a_finding(project: Path, writte
     assert refused(written, project).code == "RBX1306"
 
 
+def test_a_link_that_leads_out_of_the_project_says_where(project: Path) -> None:
+    (project / "missions/link.yaml").symlink_to(secret := project.parent / "secret.yaml")
+    finding = refused("../../missions/link.yaml", project)
+    assert finding.message == "'../../missions/link.yaml' leads through a link out of the project"
+    assert finding.help == f"it leads to '{secret}': put a copy of that file in its place"
+
+
 def test_a_missing_file_names_the_nearest_neighbour(project: Path) -> None:
     finding = refused("../../missions/patrl.yaml", project)
     assert (finding.code, finding.span, finding.help) == ("RBX1301", HERE, "did you mean 'patrol.yaml'?")
