@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rbxcompose.base.findings import Finding, Span, kind, need, once, replacement
 from rbxcompose.base.printable import plain
-from rbxcompose.manifest.reader import UNREADABLE
+from rbxcompose.manifest.reader import UNREADABLE, is_there
 
 PREFIX = "rbx:"
 PARTS = "parts"  # the library's folder of parts
@@ -71,7 +71,7 @@ def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
                 span, message, help="did you mean " + " or ".join(f"'{namesake}'" for namesake in namesakes) + "?"
             )
         return OUTSIDE.at(span, message, help=f"the project is {where}: move the file there, or use what 'rbx:' has")
-    if not path.is_file():
+    if not is_there(path):
         return _missing(written, path, span, writer)
     folder = str(_real(writer).parent)
     is_folder = path.name == ROBOT_FILE and os.path.isdir(os.path.join(folder, written))
@@ -106,7 +106,7 @@ def find(written: str) -> Path | Finding:
     path = _absolute(written, Path.cwd())
     if path is None:
         return OUTSIDE.at(None, f"'{plain(written)}' is outside the library")
-    if not path.is_file():
+    if not is_there(path):
         return _missing(written, path, None)
     link = _link(written)
     if link is None or path.is_relative_to(_project_around(link.parent.resolve())):

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Mapping, MutableMapping
 from pathlib import Path
 
 from rbxcompose.base.files import NotRegularError, open_regular
-from rbxcompose.base.findings import Edit, Finding, Fix, Severity, Span, kind
+from rbxcompose.base.findings import Edit, Finding, Fix, Severity, Span, kind, once
 from rbxcompose.base.printable import FORBIDDEN, code_point
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.foreign_words import foreign_text
@@ -59,6 +59,7 @@ class Texts(dict[str, str]):
     def __init__(self, unsaved: Mapping[Path, str], parsed: dict[tuple[str, str], ParsedText] | None = None) -> None:
         super().__init__()
         self.unsaved = unsaved
+        _unsaved().update(unsaved)  # for the rest of this compile, they are there
         self.parsed = {} if parsed is None else parsed
         self.total_values = 0  # of all uses of these files
 
@@ -69,6 +70,17 @@ class Texts(dict[str, str]):
             return None
         help_text = f"a text with '${{...}}' counts as one for each {tree.FILL_TEXT} characters"
         return TOO_LARGE.at(None, f"with '{shown}' this robot has more than {tree.ALL_VALUES:,} values", help=help_text)
+
+
+@once
+def _unsaved() -> set[Path]:
+    """Return the files of this compile that have a text in an editor."""
+    return set()
+
+
+def is_there(path: Path) -> bool:
+    """Return whether there is a file, on disk or only in an editor."""
+    return path in _unsaved() or path.is_file()
 
 
 def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> ParsedText:

@@ -81,6 +81,17 @@ def test_an_overlay_is_checked_with_the_robot_beside_it(folder: Path) -> None:
     assert project.robot_of(path) is not None
 
 
+def test_a_text_is_checked_also_if_its_file_is_not_there(folder: Path) -> None:
+    project, path = Project({}), folder / "missions/patrol.yaml"
+    text = path.read_text(encoding="utf-8")
+    assert codes(project, path, text) == {}
+    path.unlink()
+    assert codes(project, path, text.replace("go_to: dock", "go_to: dok")) == {"patrol.yaml": ["RBX4103"]}
+    robot = folder / "robots/turtlebot/robot.yaml"
+    text = robot.read_text(encoding="utf-8").replace("max_speed", "max_sped")
+    assert "RBX1001" in codes(project, folder / "robots/new/robot.yaml", text)["robot.yaml"]
+
+
 def test_while_a_robot_cannot_be_read_its_names_are_still_known(folder: Path) -> None:
     project, path = Project({}), folder / "robots/turtlebot/robot.yaml"
     project.change(path, path.read_text(encoding="utf-8"))
