@@ -82,6 +82,7 @@ def test_every_slip_is_told_with_its_cure(golden: Golden) -> None:
         ("- go_to:dock\n    timeout: 5 s", "- go_to: dock\n    timeout: 5 s"),
         ("- go_to:dock", "- go_to: dock"),
         ("go_to:dock", "go_to: dock"),
+        ("- go_to dock\n  - log hello\n  - wait 3 s", "- go_to: dock\n  - log: hello\n  - wait: 3 s"),
         ("- a:\n    optional: No", "- a:\n    optional: false"),
         ("repeat: endless\n  every: 1 s\n  do: a", "repeat: forever\n  every: 1 s\n  do: a"),
         ("- go_to: dock\n    recharge:", "- go_to: dock\n  - recharge:"),
@@ -94,7 +95,18 @@ def test_a_slip_that_can_mean_one_thing_only_is_cured(wrong: str, right: str) ->
 
 @pytest.mark.parametrize(
     "unclear",
-    ["- go_to: dock\n    retries: 3", "- go_to: dock\n    fly_away:", "- [-recharge]", "{-recharge: 3}", "- -recharge"],
+    [
+        "- go_to: dock\n    retries: 3",
+        "- go_to: dock\n    fly_away:",
+        "- [-recharge]",
+        "{-recharge: 3}",
+        "- -recharge",
+        "go_to dock",
+        "[log hello]",
+        "- if $door",
+        "- log [a]",
+        "- go_to dock:\n    timeout: 3 s",
+    ],
 )
 def test_what_may_mean_several_things_is_left_alone(unclear: str) -> None:
     text = f"do:\n  {unclear}\n"

@@ -35,10 +35,14 @@ def tight_dashes(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None
 
 def _spaced(key: ScalarNode) -> Fix:
     """Return the fix that puts a space after a dash; it applies only to a line of its own."""
+    return _behind(_INDENT, key, f"- {key.text[1:]}")
+
+
+def _behind(before: str, key: ScalarNode, meant: str) -> Fix:
+    """Return the fix that writes a word in another way; it applies only behind `before`."""
     span = key.span
-    before = span._replace(column=span.column - len(_INDENT), end_line=span.line, end_column=span.column)
-    meant = f"- {key.text[1:]}"
-    return Fix((Edit(before, _INDENT, _INDENT), Edit(span, key.text, meant)), True, f"'{key.text}' -> '{meant}'")
+    place = span._replace(column=span.column - len(before), end_line=span.line, end_column=span.column)
+    return Fix((Edit(place, before, before), Edit(span, key.text, meant)), True, f"'{key.text}' -> '{meant}'")
 
 
 @slip(Takes.STEP, after=(tight_dashes,))
@@ -72,27 +76,38 @@ def words_run_together(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] 
     own = place.words.own(node) if isinstance(node, MappingNode) else []
     if not own or not isinstance(node, MappingNode):
         return None
-    finding = _report(node.entries[place.words.kind_of(node) or own[0]].key)
+    finding = _report(node.entries[place.words.kind_of(node) or own[0]], place.words)
     return Repair(without_word(node, place.words), (finding,)) if finding else None
 
 
-def _report(key: ScalarNode) -> Finding | None:
-    words = key.text.split()
+def _report(entry: Entry, known: Words) -> Finding | None:
+    key, words = entry.key, entry.key.text.split()
     if _TIGHT_COLON.fullmatch(key.text):
         name, _, value = key.text.partition(":")
         meant, message = f"{name}: {value}", "a space is missing after the colon"
-        fix = replacement(key.span, key.text, meant)
-        return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{meant}'", fix=fix)
+        tight = replacement(key.span, key.text, meant)
+        return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{meant}'", fix=tight)
     if len(words) < 2:
         return None
     if key.span.line != key.span.end_line:
         message = "a step with settings below it needs a colon"
         return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{words[0]}:'")
     message, meant = f"'{key.text}' is neither a step nor a skill", f"{words[0]}: {' '.join(words[1:])}"
-    return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{meant}'")
+    is_alone = key.plain and entry.value.span == key.span  # there is no colon behind it
+    fix = _behind(_DASH, key, meant) if is_alone and _takes_value(words[0], known) and _VALUE.match(words[1]) else None
+    return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{meant}'", fix=fix)
 
 
 _DASH = "- "
+_VALUE = re.compile(r"[\w$]")  # begins what is no other form of YAML
+_VALUES = (Takes.TEXT, Takes.DURATION, Takes.CONDITION, Takes.WATCHED, Takes.VALUE, Takes.WORD, Takes.CHOICE)
+
+
+def _takes_value(word: str, known: Words) -> bool:
+    """Return whether a step may be a word with one value behind its colon."""
+    slots = known.kinds.get(word, {})
+    has_steps = any(slot.takes in (Takes.STEP, Takes.CASES) for slot in slots.values())
+    return word in known.skills or (word in slots and slots[word].takes in _VALUES and not has_steps)
 
 
 @slip(Takes.STEPS, Takes.BRANCHES)
