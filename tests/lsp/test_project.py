@@ -8,7 +8,10 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pygls.workspace import PositionCodec
 
+from rbxcompose.base.findings import Span
+from rbxcompose.tools.lsp.convert import Converter
 from rbxcompose.tools.lsp.project import Project
 from rbxcompose.tools.lsp.rename import actions, change_of
 from tests.conftest import ROOT
@@ -111,6 +114,17 @@ def test_the_fix_of_a_finding_is_the_smallest_change(folder: Path) -> None:
     change = action.changes[path]
     assert change.text == "e"
     assert list(actions(project, [finding], 0, 1)) == []  # another line
+
+
+def test_files_are_named_as_the_editor_sees_them_if_it_opened_a_link(folder: Path) -> None:
+    (opened := folder.with_name(f"{folder.name}_opened")).symlink_to(folder)
+    convert = Converter(lambda path: "", PositionCodec())
+    mission = convert.path((opened / "missions/patrol.yaml").as_uri())
+    assert mission == folder / "missions/patrol.yaml"
+    assert convert.uri(mission) == (opened / "missions/patrol.yaml").as_uri()
+    span = Span(str(folder / "robots/turtlebot/robot.yaml"), 1, 1, 1, 2)
+    assert convert.location(span).uri == (opened / "robots/turtlebot/robot.yaml").as_uri()
+    assert convert.uri(folder.parent / "other.yaml") == (folder.parent / "other.yaml").as_uri()
 
 
 @given(st.text("ab\n", max_size=8), st.text("ab\n", max_size=8))

@@ -51,7 +51,17 @@ class Converter:
 
     def uri(self, path: Path) -> str:
         """Return the editor's name for a file."""
-        return self._uris.get(path) or from_fs_path(str(path)) or ""
+        return self._uris.get(path) or from_fs_path(str(self._as_opened(path))) or ""
+
+    def _as_opened(self, path: Path) -> Path:
+        """Return a file below the folder that the editor has opened, which may be a link to where it really is."""
+        for real, uri in self._uris.items():
+            written = Path(to_fs_path(uri) or "")
+            beside = zip(real.parents, written.parents, strict=False)
+            named = next((link / path.relative_to(above) for above, link in beside if path.is_relative_to(above)), path)
+            if named.resolve() == path:
+                return named
+        return path
 
     def position(self, text: str, position: types.Position) -> tuple[int, int]:
         """Return the line and character, counted from 0."""
