@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.manifest.documents import KINDS
 from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.tools.lsp.completion import complete
 from rbxcompose.tools.lsp.document import Document
@@ -123,3 +124,21 @@ def test_a_file_of_a_world_gets_its_own_keys(text: str, labels: set[str], tmp_pa
     found = complete(Document(tmp_path / "w.yaml", whole), whole.count("\n"), len(whole.rpartition("\n")[2]))
     assert labels <= {item.label for item in found}
     assert "components" not in {item.label for item in found}
+
+
+@pytest.mark.parametrize(
+    ("file", "kind", "key"),
+    [
+        ("missions/tour.yaml", "Mission", "do"),
+        ("missions/tests/tour.test.yaml", "Test", "expect"),
+        ("parts/arm.yaml", "Part", "components"),
+        ("robots/one/robot.yaml", "Robot", "components"),
+        ("systems/two.yaml", "System", "hosts"),
+    ],
+)
+def test_a_file_without_its_kind_gets_those_of_its_folder_first(file: str, kind: str, key: str, tmp_path: Path) -> None:
+    path = tmp_path / file
+    assert key in {item.label for item in complete(Document(path, "rbx: 1\n"), 1, 0)}
+    kinds = [item.label for item in complete(Document(path, "rbx: 1\nkind: "), 1, 6)]
+    assert kinds[0] == kind
+    assert sorted(kinds) == sorted(KINDS)

@@ -10,6 +10,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.units import NUMBER_TEXT, Dimension, units_of
 from rbxcompose.compiler.schema.guide import Guide, GuidedValue
 from rbxcompose.compiler.schema.scalars import Schema
+from rbxcompose.manifest.documents import KINDS
 from rbxcompose.missions.language.keys import anywhere
 from rbxcompose.tools.lsp.answers import fills, variables
 from rbxcompose.tools.lsp.document import Document, Spot
@@ -116,7 +117,8 @@ def _of_value(spot: Spot, path: tuple[str | int, ...]) -> Iterator[CompletionIte
         yield CompletionItem(name, "name", name, replaces, about)
     if spot.document.is_mission and not kind and _is_expression(value):
         yield from (CompletionItem(name, "name", name, replaces, about) for name, about in spot.known.of(PLACE).items())
-    for word, about in value.words.items():
+    kinds = dict.fromkeys((spot.document.usual_kind, *KINDS), "") if path == ("kind",) else {}
+    for word, about in (kinds or value.words).items():
         yield CompletionItem(word, "word", word, replaces, "", about)
     if not before:
         yield from (CompletionItem(sample, "word", sample, 0, "example") for sample in value.examples)

@@ -16,6 +16,7 @@ from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.schema.documents import makers, schema_for
 from rbxcompose.compiler.schema.guide import Guide
+from rbxcompose.manifest.section import PART, ROBOT, SYSTEM, TEST
 from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
 from rbxcompose.manifest.yaml_nodes import compose
 from rbxcompose.tools.lsp.names import KnownNames
@@ -32,7 +33,7 @@ _BEGINS_NODE = re.compile(r"(\s|- )*[^\s:]*")
 _COMMENT = re.compile(r"(^|\s)#")
 _COLON = re.compile(r"['\"]?\s*:(\s|$)")
 _BRACKETS = {"[": "]", "{": "}"}
-DEFAULT_KIND = "Robot"  # unless the text names another
+_FOLDERS = {"robots": ROBOT, "missions": MISSION, "parts": PART, "systems": SYSTEM, "worlds": "World"}
 
 
 def quick_tree(text: str) -> TreeNode | None:
@@ -268,9 +269,16 @@ class Document:
 
     @property
     def kind(self) -> str:
-        """Return the kind of manifest, if it has a schema; an unknown one is treated as a robot."""
+        """Return the kind of manifest, if it has a schema; else that which belongs into its folder."""
         written = kind_of(self.text)
-        return written if written in makers() else DEFAULT_KIND
+        return written if written in makers() else self.usual_kind
+
+    @property
+    def usual_kind(self) -> str:
+        """Return the kind that a file of this name in this folder usually has."""
+        if self.path.stem.endswith(".test"):
+            return TEST
+        return next((_FOLDERS[above.name] for above in self.path.parents if above.name in _FOLDERS), ROBOT)
 
     @property
     def is_mission(self) -> bool:
