@@ -91,7 +91,8 @@ _WHY = {
 _INTEGERS = 1 << 63
 _BODY = "in the place of 'robot_description', write 'body: {xacro: FILE}'"
 
-_NODE_NAME, _NAMESPACE = re.compile(r"([A-Za-z_]\w*)?", re.ASCII), re.compile(r"(/[A-Za-z_]\w*)*", re.ASCII)
+_NODE_NAME = re.compile(r"([A-Za-z_]\w*)?", re.ASCII)
+_NAMESPACE = re.compile(r"(/[A-Za-z_]\w*)*", re.ASCII)
 
 
 @dataclass(slots=True)
@@ -392,12 +393,13 @@ class Evaluation:
             return
         name = self._text(entity, "name", scope) or ""
         wanted = name or self._text(entity, "exec_name", scope) or PurePath(executable).stem
-        name = self._ros_name(_NODE_NAME, name, entity)
+        name = name if _NODE_NAME.fullmatch(name) else self._no_name(name, entity)
         program = LaunchedProgram(wanted, entity.span, package, executable, name, words=words)
         if ros := self._words(replace(entity, children=()), "ros_args", scope):
             program.words += ["--ros-args", *ros, "--"]
         given = self._text(entity, "namespace", scope) or ""
-        program.namespace = self._ros_name(_NAMESPACE, _namespace(scope.namespace, given), entity)
+        namespace = _namespace(scope.namespace, given)
+        program.namespace = namespace if _NAMESPACE.fullmatch(namespace) else self._no_name(namespace, entity)
         if "cwd" in entity.attributes:
             self._leave(entity.attributes["cwd"].span, "'cwd' of 'node'", "a node runs in the folder of the robot")
         program.remaps = dict(scope.remaps)
@@ -407,10 +409,8 @@ class Evaluation:
         self._common(program, entity, scope)
         self._report_rest_of(program, entity, scope)
 
-    def _ros_name(self, pattern: re.Pattern[str], name: str, entity: LaunchEntity) -> str:
-        """Return a name, or nothing after a finding if no node can have it."""
-        if pattern.fullmatch(name):
-            return name
+    def _no_name(self, name: str, entity: LaunchEntity) -> str:
+        """Return nothing in place of a name, after the finding that no node can have it."""
         self._leave(entity.span, f"the name '{plain(name, 60)}'", "names in ROS 2 have letters, digits and '_' only")
         return ""
 
