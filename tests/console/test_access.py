@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from rbxcompose.domains.console.access import (
     OF_PARAMETERS,
     Door,
+    OperationTarget,
     Role,
-    Target,
     needed,
     own_secret,
     renew_secret,
@@ -33,27 +33,27 @@ SECRET = bytes(32)
 @pytest.mark.parametrize(
     ("target", "least"),
     [
-        (Target("subscribe", "/odom"), Role.VIEW),
-        (Target("subscribe", "/arm/state"), Role.VIEW),
-        (Target("publish", "/cmd_vel"), Role.OPERATE),
-        (Target("publish", "/arm/goal"), Role.CONFIGURE),
-        (Target("publish", "/cmd_vel", others=("/arm/cmd_vel",)), Role.CONFIGURE),
-        (Target("call_service", "/console/stop"), Role.VIEW),
-        (Target("call_service", "/console/release"), Role.OPERATE),
-        (Target("call_service", "/rosapi/topics"), Role.VIEW),
-        (Target("call_service", "/rosapi/topics", type="std_srvs/srv/Trigger"), Role.OPERATE),
-        (Target("call_service", "/rosapi/set_param"), Role.CONFIGURE),
-        (Target("call_service", "/dock", type="std_srvs/srv/Trigger"), Role.OPERATE),
-        (Target("call_service", "/get_parameters", type="std_srvs/srv/Trigger"), Role.OPERATE),
-        (Target("call_service", "/arm/home", type="std_srvs/srv/Trigger"), Role.CONFIGURE),
-        (Target("send_action_goal", "/go_to"), Role.OPERATE),
-        (Target("advertise_service", "/x"), Role.CONFIGURE),
-        (Target("auth"), Role.NOBODY),
-        (Target("who knows"), Role.OPERATE),
+        (OperationTarget("subscribe", "/odom"), Role.VIEW),
+        (OperationTarget("subscribe", "/arm/state"), Role.VIEW),
+        (OperationTarget("publish", "/cmd_vel"), Role.OPERATE),
+        (OperationTarget("publish", "/arm/goal"), Role.CONFIGURE),
+        (OperationTarget("publish", "/cmd_vel", others=("/arm/cmd_vel",)), Role.CONFIGURE),
+        (OperationTarget("call_service", "/console/stop"), Role.VIEW),
+        (OperationTarget("call_service", "/console/release"), Role.OPERATE),
+        (OperationTarget("call_service", "/rosapi/topics"), Role.VIEW),
+        (OperationTarget("call_service", "/rosapi/topics", type="std_srvs/srv/Trigger"), Role.OPERATE),
+        (OperationTarget("call_service", "/rosapi/set_param"), Role.CONFIGURE),
+        (OperationTarget("call_service", "/dock", type="std_srvs/srv/Trigger"), Role.OPERATE),
+        (OperationTarget("call_service", "/get_parameters", type="std_srvs/srv/Trigger"), Role.OPERATE),
+        (OperationTarget("call_service", "/arm/home", type="std_srvs/srv/Trigger"), Role.CONFIGURE),
+        (OperationTarget("send_action_goal", "/go_to"), Role.OPERATE),
+        (OperationTarget("advertise_service", "/x"), Role.CONFIGURE),
+        (OperationTarget("auth"), Role.NOBODY),
+        (OperationTarget("who knows"), Role.OPERATE),
     ],
     ids=str,
 )
-def test_each_operation_and_name_has_its_least_role(target: Target, least: Role) -> None:
+def test_each_operation_and_name_has_its_least_role(target: OperationTarget, least: Role) -> None:
     assert needed(target, {"/arm/*": Role.CONFIGURE}) is least
 
 

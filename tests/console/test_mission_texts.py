@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.domains.console.access import Role, Target, needed
+from rbxcompose.domains.console.access import OperationTarget, Role, needed
 from rbxcompose.domains.console.editor_process import MOST_WAITING, EditorProcess
 from rbxcompose.domains.console.protocol import MISSION_TEXTS, ROBOT_TEXTS, EditMission
 from rbxcompose.tools.mission_editor.editor import REQUESTS
@@ -37,7 +37,7 @@ def test_a_request_about_a_text_is_passed_on_and_its_answer_comes_back() -> None
 
 def test_the_gateway_passes_on_all_that_the_editor_answers_each_with_a_role_of_its_own() -> None:
     assert set(MISSION_TEXTS) == set(REQUESTS)
-    roles = {name: needed(Target("call_service", f"/console/mission/{name}"), {}) for name in REQUESTS}
+    roles = {name: needed(OperationTarget("call_service", f"/console/mission/{name}"), {}) for name in REQUESTS}
     assert {name for name, role in roles.items() if role is Role.CONFIGURE} == {"new", "save", "test_new"}
     assert {name for name, role in roles.items() if role is Role.OPERATE} == {"test", "try"}
 

@@ -113,7 +113,6 @@ def test_a_state_is_renamed_wherever_its_machine_names_it() -> None:
         "do:\n  sequence:\n    go_to: dock\n    timeout: 5 s\n",
         "do:\n  sequence: {go_to: dock, say: hello}\n",
         "do:\n  sequence:\n    go_to:\n      place: dock\n",
-        "do:\n  - recharge\n  - say hello to\n",
         SLIPS["set in one line"],
         SLIPS["set with two equals signs"],
         SLIPS["a list below a hook"],

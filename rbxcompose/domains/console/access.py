@@ -92,7 +92,7 @@ OF_PARAMETERS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class OperationTarget:
     """An operation and what it is carried out on: all that is asked when it is checked, noted and done."""
 
     op: str
@@ -108,7 +108,7 @@ class Target:
     """Of a topic that actions have in ROS 1: the name that it gives the action, the action, and which topic it is."""
 
 
-def needed(target: Target, guarded: Mapping[str, Role]) -> Role:
+def needed(target: OperationTarget, guarded: Mapping[str, Role]) -> Role:
     """Return the least role that may have an operation of rosbridge carried out.
 
     Args:

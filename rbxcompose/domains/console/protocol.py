@@ -19,7 +19,7 @@ from typing import Any
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.console import old_actions, rosapi
-from rbxcompose.domains.console.access import Role, Target, needed
+from rbxcompose.domains.console.access import OperationTarget, Role, needed
 from rbxcompose.domains.console.encodings import (
     COMPRESSIONS,
     SMALLEST_PIECE,
@@ -769,13 +769,13 @@ class Bridge:
         if op not in _OPERATIONS:
             raise BadFrameError(f"there is no operation '{_short(op)}'")
         operation, key = _OPERATIONS[op]
-        target = self._target(op, key, data.get(key)) if key else Target(op)
+        target = self._target(op, key, data.get(key)) if key else OperationTarget(op)
         if op in _ANSWERED:
             operation(self, client, data, target)
         else:
             self._permitted(client, target, partial(operation, self, client, data, target))
 
-    def _target(self, op: str, key: str, name: object) -> Target:
+    def _target(self, op: str, key: str, name: object) -> OperationTarget:
         """Return what an operation is carried out on that names a topic, a service or an action.
 
         Raises:
@@ -791,9 +791,9 @@ class Bridge:
             done = full if op in _LISTENS else self._commanded(full)
             if (old := self._old_parts(done)) is not None:
                 whole = old[1]
-        return Target(op, done, name, (full, whole), old=old)
+        return OperationTarget(op, done, name, (full, whole), old=old)
 
-    def _service_target(self, op: str, service: str, written: str = "") -> Target:
+    def _service_target(self, op: str, service: str, written: str = "") -> OperationTarget:
         actions, whole = self._graph.actions(), _whole(service)
         type_ = "" if service in _OWN or service in _ROSAPI else self._graph.services().get(service, "")
         if service == f"{whole}{_CANCELS}" and whole in actions:
@@ -802,9 +802,9 @@ class Bridge:
             whole = paused
         elif service == _DRIVES and self._drive is not None:
             whole = self._drive.topic
-        return Target(op, service, written, (whole,), type_)
+        return OperationTarget(op, service, written, (whole,), type_)
 
-    def _require(self, client: _Client, target: Target) -> Role:
+    def _require(self, client: _Client, target: OperationTarget) -> Role:
         """Refuse what a client's role may not; return the role that is needed.
 
         Raises:
@@ -815,7 +815,7 @@ class Bridge:
             raise BadFrameError(f"this needs the role '{least.word}'; yours is '{client.role.word}'")
         return least
 
-    def _permitted(self, client: _Client, target: Target, do: Callable[[], None]) -> None:
+    def _permitted(self, client: _Client, target: OperationTarget, do: Callable[[], None]) -> None:
         """Do what a client may, and note it if it changes something."""
         least = self._require(client, target)
         is_known = target.name in client.advertised
@@ -831,21 +831,21 @@ class Bridge:
         """Note what a request changes once that is done, also if its client is gone by then."""
         self._promised[number] = f"{client.who} ({client.role.word}): {text}"
 
-    def _fragment(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _fragment(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         if (frame := client.pieces.add(data)) is not None:
             self._carry_out(client, _within(frame))
 
-    def _png(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _png(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         self._carry_out(client, _within(from_png(data.get("data"), LARGEST)))
 
-    def _auth(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _auth(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         """Give a client the role of its token, which is the `mac` of rosbridge's `auth`."""
         role = self._admit(token) if isinstance(token := data.get("mac"), str) else Role.NOBODY
         if role is Role.NOBODY:
             raise BadFrameError("'mac' is no token of this robot")
         client.role = max(client.role, role)
 
-    def _subscribe(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _subscribe(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         name, topic = target.written, target.name
         if (compression := data.get("compression") or "none") not in COMPRESSIONS:
             raise BadFrameError(f"a compression is one of {', '.join(COMPRESSIONS)}, not '{_short(compression)}'")
@@ -879,7 +879,7 @@ class Bridge:
             if stream.offer(last, self._now):
                 self.woken.add(client.number)
 
-    def _unsubscribe(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _unsubscribe(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         name = target.written
         if (stream := client.streams.get(name)) is None:
             raise BadFrameError(f"there is no subscription to '{name}'")
@@ -893,12 +893,12 @@ class Bridge:
         else:
             self._end_stream(client, name)
 
-    def _advertise(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _advertise(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         if target.old is None:  # else it is taken here
             message = self._message_on(target.name, data)
             self._declare(client, target.name, message, is_latched=data.get("latch") is True)
 
-    def _unadvertise_op(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _unadvertise_op(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         topic = target.name
         if target.old is not None:
             return
@@ -908,7 +908,7 @@ class Bridge:
             self._halt_if(self.lease.release(client.number))  # while there is a publisher
         self._unadvertise(topic)
 
-    def _publish(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _publish(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         topic = target.name
         if target.old is not None:
             self._publish_old(client, *target.old, data.get("msg"))
@@ -951,7 +951,7 @@ class Bridge:
             self.lease.renew(client.number, self._now)
         return True
 
-    def _call_service(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _call_service(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         if client.open_calls >= MOST_SUBSCRIPTIONS:
             raise BadFrameError(f"at most {MOST_SUBSCRIPTIONS} calls of a client are open")
         self._calls_so_far += 1
@@ -963,7 +963,7 @@ class Bridge:
         except (BadFrameError, WrongMessageError) as error:
             self._respond(number, str(error), is_good=False)
 
-    def _begin_call(self, client: _Client, number: int, data: Mapping[str, Any], target: Target) -> None:
+    def _begin_call(self, client: _Client, number: int, data: Mapping[str, Any], target: OperationTarget) -> None:
         given, values = data.get("args"), None
         if target.name in _OWN:
             values = _OWN[target.name](self, client, _named(given, _DRIVE_ARGUMENTS), number)
@@ -979,7 +979,7 @@ class Bridge:
         if values is not None:
             self._respond(number, values, is_good=True)
 
-    def _call(self, number: int, target: Target, given: object, data: Mapping[str, Any]) -> None:
+    def _call(self, number: int, target: OperationTarget, given: object, data: Mapping[str, Any]) -> None:
         type_ = self._type_of(target.name, target.type, data.get("type"), "service")
         request = from_json(type_.Request, arguments(type_.Request, given), self._stamp)
         timeout = data.get("timeout")
@@ -989,7 +989,7 @@ class Bridge:
 
     # Services of clients
 
-    def _advertise_service(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _advertise_service(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         service, type_ = target.name, data.get("type")
         if not isinstance(type_, str) or not _TYPE.fullmatch(type_):
             raise BadFrameError("'type' is the name of a type of services")
@@ -1004,13 +1004,13 @@ class Bridge:
         self._served[service] = _Served(client.number, target.written, known)
         self._requests.append(Serve(service, known))
 
-    def _unadvertise_service(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _unadvertise_service(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         service = target.name
         if (served := self._served.get(service)) is None or served.client != client.number:
             raise BadFrameError(f"'{service}' is not served by this client")
         self._end_serving(service)
 
-    def _service_response(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _service_response(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         """Pass on what a client answers to a request."""
         service = target.name
         served = self._served.get(service)
@@ -1031,7 +1031,7 @@ class Bridge:
 
     # Actions of clients
 
-    def _advertise_action(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _advertise_action(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         action, type_ = target.name, data.get("type")
         if not isinstance(type_, str) or not _TYPE.fullmatch(type_):
             raise BadFrameError("'type' is the name of a type of actions")
@@ -1046,7 +1046,7 @@ class Bridge:
         self._served_actions[action] = _ServedAction(client.number, target.written, known)
         self._requests.append(ServeAction(action, known))
 
-    def _unadvertise_action(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _unadvertise_action(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         action = target.name
         if (served := self._served_actions.get(action)) is None or served.client != client.number:
             raise BadFrameError(f"'{action}' is not served by this client")
@@ -1056,12 +1056,12 @@ class Bridge:
         del self._served_actions[action]
         self._requests.append(UnserveAction(action))  # its goal is lost, and its sender learns that
 
-    def _action_feedback(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _action_feedback(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         served, number = self._carried_out(client, data, target.name)
         feedback = from_json(served.type.Feedback, data.get("values") or {}, self._stamp)
         self._requests.append(GoalFeedback(number, feedback))
 
-    def _action_result(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _action_result(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         """Take how a goal ended: by its `status`, or else by whether there is a `result`."""
         served, number = self._carried_out(client, data, target.name)
         by_default = _STATUSES[Outcome.ABORTED if data.get("result") is False else Outcome.SUCCEEDED]
@@ -1182,7 +1182,7 @@ class Bridge:
 
     # Actions
 
-    def _send_goal(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _send_goal(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         goal = _Goal(client.number, data.get("id"), target.written, target.name, is_old=False)
         begin = partial(self._begin_goal, client, goal, data.get("args"), data.get("action_type"))
         try:
@@ -1219,7 +1219,7 @@ class Bridge:
         except KeyError as error:
             raise BadFrameError(f"the type '{known}' of '{name}' is not known here") from error
 
-    def _cancel_goal(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _cancel_goal(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         """Cancel goals of the client to an action, by their id."""
         wanted = client.number, data.get("id"), target.name
         numbers = [number for number, goal in self._goals.items() if (goal.client, goal.id, goal.action) == wanted]
@@ -1273,12 +1273,12 @@ class Bridge:
         text = json.dumps(_finite(message), separators=(",", ":"))
         self._pass_on(f"{name}/{part}", _Shared(None, text), self._now)
 
-    def _set_level(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _set_level(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         if (level := data.get("level")) not in LEVELS:
             raise BadFrameError(f"a level is one of {', '.join(LEVELS)}")
         client.level = LEVELS.index(level)
 
-    def _take_status(self, client: _Client, data: Mapping[str, Any], target: Target) -> None:
+    def _take_status(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         """Ignore what a client reports: nobody here reads it."""
 
     # Services of the gateway
@@ -1474,7 +1474,7 @@ class Bridge:
         return requests
 
 
-_OPERATIONS: Mapping[str, tuple[Callable[[Bridge, _Client, Mapping[str, Any], Target], None], str]] = {
+_OPERATIONS: Mapping[str, tuple[Callable[[Bridge, _Client, Mapping[str, Any], OperationTarget], None], str]] = {
     "advertise": (Bridge._advertise, "topic"),
     "fragment": (Bridge._fragment, ""),
     "png": (Bridge._png, ""),

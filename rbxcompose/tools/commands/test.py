@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
         return misused("test", f"no tests ('kind: Test') in {plain(', '.join(map(str, arguments.paths)))}")
     if arguments.junit:
         try:
-            arguments.junit.open("a").close()  # now, and not after all tests have run
+            arguments.junit.write_text("")  # now, and not after all tests have run
         except OSError as error:
             return misused("test", f"'{plain(str(arguments.junit))}' cannot be written: {error.strerror}")
     reading = TrialReader(os.environ, unsaved_of(arguments))
