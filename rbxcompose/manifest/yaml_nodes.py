@@ -117,8 +117,10 @@ def _missing_colon(trouble: slip_registry.Trouble) -> Finding:
 
 
 def _no_content(trouble: slip_registry.Trouble) -> Finding:
-    character = trouble.line_text[trouble.column : trouble.column + 1]
-    return slip_registry.NOT_YAML.at(trouble.here, f"a value is missing before this '{plain(character)}'")
+    if character := trouble.line_text[trouble.column : trouble.column + 1]:
+        return slip_registry.NOT_YAML.at(trouble.here, f"a value is missing before this '{plain(character)}'")
+    help_text = "close what '[' and '{' have opened"
+    return slip_registry.NOT_YAML.at(trouble.here, "a value is missing at the end of the file", help=help_text)
 
 
 def _anchor_twice(trouble: slip_registry.Trouble) -> Finding:

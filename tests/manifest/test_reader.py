@@ -116,6 +116,7 @@ TRAPS = [
     ("a:\n  - b\n c", "RBX1102", (3, 2), "this line does not fit the lines above it"),
     ("{a: 1}}", "RBX1102", (1, 7), "there is extra text here"),
     ("a: ]", "RBX1102", (1, 4), "a value is missing before this ']'"),
+    ("a: {b: {", "RBX1102", (2, 1), "a value is missing at the end of the file"),
     ('a: "\\q"', "RBX1102", (1, 5), "a backslash in double quotes starts an escape"),
     ("a: &x 1\nb: &x 2", "RBX1102", (2, 4), "two anchors ('&') have the same name"),
     ("# only a comment", "RBX1102", (1, 1), "this file is empty"),
