@@ -51,7 +51,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/servos": Cost(code=7958, files=52, small=2, imports=590),
     "domains/vision": Cost(code=2603, files=31, small=1, imports=354),
     "domains/worlds": Cost(code=4663, files=41, small=3, imports=568),
-    "manifest": Cost(code=3530, files=26, small=1, imports=278),
+    "manifest": Cost(code=3532, files=26, small=1, imports=278),
     "missions": Cost(code=12425, files=135, small=19, imports=1321),
     "msgs": Cost(code=1573, files=16, small=3, imports=107),
     "runtime": Cost(code=7696, files=46, small=1, imports=714),
@@ -62,7 +62,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 115435,
+    "lines of code": 115437,
     "files": 948,
     "files of 1 to 30 lines of code": 75,
     "lines of imports": 11328,
