@@ -358,7 +358,7 @@ def test_what_is_no_window_is_refused(path: str) -> None:
         (f'{{"op": "service_response", "service": "/x", "id": "{"1" * 5000}"}}', "no open request"),
         ('{"op": "set_level", "level": "loud"}', "a level"),
         (f'{{"op": "set_level", "level": {"[" * 101}{"]" * 101}}}', "nested"),
-        ('{"op":' * 10_000, "nested"),
+        ('{"op":' * 10_000 + "1" + "}" * 10_000, "nested"),
         ('{"op": "publish", "msg": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested"),
         (" " * (LARGEST + 1), "at most 8 MiB"),
     ],

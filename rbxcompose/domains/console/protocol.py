@@ -75,6 +75,7 @@ _NODE_SERVICES: Mapping[type[Service[Any, Any]], str] = {
     SetParameters: "set_parameters",
 }
 _CANCELS = "/_action/cancel_goal"  # the end of the name of the service that cancels goals of an action
+_NESTS = (dict, list)
 _TOO_DEEP = f"lists and maps are nested more than {DEEPEST} deep"
 _SHOWN = 60  # characters of what a client sent, in a status
 
@@ -1585,7 +1586,7 @@ def _loaded(text: str | bytes) -> Any:
     level: list[Any] = [[found]]
     for _ in range(DEEPEST + 1):
         inner = (value.values() if isinstance(value, dict) else value for value in level)
-        if not (level := [value for values in inner for value in values if isinstance(value, dict | list)]):
+        if not (level := [value for values in inner for value in values if value and isinstance(value, _NESTS)]):
             return found
     raise BadFrameError(_TOO_DEEP)
 
