@@ -23,7 +23,7 @@ from rbxcompose.manifest import tree
 from rbxcompose.manifest.arguments import given_span, show
 from rbxcompose.manifest.foreign_words import PATTERN, Cure, cure_of, cure_of_variable
 from rbxcompose.manifest.scalars import describe
-from rbxcompose.manifest.secrets import NoSecretError, Secrets
+from rbxcompose.manifest.secrets import VARIABLE, NoSecretError, Secrets
 from rbxcompose.manifest.tree import ALL_BYTES, BROKEN, Entry, ScalarNode, SequenceNode, TreeNode, part_span, size
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
@@ -332,6 +332,9 @@ class _Filler:
 
     def variable(self, scalar: ScalarNode, piece: re.Match[str], variable: re.Match[str]) -> object:
         name, mode, rest = variable["name"], variable["mode"], variable["rest"]
+        if name.startswith(VARIABLE):
+            own = f"${{secret.{plain(name.removeprefix(VARIABLE).lower(), 60)}}}"
+            return self.shown_secret(scalar, piece, f"this variable holds a secret, which is named '{own}'")
         value = self.names.environment.get(name)
         if value or (value is not None and not mode):
             return _FromEnvironment(value)

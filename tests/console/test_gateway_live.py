@@ -19,7 +19,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Awaitable, Callable, Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
@@ -32,6 +32,7 @@ from playwright.sync_api import expect
 from websockets.asyncio.client import ClientConnection, connect
 
 from rbxcompose.commands.guest import Guest
+from rbxcompose.domains.console.components.gateway import MOST_CONNECTIONS
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.sdk.ports import Qos
 from tests.cli.live_robot import PATIENCE, Robot
@@ -526,6 +527,22 @@ def test_a_slow_reader_delays_nobody(robot: Robot) -> None:
 async def floods(browser: Browser) -> None:
     await browser.socket.send(" " * (20 * 1024 * 1024))
     await browser.next("status")
+
+
+def test_connections_that_ask_nothing_take_no_more_than_their_share(robot: Robot) -> None:
+    async def looks(browser: Browser) -> None:
+        with ExitStack() as held:
+            for _ in range(MOST_CONNECTIONS + 50):
+                held.enter_context(socket.create_connection(("127.0.0.1", PORT), PATIENCE)).sendall(
+                    b"GET / HTTP/1.1\r\n"
+                )
+            assert (await browser.calls("/rosapi/get_time"))["time"]
+            with socket.create_connection(("127.0.0.1", PORT), PATIENCE) as late, suppress(ConnectionError):
+                late.sendall(b"GET /config HTTP/1.1\r\nHost: " + HOST.encode() + b"\r\n")
+                assert late.recv(1) == b""  # it is one too many
+
+    browse(looks)
+    assert get("/")[0] == 200
 
 
 def test_bad_frames_close_at_most_their_own_connection(robot: Robot) -> None:

@@ -26,7 +26,7 @@ bus: {port: 7895}
 UP = 60  # [s]
 
 VISIT = """
-import asyncio, json, sys, urllib.error, urllib.request
+import asyncio, json, sys, time, urllib.error, urllib.request
 from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
 robot, tokens = sys.argv[1], json.loads(sys.argv[2])
@@ -69,9 +69,11 @@ async def talk(*frames, **options):
             if frame["op"] == "status":
                 statuses.append(frame["msg"])
 
-async def closed(**options):
+async def closed(frame="", **options):
     try:
         async with connect(f"ws://{place}/rosbridge", **options) as socket:
+            if frame:
+                await socket.send(frame)
             await socket.wait_closed()
             return socket.close_code
     except InvalidStatus as refused:
@@ -82,6 +84,9 @@ found["stranger"] = asyncio.run(talk(drives))
 found["viewer"] = asyncio.run(talk({"op": "auth", "mac": tokens["view"]}, drives))
 found["operator"] = asyncio.run(talk(drives, additional_headers={"Cookie": cookie.partition(";")[0]}))
 found["foreign"] = asyncio.run(closed(origin="http://evil.example"))
+began = time.monotonic()
+found["long frame"] = asyncio.run(closed(json.dumps({"op": "auth", "mac": "x" * 5000})))
+found["waits"] = time.monotonic() - began > 4  # as long as somebody who says nothing
 found["shy"] = asyncio.run(closed())
 print(json.dumps(found))
 """
@@ -134,6 +139,8 @@ def test_only_who_has_a_token_gets_in_and_each_does_what_its_role_may(hosts: Hos
         "viewer": ["this needs the role 'operate'; yours is 'view'", True],
         "operator": [True],
         "foreign": 403,
+        "long frame": 1008,
+        "waits": False,
         "shy": 1008,
     }
     assert f"{LAPTOP} (operate): publish /cmd_vel" in log

@@ -113,6 +113,7 @@ TEXT_ARGUMENT = 'args: {t: {type: text, default: "${secret.token}"}}\n'
 WRONG = [
     ('about: "speaks with ${secret.token}"\n', "RBX1208"),
     ("about: ${secret.token}\n", "RBX1208"),
+    ("about: ${env.RBX_SECRET_TOKEN}\n", "RBX1208"),
     ('components:\n  cloud: {type: cloud, token: "x${secret.token}"}\n', "RBX1208"),
     ("components:\n  cloud: {type: cloud, token: abc}\n", "RBX1004"),
     (ROBOT.replace("}\n", ', name: "${secret.token}"}\n'), "RBX1003"),

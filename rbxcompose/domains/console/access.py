@@ -45,8 +45,8 @@ _ROLES = {
     "unsubscribe": Role.VIEW,
     "set_level": Role.VIEW,
     "status": Role.VIEW,
-    "fragment": Role.NOBODY,  # what is within is judged by itself
-    "png": Role.NOBODY,
+    "fragment": Role.VIEW,  # what is within is judged by itself
+    "png": Role.VIEW,
     "auth": Role.NOBODY,
     "advertise_service": Role.CONFIGURE,  # others would believe its answers
     "advertise_action": Role.CONFIGURE,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 import traceback
 from collections.abc import Mapping
@@ -28,33 +29,57 @@ from rbxcompose.tools.mission_editor.editor import Compile, MissionEditor
 from rbxcompose.tools.robot_editor.editor import PREFIX, RobotEditor
 from rbxcompose.tools.robot_editor.live_robot import LIVE_REQUESTS, LiveRobot
 
+_NAMED = re.compile(r"\benv\.(\w+)")
+_OF_PROGRAMS = re.compile(
+    r"PATH|HOME|USER|LOGNAME|SHELL|LANG\w*|LC_\w+|TZ|TERM|TMPDIR"
+    r"|(XDG|PYTHON|VIRTUAL|LD|NUMBA|OMP|RBX|AMENT|ROS|RMW|ZENOH|MUJOCO)_?\w*"
+)
 _NOT_UP = {"answer": None, "refused": "the robot is not up any more"}
 
 
-def compile_with(file: str, layers: ChosenLayers) -> tuple[Compile, Compile, tuple[str, ...]]:
+class Variables:
+    """The environment of `up`, of which the texts that visitors send get only what files on disk name."""
+
+    def __init__(self) -> None:
+        self.all = dict(os.environ)
+
+    def restrict(self, sources: Mapping[str, str]) -> None:
+        """Leave to this process, and to those that it starts, what programs need and what these files name."""
+        named = {name for text in sources.values() for name in _NAMED.findall(text)}
+        kept = {name for name in self.all if name in named or _OF_PROGRAMS.fullmatch(name)}
+        for name in os.environ.keys() - kept:
+            del os.environ[name]
+        os.environ.update({name: self.all[name] for name in kept})
+
+
+def compile_with(
+    file: str, layers: ChosenLayers, variables: Variables | None = None
+) -> tuple[Compile, Compile, tuple[str, ...]]:
     """Return what compiles a robot as it runs, what does so without real devices, and who shares its manifest.
 
-    Its system is read once.
+    Its system is read once. What is on disk has all `variables`, what is not saved those that it may have.
     """
+    whole: Mapping[str, str] = os.environ if variables is None else variables.all
     outside, others = NOTHING, tuple[str, ...]()
     if layers.system:
-        system = compile_system(
-            layers.system, environment=os.environ, real=layers.real, profiles=layers.system_profiles
-        )
+        system = compile_system(layers.system, environment=whole, real=layers.real, profiles=layers.system_profiles)
         outside = system.robots[layers.member].robot.outside if layers.member in system.robots else NOTHING
         others = _sharing(Path(file).resolve(), layers.member, system)
 
     def compiled(unsaved: Mapping[Path, str], *, real: bool = layers.real) -> Compilation:
-        return compile_robot(
+        made = compile_robot(
             file,
             profiles=layers.profiles,
             overlays=layers.overlays,
             sets=layers.sets,
             real=real,
-            environment=os.environ,
+            environment=os.environ if unsaved else whole,
             unsaved=unsaved,
             outside=outside,
         )
+        if variables is not None and not unsaved:
+            variables.restrict(made.sources)
+        return made
 
     return compiled, partial(compiled, real=False), others
 
@@ -98,6 +123,8 @@ def answer_line(editor: MissionEditor | RobotEditors, line: str) -> dict[str, An
 def main(robot: str) -> int:
     """Answer requests until there are no more; `apply` may have brought other layers in between."""
     editor, state, answers = None, None, sys.stdout
+    variables = Variables()
+    variables.restrict({})
     sys.stdout = sys.stderr  # whatever a component prints in a dry run is no answer
     for line in sys.stdin:
         try:
@@ -106,7 +133,7 @@ def main(robot: str) -> int:
         except NotDoneError:
             newest = None
         if newest is not None and (state is None or (newest.file, newest.layers) != (state.file, state.layers)):
-            compiled, simulated, others = compile_with(newest.file, newest.layers)
+            compiled, simulated, others = compile_with(newest.file, newest.layers, variables)
             file = Path(newest.file)
             missions = MissionEditor(compiled, file, simulated)
             live = LiveRobot(folder, compiled, newest.layers)

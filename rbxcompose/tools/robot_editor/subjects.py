@@ -257,8 +257,8 @@ def colour_text(value: Any) -> str:
     """Return a colour as it is written.
 
     Raises:
-        Refused: if it is too long for one.
+        Refused: if it is none: it is too long, or would be filled in.
     """
-    if not isinstance(value, str) or len(value) > _LONGEST or not value.isprintable():
+    if not isinstance(value, str) or len(value) > _LONGEST or not value.isprintable() or "$" in value:
         raise Refused("'colour' is a word, or '#' with digits")
     return value if value.isalpha() and value not in ("true", "false", "null") else json.dumps(value)

@@ -21,7 +21,7 @@ from collections.abc import (
     MutableMapping,
     Sequence,
 )
-from concurrent.futures import Future
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import suppress
 from functools import cached_property, partial
 from pathlib import Path
@@ -97,6 +97,7 @@ if TYPE_CHECKING:
 
 STATIC = Path(__file__).parents[1] / "static"  # the built page
 MOST_CLIENTS = 64
+MOST_CONNECTIONS = 256  # at once: descriptors for all else, such as a stop, are left
 MOST_STRANGERS = 8  # clients that have not said yet who they are
 PACKAGES = ("PIL", "cbor2", "segno", "starlette", "uvicorn", "websockets")
 SOCKETS = ("/", "/rosbridge")  # where WebSockets are taken
@@ -108,7 +109,9 @@ _PING = 5.0  # [s] until a client that does not read counts as gone
 _FAREWELL = 1  # [s] for clients to let go
 _GOODBYE = 3.0  # [s] to wait for the thread to end
 _STOPPED = 1.0  # [s] for all processes to answer to a stop over the bus
-_SHY = 5.0  # [s] for a client to say who it is
+_SHY = 5.0  # [s] for a client to say who it is, or what it wants
+_AT_ONCE = 4  # requests that the robot is asked: it answers one after the other
+_REFUSALS = 10.0  # [s] between two notes of refused tokens
 _SAVING = 30.0  # [s] for a save
 _TRYING = 90.0  # [s] for a dry run, and for the tests of a mission
 _LONG = ("test", "try", "robot/")
@@ -476,6 +479,10 @@ class GatewaySession:
         self._goals: dict[int, SentGoal] = {}  # that have not ended
         self._wakes: dict[int, asyncio.Event] = {}  # by client
         self._unknown: set[int] = set()  # clients that did not say in time who they are
+        self._refused, self._refusals_due = (
+            0,
+            -math.inf,
+        )  # wrong tokens since the last note of one, and when [s] the next
         self._loop = asyncio.get_running_loop()
         self._pump_timer: asyncio.TimerHandle | None = None
         self._lease_timer: asyncio.TimerHandle | None = None
@@ -485,6 +492,8 @@ class GatewaySession:
         self._foxglove: FoxgloveServer | None = None
         self.trouble = ""  # what is not served beside the page
         self._saving = asyncio.Lock()
+        self._asking = asyncio.Semaphore(_AT_ONCE)
+        self._stopping = ThreadPoolExecutor(1)  # so that a stop waits for nothing else
         self._candidates = CandidateModels()
         self._editor = EditorProcess(folder.path.name)
         self._trier = EditorProcess(folder.path.name, patience=_TRYING)  # so that nobody who types waits for it
@@ -496,6 +505,19 @@ class GatewaySession:
     async def serve(self, listener: socket.socket, stop: asyncio.Event) -> None:
         """Serve until `stop`."""
         import uvicorn
+        from uvicorn.protocols.http.h11_impl import H11Protocol
+
+        class Hurried(H11Protocol):
+            """A connection that is let go if it is one too many, or sends no whole request in time."""
+
+            def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+                super().connection_made(transport)
+                self.loop.call_later(_SHY if len(self.connections) <= MOST_CONNECTIONS else 0.0, self.let_go)
+
+            def let_go(self) -> None:
+                asked: object = self.cycle  # None until there is a request, whatever uvicorn declares
+                if asked is None and self in self.connections:  # else it is a WebSocket now
+                    self.transport.abort()
 
         class Quiet(uvicorn.Server):
             """A server that sleeps until something happens; others wake ten times a second."""
@@ -513,6 +535,7 @@ class GatewaySession:
             log_level="warning",
             access_log=False,
             lifespan="off",
+            http=Hurried,
             ws="websockets-sansio",
             ws_max_size=2 * LARGEST,  # beyond that, the connection is closed
             ws_per_message_deflate=False,  # within a machine it costs more than it saves
@@ -533,6 +556,7 @@ class GatewaySession:
                 timer.cancel()
         for task in self._tasks:
             task.cancel()
+        self._stopping.shutdown(wait=False)
         self._editor.close()
         self._trier.close()
         if self._foxglove is not None:
@@ -566,9 +590,10 @@ class GatewaySession:
                 return JSONResponse({"message": "this is no token"}, 413)
             token = (await request.body()).decode("ascii", "replace").strip()
             role = self._role_of(token)
-            self._note(f"{_address(request)}: {'logs in to ' + role.word if role else 'is refused: a wrong token'}")
             if role is Role.NOBODY:
+                self._note_refusal(_address(request))
                 return JSONResponse({"message": "the token is wrong, or was renewed"}, 401)
+            self._note(f"{_address(request)}: logs in to {role.word}")
             answer = JSONResponse({"role": role.word})
             answer.set_cookie(self._cookie, token, _COOKIE_AGE, httponly=True, samesite="strict")
             return answer
@@ -749,6 +774,9 @@ class GatewaySession:
             while (message := await web_socket.receive())["type"] == "websocket.receive":
                 text = message.get("text")
                 frame = text if text is not None else message.get("bytes") or b""
+                if self._bridge.role(number) is Role.NOBODY and len(frame) > _LONGEST_LOGIN:
+                    self._turn_away(number)  # it may say who it is, and nothing that takes time to read
+                    continue
                 self._do(self._bridge.receive(number, frame, self._now, self._stamp))
         finally:
             shy.cancel()
@@ -760,8 +788,19 @@ class GatewaySession:
     def _ask_who(self, number: int) -> None:
         """Let a client go that has no role after a while."""
         if self._bridge.role(number) is Role.NOBODY:
-            self._unknown.add(number)
-            self._wakes[number].set()
+            self._turn_away(number)
+
+    def _note_refusal(self, address: str) -> None:
+        """Note that a token is wrong, but not each of thousands: they would wash out the log of who did what."""
+        self._refused += 1
+        if self._now >= self._refusals_due:
+            again = f", and {self._refused - 1} more before" if self._refused > 1 else ""
+            self._note(f"{address}: is refused: a wrong token{again}")
+            self._refused, self._refusals_due = 0, self._now + _REFUSALS
+
+    def _turn_away(self, number: int) -> None:
+        self._unknown.add(number)
+        self._wakes[number].set()
 
     async def _send(self, web_socket: WebSocket, number: int) -> None:
         """Send a client what is due for it; one that reads slowly holds up only itself."""
@@ -1028,9 +1067,14 @@ class GatewaySession:
 
     async def _ask_robot(self, request: AskRobot) -> None:
         """Send a request as the command line does; a stop also reaches a robot whose supervisor is slow."""
-        answer, refusal = await self._asked(request.request, request.role, request.who)
+        if request.request is not STOP:
+            answer, refusal = await self._asked(request.request, request.role, request.who)
+        else:
+            self._note(f"{request.who}: asks {STOP['type']}")
+            answer, refusal = await self._answer(STOP, self._stopping)
         if refusal and request.request is STOP:
-            stopped = await asyncio.to_thread(self._guest.ask, stop_key(self._folder.path.name), _STOPPED)
+            ask = partial(self._guest.ask, stop_key(self._folder.path.name), _STOPPED)
+            stopped = await self._loop.run_in_executor(self._stopping, ask)
             if names := ", ".join(sorted(name.decode() for name in stopped)):
                 answer, refusal = f"the supervisor does not answer: stopped over the bus: {names}", ""
         self._bridge.robot_answered(request.number, answer, refusal)
@@ -1084,11 +1128,12 @@ class GatewaySession:
             if role < Role.OPERATE:
                 return None, f"'{name}' needs the role '{Role.OPERATE.word}'"
             self._note(f"{who}: asks {name}")
-        return await self._answer(request)
+        async with self._asking:
+            return await self._answer(request)
 
-    async def _answer(self, request: Mapping[str, Any]) -> tuple[Any, str]:
+    async def _answer(self, request: Mapping[str, Any], executor: Executor | None = None) -> tuple[Any, str]:
         try:
-            return await asyncio.to_thread(ask_as_data, self._folder, request), ""
+            return await self._loop.run_in_executor(executor, ask_as_data, self._folder, request), ""
         except (Refused, NoAnswerError) as error:
             return None, str(error) or "the supervisor does not answer"
 
