@@ -365,7 +365,7 @@ def test_a_number_is_set_in_the_type_that_the_parameter_has() -> None:
         (10**400, "no parameter can have this value"),
         ("1" + "0" * 5000, ""),  # a text
         ("[" * 100_000, "nested"),
-        ("[" * 101 + "]" * 101, "nested"),
+        ("[" * 102 + "]" * 102, "nested"),
         ([[[1]]], "no parameter can have this value"),
         ({"a": 1}, "no parameter can have this value"),
         ("\ud800", "surrogates"),
