@@ -347,7 +347,7 @@ def in_folder(value: object, info: pydantic.ValidationInfo) -> object:
     return os.path.normpath(os.path.join(str(there), value)) if there and isinstance(value, str) and value else value
 
 
-def bring(path: str, info: pydantic.ValidationInfo) -> str:
+def bundle_path(path: str, info: pydantic.ValidationInfo) -> str:
     """Let a file, or all that is in a folder, travel to other hosts with the manifest; return the path.
 
     What is not there, or not in the project, is expected on the host.
@@ -359,7 +359,7 @@ def bring(path: str, info: pydantic.ValidationInfo) -> str:
 
 LocalPath = Annotated[str, pydantic.BeforeValidator(in_folder)]
 """A field that names a file or a folder, relative to that of the manifest's file; it holds the whole path."""
-LocalFiles = Annotated[LocalPath, pydantic.AfterValidator(bring)]
+LocalFiles = Annotated[LocalPath, pydantic.AfterValidator(bundle_path)]
 """The same, for a file that travels to other hosts with the manifest, or a folder with all that is in it."""
 PlaceName = Annotated[Place, Refers(PLACE)]
 """A field that names one of the robot's `places` and holds the place itself."""

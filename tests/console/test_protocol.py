@@ -723,8 +723,9 @@ def test_a_token_of_the_operation_auth_gives_a_role_and_never_takes_one() -> Non
     assert client.does("publish", topic="/level", msg={"data": 1}) == []
     assert client.does("auth", mac="v") == []
     assert room.bridge.role(client.number) is Role.OPERATE
-    (status,) = Room().client(Role.NOBODY).does("auth", mac="x")
+    (status,) = (other := Room()).client(Role.NOBODY).does("auth", mac="x")
     assert status["msg"] == "'mac' is no token of this robot"
+    assert len(other.bridge.refused) == 1  # for the log
 
 
 def test_the_log_says_once_who_does_what() -> None:

@@ -253,7 +253,7 @@ def test_what_is_driven_to_and_fro_is_no_progress(tmp_path: Path) -> None:
 
     def attempts_at(*distances: float) -> int:
         for navigator.follower.left in distances:
-            navigator.get_on(path)
+            navigator.track_progress(path)
         return navigator.attempts
 
     assert attempts_at(4.0, 3.0) == 0

@@ -40,7 +40,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/arms": Cost(code=13084, files=77, small=2, imports=1201),
     "domains/bases": Cost(code=2107, files=19, small=0, imports=193),
     "domains/body": Cost(code=3560, files=28, small=2, imports=369),
-    "domains/console": Cost(code=3525, files=22, small=2, imports=298),
+    "domains/console": Cost(code=3533, files=22, small=2, imports=298),
     "domains/devices": Cost(code=1966, files=23, small=0, imports=211),
     "domains/diagnostics": Cost(code=2354, files=24, small=4, imports=214),
     "domains/muxes": Cost(code=2044, files=14, small=1, imports=117),
@@ -62,7 +62,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 115500,
+    "lines of code": 115508,
     "files": 948,
     "files of 1 to 30 lines of code": 75,
     "lines of imports": 11330,

@@ -526,6 +526,8 @@ class Bridge:
         """Clients for which something new waits; who sends takes them out."""
         self.notes: deque[str] = deque(maxlen=MOST_FRAMES)
         """Who did what, for the log; who writes it takes them out."""
+        self.refused: deque[str] = deque(maxlen=MOST_FRAMES)
+        """Who came with a wrong token, likewise."""
         self._graph, self._drive = graph, drive
         self._clients: dict[int, _Client] = {}
         self._listened: dict[str, _Listened] = {}
@@ -534,7 +536,7 @@ class Bridge:
         self._served: dict[str, _Served] = {}
         self._served_actions: dict[str, _ServedAction] = {}
         self._goals: dict[int, _Goal] = {}
-        self._promised: dict[int, str] = {}  # notes of what calls will have changed
+        self._pending_notes: dict[int, str] = {}  # notes of what calls will have changed
         self._old_statuses: dict[str, dict[object, tuple[int, str]]] = {}  # by name of an action, then of a goal
         self._clients_so_far = self._calls_so_far = 0
         self._requests: list[BusRequest] = []
@@ -739,7 +741,7 @@ class Bridge:
 
     def robot_answered(self, number: int, answer: object, refusal: str = "") -> None:
         """Pass on what the robot answered to a request, or why it refused."""
-        if (note := self._promised.pop(number, "")) and not refusal:
+        if (note := self._pending_notes.pop(number, "")) and not refusal:
             self.notes.append(note)
         message = refusal or (answer if isinstance(answer, str) else "")
         self._respond(number, {"success": not refusal, "message": message, "answer": answer}, is_good=True)
@@ -828,9 +830,9 @@ class Bridge:
                 client.noted = text
                 self.notes.append(f"{client.who} ({client.role.word}): {text}")
 
-    def _promise(self, client: _Client, number: int, text: str) -> None:
+    def _note_when_done(self, client: _Client, number: int, text: str) -> None:
         """Note what a request changes once that is done, also if its client is gone by then."""
-        self._promised[number] = f"{client.who} ({client.role.word}): {text}"
+        self._pending_notes[number] = f"{client.who} ({client.role.word}): {text}"
 
     def _fragment(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         if (frame := client.pieces.add(data)) is not None:
@@ -843,6 +845,7 @@ class Bridge:
         """Give a client the role of its token, which is the `mac` of rosbridge's `auth`."""
         role = self._admit(token) if isinstance(token := data.get("mac"), str) else Role.NOBODY
         if role is Role.NOBODY:
+            self.refused.append(client.who)
             raise BadFrameError("'mac' is no token of this robot")
         client.role = max(client.role, role)
 
@@ -1344,7 +1347,7 @@ class Bridge:
         if name == "save" and given.get("dry_run") is True:
             request["dry_run"] = True
         elif name in _WRITES:
-            self._promise(client, number, f"{_WRITES[name]} the mission {_short(request['mission'])}")
+            self._note_when_done(client, number, f"{_WRITES[name]} the mission {_short(request['mission'])}")
         self._requests.append(EditMission(number, request))
 
     def _robot_service(self, client: _Client, given: Mapping[str, Any], number: int, name: str) -> None:
@@ -1357,9 +1360,9 @@ class Bridge:
         if name == "save" and given.get("dry_run") is True:
             request["dry_run"] = True
         elif name == "save":
-            self._promise(client, number, f"saves {_short(request['subject'])} of the robot")
+            self._note_when_done(client, number, f"saves {_short(request['subject'])} of the robot")
         elif name in _CHANGES:
-            self._promise(client, number, _CHANGES[name])
+            self._note_when_done(client, number, _CHANGES[name])
         self._requests.append(EditMission(number, request))
 
     def _rosapi(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:

@@ -31,8 +31,8 @@ from rbxcompose.tools.robot_editor.live_robot import LIVE_REQUESTS, LiveRobot
 
 _NAMED = re.compile(r"\benv\.(\w+)")
 _OF_PROGRAMS = re.compile(
-    r"PATH|HOME|USER|LOGNAME|SHELL|LANG\w*|LC_\w+|TZ|TERM|TMPDIR"
-    r"|(XDG|PYTHON|VIRTUAL|LD|NUMBA|OMP|RBX|AMENT|ROS|RMW|ZENOH|MUJOCO)_?\w*"
+    r"PATH|HOME|USER|LOGNAME|SHELL|LANG|LANGUAGE|TZ|TERM|TMPDIR|PYTHON\w+"
+    r"|(LC|XDG|VIRTUAL|LD|NUMBA|OMP|RBX|RBXCOMPOSE|AMENT|ROS|RMW|ZENOH|MUJOCO)_\w+"
 )
 _NOT_UP = {"answer": None, "refused": "the robot is not up any more"}
 

@@ -479,10 +479,8 @@ class GatewaySession:
         self._goals: dict[int, SentGoal] = {}  # that have not ended
         self._wakes: dict[int, asyncio.Event] = {}  # by client
         self._unknown: set[int] = set()  # clients that did not say in time who they are
-        self._refused, self._refusals_due = (
-            0,
-            -math.inf,
-        )  # wrong tokens since the last note of one, and when [s] the next
+        self._refused = 0  # wrong tokens since the last note of one
+        self._refusals_due = -math.inf  # when [s] the next may be noted
         self._loop = asyncio.get_running_loop()
         self._pump_timer: asyncio.TimerHandle | None = None
         self._lease_timer: asyncio.TimerHandle | None = None
@@ -493,7 +491,7 @@ class GatewaySession:
         self.trouble = ""  # what is not served beside the page
         self._saving = asyncio.Lock()
         self._asking = asyncio.Semaphore(_AT_ONCE)
-        self._stopping = ThreadPoolExecutor(1)  # so that a stop waits for nothing else
+        self._stopping = ThreadPoolExecutor(2)  # so that a stop waits for nothing else
         self._candidates = CandidateModels()
         self._editor = EditorProcess(folder.path.name)
         self._trier = EditorProcess(folder.path.name, patience=_TRYING)  # so that nobody who types waits for it
@@ -507,14 +505,17 @@ class GatewaySession:
         import uvicorn
         from uvicorn.protocols.http.h11_impl import H11Protocol
 
-        class Hurried(H11Protocol):
+        class LimitedConnection(H11Protocol):
             """A connection that is let go if it is one too many, or sends no whole request in time."""
 
             def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
                 super().connection_made(transport)
-                self.loop.call_later(_SHY if len(self.connections) <= MOST_CONNECTIONS else 0.0, self.let_go)
+                if len(self.connections) > MOST_CONNECTIONS:
+                    transport.abort()
+                else:
+                    self.loop.call_later(_SHY, self.close_if_idle)
 
-            def let_go(self) -> None:
+            def close_if_idle(self) -> None:
                 asked: object = self.cycle  # None until there is a request, whatever uvicorn declares
                 if asked is None and self in self.connections:  # else it is a WebSocket now
                     self.transport.abort()
@@ -535,7 +536,7 @@ class GatewaySession:
             log_level="warning",
             access_log=False,
             lifespan="off",
-            http=Hurried,
+            http=LimitedConnection,
             ws="websockets-sansio",
             ws_max_size=2 * LARGEST,  # beyond that, the connection is closed
             ws_per_message_deflate=False,  # within a machine it costs more than it saves
@@ -775,7 +776,7 @@ class GatewaySession:
                 text = message.get("text")
                 frame = text if text is not None else message.get("bytes") or b""
                 if self._bridge.role(number) is Role.NOBODY and len(frame) > _LONGEST_LOGIN:
-                    self._turn_away(number)  # it may say who it is, and nothing that takes time to read
+                    self._disconnect(number)  # it may say who it is, and nothing that takes time to read
                     continue
                 self._do(self._bridge.receive(number, frame, self._now, self._stamp))
         finally:
@@ -788,7 +789,7 @@ class GatewaySession:
     def _ask_who(self, number: int) -> None:
         """Let a client go that has no role after a while."""
         if self._bridge.role(number) is Role.NOBODY:
-            self._turn_away(number)
+            self._disconnect(number)
 
     def _note_refusal(self, address: str) -> None:
         """Note that a token is wrong, but not each of thousands: they would wash out the log of who did what."""
@@ -798,7 +799,8 @@ class GatewaySession:
             self._note(f"{address}: is refused: a wrong token{again}")
             self._refused, self._refusals_due = 0, self._now + _REFUSALS
 
-    def _turn_away(self, number: int) -> None:
+    def _disconnect(self, number: int) -> None:
+        """Close the connection of a client, as soon as its sender sees that."""
         self._unknown.add(number)
         self._wakes[number].set()
 
@@ -835,6 +837,8 @@ class GatewaySession:
         """Let the bus do what is due, wake the clients that it brought something, and plan when to look again."""
         while self._bridge.notes:
             self._note(self._bridge.notes.popleft())
+        while self._bridge.refused:
+            self._note_refusal(self._bridge.refused.popleft())
         due = self._guest.pump()
         if self._pump_timer is not None:
             self._pump_timer.cancel()
@@ -1066,19 +1070,24 @@ class GatewaySession:
         attempt()
 
     async def _ask_robot(self, request: AskRobot) -> None:
-        """Send a request as the command line does; a stop also reaches a robot whose supervisor is slow."""
-        if request.request is not STOP:
-            answer, refusal = await self._asked(request.request, request.role, request.who)
+        """Send a request as the command line does."""
+        if request.request is STOP:
+            answer, refusal = await self._stop(request.who)
         else:
-            self._note(f"{request.who}: asks {STOP['type']}")
-            answer, refusal = await self._answer(STOP, self._stopping)
-        if refusal and request.request is STOP:
+            answer, refusal = await self._asked(request.request, request.role, request.who)
+        self._bridge.robot_answered(request.number, answer, refusal)
+        self._pump()
+
+    async def _stop(self, who: str) -> tuple[Any, str]:
+        """Stop the robot, also if its supervisor is slow; return what it answers, or why it did not stop."""
+        self._note(f"{who}: asks {STOP['type']}")
+        answer, refusal = await self._answer(STOP, self._stopping)
+        if refusal:
             ask = partial(self._guest.ask, stop_key(self._folder.path.name), _STOPPED)
             stopped = await self._loop.run_in_executor(self._stopping, ask)
             if names := ", ".join(sorted(name.decode() for name in stopped)):
-                answer, refusal = f"the supervisor does not answer: stopped over the bus: {names}", ""
-        self._bridge.robot_answered(request.number, answer, refusal)
-        self._pump()
+                return f"the supervisor does not answer: stopped over the bus: {names}", ""
+        return answer, refusal
 
     async def _read_log(self, request: TailLog) -> None:
         answer = await asyncio.to_thread(tail, self._folder.path / LOG, request.after)

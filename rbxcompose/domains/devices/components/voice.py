@@ -7,7 +7,7 @@ import math
 from pydantic import ValidationInfo, field_validator
 
 from rbxcompose import sdk
-from rbxcompose.base.config import bring, in_folder
+from rbxcompose.base.config import bundle_path, in_folder
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.devices.speech import LONGEST, MODEL, SpeechProgram, Utterance, duration_of, pipeline_of
@@ -31,8 +31,8 @@ class VoiceConfig(sdk.Config):
     def _is_a_local_file(cls, given: object, info: ValidationInfo) -> object:
         if not isinstance(given, str) or not given.endswith(MODEL):
             return given
-        voice = bring(str(in_folder(given, info)), info)
-        bring(f"{voice}.json", info)  # piper reads it, too
+        voice = bundle_path(str(in_folder(given, info)), info)
+        bundle_path(f"{voice}.json", info)  # piper reads it, too
         return voice
 
 

@@ -375,7 +375,7 @@ class Navigator(sdk.Component[NavigatorConfig]):
                 self.recover(goal)
             return
         velocity, state = self.follower.update(pose, costs, dt)
-        self.get_on(self.path)
+        self.track_progress(self.path)
         if state in (FollowState.BLOCKED, FollowState.STUCK):
             self.path, self.reason = None, "something is in the way" if state is FollowState.BLOCKED else "it is stuck"
             self.recover(goal)
@@ -393,7 +393,7 @@ class Navigator(sdk.Component[NavigatorConfig]):
         else:
             self.report(goal, pose)
 
-    def get_on(self, path: PlannedPath) -> None:
+    def track_progress(self, path: PlannedPath) -> None:
         """Note how far it is to the goal; what is driven to and fro, after a recovery, is no progress."""
         stops = path.poses[-1], *self.poses
         left = self.follower.left + sum(before.distance(after) for before, after in pairwise(stops))

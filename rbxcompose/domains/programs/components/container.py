@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
-from rbxcompose.base.config import Config, LocalPath, bring
+from rbxcompose.base.config import Config, LocalPath, bundle_path
 from rbxcompose.base.requests import OutsideError
 from rbxcompose.domains.programs.child import StartOrder
 from rbxcompose.domains.programs.components.program import ProgramLimits, RunConfig, Runner
@@ -59,7 +59,7 @@ class MountModel(Config):
     @model_validator(mode="after")
     def _travels(self, info: ValidationInfo) -> MountModel:
         if not self.writable:
-            bring(self.folder, info)
+            bundle_path(self.folder, info)
         return self
 
 

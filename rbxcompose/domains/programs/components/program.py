@@ -21,7 +21,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, fie
 from pydantic_core import PydanticCustomError
 
 from rbxcompose.base.clock import MonotonicClock, SteppedClock
-from rbxcompose.base.config import Config, LocalFiles, LocalPath, Secret, Time, bring
+from rbxcompose.base.config import Config, LocalFiles, LocalPath, Secret, Time, bundle_path
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import OutsideError
@@ -133,11 +133,11 @@ def _is_there(path: str) -> str:
     return path
 
 
-def bring_command(command: Iterable[str] | None, folder: str, info: ValidationInfo) -> str:
+def bundle_command(command: Iterable[str] | None, folder: str, info: ValidationInfo) -> str:
     """Let the files that a command names travel with the manifest; return the folder where it runs."""
     for file in (os.path.join(folder, word) for word in command or ()):
         if os.path.isfile(file):
-            bring(file, info)
+            bundle_path(file, info)
     return folder
 
 
@@ -688,7 +688,7 @@ class ProgramConfig(RunConfig):
     @field_validator("folder")
     @classmethod
     def _brings_what_it_names(cls, folder: str, info: ValidationInfo) -> str:
-        return bring_command(info.data.get("command"), folder, info)
+        return bundle_command(info.data.get("command"), folder, info)
 
 
 @component("program")

@@ -32,7 +32,7 @@ from rbxcompose.domains.programs.components.program import (
     RunConfig,
     Runner,
     StopModel,
-    bring_command,
+    bundle_command,
     order_of,
 )
 from rbxcompose.domains.programs.sections.ros2 import ros2
@@ -105,7 +105,7 @@ class Ros2NodeConfig(RunConfig):
     @field_validator("folder")
     @classmethod
     def _brings_what_it_names(cls, folder: str, info: ValidationInfo) -> str:
-        return bring_command([*(info.data.get("command") or ()), *info.data.get("arguments", ())], folder, info)
+        return bundle_command([*(info.data.get("command") or ()), *info.data.get("arguments", ())], folder, info)
 
     @model_validator(mode="after")
     def _is_one(self) -> Ros2NodeConfig:
