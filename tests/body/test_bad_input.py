@@ -42,6 +42,12 @@ SLOW = (
     "10,000 links of their own",
     "10,000 joints without links",
     "10,000 joints that mimic nothing",
+    "a text that grows",
+    "100,000 elements",
+    "a tag of 1 MB",
+    "an expansion of 9 MB",
+    "a long text",
+    "100,000 elements inside each other in xacro",
 )
 """What is stopped after a second, as `messages without end`, or is large and many times the same."""
 LIKE_OTHERS = (
@@ -53,6 +59,14 @@ LIKE_OTHERS = (
     "YAML above",
     "YAML that is none",
     "YAML that is a picture",
+    "a DOCTYPE in xacro",
+    "an entity bomb in xacro",
+    "a bare macro of itself",
+    "a lambda of itself",
+    "a property of itself",
+    "a file of itself",
+    "the frame of a generator",
+    "a format",
 )
 """Each takes a process, and is refused by what refuses another one."""
 LIKE_MISTAKES = ("Python", "the environment", "a file of the system", "YAML elsewhere")
@@ -140,7 +154,8 @@ def test_a_picture_of_what_is_endless_is_refused(number: str, attributes: str, t
 
 
 @pytest.mark.parametrize("name", ["M.STL", *rare("m.stl")])
-def test_a_mesh_that_is_one_is_drawn(name: str, tmp_path: Path) -> None:
+def test_a_mesh_that_is_one_is_drawn(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rbxcompose.domains.body.picture.SIZE", 100)
     (tmp_path / name).write_bytes(stl(2))
     assert mesh_problem(tmp_path / name) == ""
     assert draw(body_of(mesh(name, b"")), {}, {name: tmp_path / name}).startswith(b"\x89PNG")

@@ -64,7 +64,7 @@ def _agree(name: str, three: Three, examples: int) -> None:
 
 @pytest.mark.timeout(600)
 def test_three_libraries_agree_on_every_link_of_a_random_body(soak: Soak) -> None:
-    examples = soak.examples(15, 1000)
+    examples = soak.examples(6, 1000)
     links: list[int] = []
 
     @settings(max_examples=examples, database=None, suppress_health_check=list(HealthCheck))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from rbxcompose.domains.body.meshes import GREY, joined
 from rbxcompose.domains.body.picture import bounds_of, png_of, rendered, solids_of_links
@@ -32,7 +33,8 @@ def test_links_without_materials_can_be_told_apart() -> None:
     assert [list(GREY)] not in found.values()
 
 
-def test_the_body_fills_its_picture() -> None:
+def test_the_body_fills_its_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rbxcompose.domains.body.picture.SIZE", 200)
     solids = solids_of_links(description_of(URDF).body, {}, {})
     whole = joined([solid for each in solids.values() for solid in each])
     pixels = rendered(whole, bounds_of(whole))

@@ -126,7 +126,7 @@ URDF = (
 )
 
 
-@pytest.mark.parametrize("name", ["link", "sensor", "arm", *rare("origin", "camera", "gazebo")])
+@pytest.mark.parametrize("name", ["link", *rare("sensor", "arm", "origin", "camera", "gazebo")])
 def test_plain_urdf_is_never_taken_for_a_call(name: str, tmp_path: Path) -> None:
     macro = f'<xacro:macro name="{name}"><link name="wrong"/></xacro:macro>'
     checked = check(tmp_path, cart=f"{BOUND}{macro}{URDF}</robot>")
@@ -213,7 +213,7 @@ def test_a_pattern_includes_the_files_that_fit_it_in_their_order(tmp_path: Path)
     assert [file.name for file in files] == ["cart.xacro", "a.xacro", "b.xacro"]
 
 
-@pytest.mark.parametrize("pattern", ["none/*.xacro", "../*.xacro", *rare("/etc/pass*", "/*/*")])
+@pytest.mark.parametrize("pattern", ["../*.xacro", *rare("none/*.xacro", "/etc/pass*", "/*/*")])
 def test_a_pattern_that_no_file_of_the_project_fits_is_told(pattern: str, tmp_path: Path) -> None:
     folder = tmp_path / "project"
     folder.mkdir()

@@ -14,9 +14,10 @@ import pytest
 from rbxcompose.base.findings import Finding, Span, one_compile
 from rbxcompose.base.requests import to_data
 from rbxcompose.domains.body import xacro as xacro_answers
-from rbxcompose.domains.body.xacro import Expanded, expand
+from rbxcompose.domains.body.xacro import Expanded, XacroFile, expand, expand_all
 from rbxcompose.domains.body.xacro_answer import BareFile, BareTag, XacroAnswer, read_answer
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
+from tests.soak import rare
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
 TAG = BareTag(1, 2, "macro", (3, 4))
@@ -92,18 +93,50 @@ MISTAKES = {
 }
 
 
-@pytest.mark.parametrize("name", MISTAKES)
-def test_a_mistake_is_a_finding_at_its_place_and_nothing_is_executed(name: str, tmp_path: Path) -> None:
-    inside, line, words = MISTAKES[name]
-    (tmp_path / "wheel.xacro").write_text(MACROS)
-    found, _ = expanded(tmp_path, f'{HEAD}<xacro:include filename="wheel.xacro"/>\n{inside}\n</robot>')
-    assert isinstance(found, Finding)
-    assert found.code == "RBX2007"
-    assert words in found.message
-    assert found.span
+ENDLESS = ("a macro of its own", "a long sum", "much text")
+"""What ends the process that expands it."""
+
+
+def write(folder: Path, name: str) -> None:
+    (folder / "wheel.xacro").write_text(MACROS)
+    (folder / "r.xacro").write_text(f'{HEAD}<xacro:include filename="wheel.xacro"/>\n{MISTAKES[name][0]}\n</robot>')
+
+
+@pytest.fixture(scope="module")
+def answered(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, Expanded | Finding]]:
+    """Return the folder of each mistake, and what came of it: all are expanded in one process."""
+    folders: dict[str, Path] = {}
+    names = [name for name in MISTAKES if name not in ENDLESS]
+    for name in names:
+        folders[name] = folder = tmp_path_factory.mktemp("mistake")
+        write(folder, name)
+    found = expand_all([XacroFile(folders[name] / "r.xacro", {}, {}, [folders[name]], HERE) for name in names])
+    return {name: (folders[name], finding) for name, (finding, _) in zip(names, found, strict=True)}
+
+
+def is_told(finding: Expanded | Finding, folder: Path, line: int, words: str) -> None:
+    assert isinstance(finding, Finding)
+    assert finding.code == "RBX2007"
+    assert words in finding.message
+    assert finding.span
     if line:
-        assert found.span.line == line
-    assert {path.name for path in tmp_path.iterdir()} == {"r.xacro", "wheel.xacro"}
+        assert finding.span.line == line
+    assert {path.name for path in folder.iterdir()} == {"r.xacro", "wheel.xacro"}
+
+
+@pytest.mark.parametrize("name", [name for name in MISTAKES if name not in ENDLESS])
+def test_a_mistake_is_a_finding_at_its_place_and_nothing_is_executed(
+    name: str, answered: dict[str, tuple[Path, Expanded | Finding]]
+) -> None:
+    folder, finding = answered[name]
+    is_told(finding, folder, *MISTAKES[name][1:])
+
+
+@pytest.mark.parametrize("name", ["a macro of its own", *rare("a long sum", "much text")])
+def test_what_does_not_end_is_a_finding(name: str, tmp_path: Path) -> None:
+    write(tmp_path, name)
+    found, _ = expand(tmp_path / "r.xacro", {}, {}, [tmp_path], HERE)
+    is_told(found, tmp_path, *MISTAKES[name][1:])
 
 
 def test_a_file_is_expanded_again_only_when_something_that_it_used_has_changed(

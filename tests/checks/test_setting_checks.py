@@ -28,7 +28,7 @@ from tests.shipped import compiled
 from tests.soak import rare
 
 ROBOTS = sorted(path.parent.name for path in (ROOT / "robots").glob("*/robot.yaml"))
-FEW = ("turtlebot", "rover", "pi_robot")  # with a base, a lift, and two arms
+FEW = ("turtlebot", "rover")  # with a base, and a lift
 SIZES = (-1.0, 0.0, 1e-6, 0.01, 0.5, 2.0, 100.0)  # by which numbers are multiplied
 POWERED = """rbx: 1
 kind: Robot

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from rbxcompose.commands.lookup import BusPlace, find_place
+from tests.commands import command
 from tests.conftest import ROOT
 from tests.forked import RBXCOMPOSE, Forked, run_command
 
@@ -31,7 +32,10 @@ class Robot:
         return [*RBXCOMPOSE, *words]
 
     def do(self, *words: str) -> subprocess.CompletedProcess[str]:
-        return run_command(words, self.environment, PATIENCE)
+        """Run a command in this process, but for `up`, which is the beginning of others."""
+        if words[0] == "up":
+            return run_command(words, self.environment, PATIENCE)
+        return command(*words, environment=self.environment, folder=ROOT)
 
     def told(self, *words: str) -> Any:
         """Return what a command answers in JSON."""

@@ -87,9 +87,9 @@ def test_a_way_tells_how_much_of_it_there_is(capsys: pytest.CaptureFixture[str])
 
 def test_a_picture_tells_the_cells_that_the_tip_gets_to(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     out = str(tmp_path / "reach.png")
-    words = ("--layer", "z: 60 cm", "--cell", "5 cm", "--samples", "4000", "--out", out)
+    words = ("--layer", "z: 60 cm", "--cell", "5 cm", "--samples", "1000", "--out", out)
     found = answered(capsys, "picture", "reach", *words)
-    assert (found["samples"], found["seed"], found["of"]) == (4000, 1, 50)
+    assert (found["samples"], found["seed"], found["of"]) == (1000, 1, 50)
     cells = found["cells"]
     assert isinstance(cells, list)
     assert {cell["cell"][2] for cell in cells} == {12}

@@ -20,6 +20,7 @@ from rbxcompose.testing import check_text
 from rbxcompose.tools.live_rules import LiveRules
 from tests.conftest import ROOT
 from tests.forked import run_command
+from tests.soak import rare
 
 ROBOT = """rbx: 1
 kind: Robot
@@ -122,7 +123,7 @@ def test_a_test_and_a_trial_of_a_mission_keep_them_as_well(
     )
 
 
-@pytest.mark.parametrize("pace", [(), ("--rate", "max")])
+@pytest.mark.parametrize("pace", [(), *rare(("--rate", "max"))])
 def test_what_a_mission_sets_keeps_the_rules_of_the_robot(tmp_path: Path, pace: tuple[str, ...]) -> None:
     text = ROBOT.replace(
         "components:", "bus: {port: 7921}\nmissions: {hurry: hurry.yaml}\nstart: hurry\ncomponents:", 1

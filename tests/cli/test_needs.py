@@ -20,7 +20,7 @@ SYSTEM = "rbx: 1\nkind: System\nname: two\nhosts: {here: {}}\nrobots: {one: {rob
 @pytest.mark.parametrize(
     ("path", "extras"),
     [
-        ("robots/pi_robot", {"arm": ["right_arm"]}),
+        pytest.param("robots/pi_robot", {"arm": ["right_arm"]}, marks=pytest.mark.soak),  # as told below
         ("parts/servo_arm.yaml", {"arm": ["right_arm"]}),
         ("missions/reach_out.yaml", {"arm": ["right_arm"]}),
         ("robots/turtlebot", {}),

@@ -17,6 +17,7 @@ from websockets.sync.client import connect
 
 from tests.cli.live_robot import PATIENCE, Robot
 from tests.conftest import ROOT
+from tests.forked import Forked
 
 TEXT = """
 rbx: 1
@@ -84,14 +85,16 @@ def robot() -> Iterator[Robot]:
 
 def test_a_guest_publishes_shows_and_records_them(robot: Robot) -> None:
     file = robot.file.parent / "run.mcap"
-    recording = subprocess.Popen(
+    recording = Forked(
         robot.command("record", "-o", str(file), "--for", "4s", "--topics", "grasp"),
         env=robot.environment,
+        cwd=ROOT,
         stdout=subprocess.DEVNULL,
     )
-    with subprocess.Popen(
+    with Forked(
         robot.command("topic", "echo", "grasp", "-n", "1", "--json"),
         env=robot.environment,
+        cwd=ROOT,
         stdout=subprocess.PIPE,
         text=True,
     ) as echo:

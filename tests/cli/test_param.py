@@ -16,6 +16,7 @@ import pytest
 
 from rbxcompose.sdk.parameters import from_message
 from rbxcompose.tools.parameters.changes import value_of
+from tests.commands import command
 from tests.forked import run_command
 
 ROOT = Path(__file__).parents[2]
@@ -52,15 +53,19 @@ def base() -> Iterator[Path]:
 
 
 @pytest.fixture(scope="module")
-def do(base: Path) -> Iterator[Do]:
+def environment(base: Path) -> dict[str, str]:
+    return {**os.environ, "XDG_RUNTIME_DIR": str(base), "PYTHONPATH": str(ROOT), "NO_COLOR": "1"}
+
+
+@pytest.fixture(scope="module")
+def do(base: Path, environment: dict[str, str]) -> Iterator[Do]:
     """Run a command on a robot that is up."""
-    environment = {**os.environ, "XDG_RUNTIME_DIR": str(base), "PYTHONPATH": str(ROOT), "NO_COLOR": "1"}
     (base / "robot.yaml").write_text(MANIFEST, encoding="utf-8")
 
     def run(*words: str) -> subprocess.CompletedProcess[str]:
-        return run_command(words, environment, PATIENCE)
+        return command(*words, environment=environment, folder=ROOT)
 
-    up = run("up", "-d", str(base / "robot.yaml"))
+    up = run_command(("up", "-d", str(base / "robot.yaml")), environment, PATIENCE)
     assert up.returncode == 0, up.stderr
     yield run
     assert run("down").returncode == 0
@@ -180,9 +185,9 @@ def test_a_file_of_values_that_cannot_be_read_is_told_with_the_place(do: Do, tmp
     assert (done.returncode, f"{file}:3:9" in done.stderr) == (1, True), done.stderr
 
 
-def test_a_change_is_seen_by_who_watches(do: Do) -> None:
+def test_a_change_is_seen_by_who_watches(do: Do, environment: dict[str, str]) -> None:
     with ThreadPoolExecutor() as pool:
-        seen = pool.submit(do, "param", "watch", "battery", "-n", "1", "--json")
+        seen = pool.submit(run_command, ("param", "watch", "battery", "-n", "1", "--json"), environment, PATIENCE)
         while not seen.done():
             do("param", "set", "battery.error=11%")
             do("param", "set", "battery.error=20%")

@@ -26,7 +26,8 @@ from rbxcompose.base.printable import FORBIDDEN, columns
 from rbxcompose.runtime.log import Record
 from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.top import ComponentPicture, Load, RobotPicture, Tree, lines_of
-from tests.forked import RBXCOMPOSE, run_command
+from tests.commands import command
+from tests.forked import RBXCOMPOSE, Forked, run_command
 from tests.third_party.places import put
 
 ROOT = Path(__file__).parents[2]
@@ -122,7 +123,10 @@ class Robot:
         return [*RBXCOMPOSE, *words]
 
     def do(self, *words: str) -> subprocess.CompletedProcess[str]:
-        return run_command(words, self.environment, PATIENCE)
+        """Run a command in this process, but for `up`, which needs the package of somebody else."""
+        if words[0] == "up":
+            return run_command(words, self.environment, PATIENCE)
+        return command(*words, environment=self.environment, folder=ROOT)
 
     def seen(self) -> Any:
         """Return what `top` sees."""
@@ -167,7 +171,7 @@ def test_on_a_terminal_it_is_live_and_leaves_the_terminal_as_it_was(robot: Robot
     ours, theirs = pty.openpty()
     assert os.get_terminal_size(theirs) == (0, 0)  # as some terminals say, too
     before = termios.tcgetattr(theirs)
-    with subprocess.Popen(
+    with Forked(
         robot.command("top"), env=robot.environment, cwd=ROOT, stdin=theirs, stdout=theirs, stderr=theirs
     ) as process:
         seen = b""

@@ -9,6 +9,7 @@ import pytest
 from rbxcompose.msgs.rbxcompose_msgs import LocateArm, MoveArm
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing import Bench
+from tests.components.slow_servos import with_slow_servos
 from tests.shipped import robot_and_plan
 
 TYPES = ("arm", "scene", "servo_bus")
@@ -17,7 +18,7 @@ TYPES = ("arm", "scene", "servo_bus")
 @pytest.fixture
 def bench() -> Bench:
     _, plan = robot_and_plan("pi_robot")
-    found = Bench(*(instance for instance in plan.instances if instance.type in TYPES))
+    found = Bench(*(instance for instance in with_slow_servos(plan.instances) if instance.type in TYPES))
     found.advance(0.5)
     return found
 

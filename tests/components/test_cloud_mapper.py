@@ -24,6 +24,7 @@ from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
+from tests.components.slow_servos import with_slow_servos
 from tests.conftest import ROOT
 from tests.motion.toy_arm import urdf
 
@@ -217,7 +218,7 @@ def test_an_arm_goes_around_what_a_camera_sees(tmp_path: Path) -> None:
     compiled = compile_robot(str(ROOT / "robots/pi_robot"), overlays=[str(overlay)], environment={})
     assert compiled.plan, compiled.report
     wanted = ("arm", "servo_bus", "scene", "cloud_mapper")
-    bench = Bench(*(one for one in compiled.plan.instances if one.type in wanted))
+    bench = Bench(*(one for one in with_slow_servos(compiled.plan.instances) if one.type in wanted))
     states = bench.collect("/joint_states", JointState, Qos.STATE)
     scenes = bench.collect("/scene", SceneObjects, Qos.LATCHED)
     bench.advance(1.0)

@@ -116,6 +116,7 @@ def test_it_does_the_same_for_the_same_input(name: str) -> None:
     assert run() == run()
 
 
+@pytest.mark.soak  # `tests/testing/test_clocks.py` looks into all files that import a clock
 @all_types
 def test_it_never_asks_for_time_itself(name: str) -> None:
     assert clock_uses(Path(inspect.getfile(component_type(name)))) == []

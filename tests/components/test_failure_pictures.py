@@ -30,7 +30,8 @@ def size_of(file: Path) -> tuple[int, int]:
 
 
 @pytest.mark.timeout(120)
-def test_the_text_of_a_failed_goal_names_its_picture(tmp_path: Path) -> None:
+def test_the_text_of_a_failed_goal_names_its_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rbxcompose.domains.body.picture.SIZE", 300)
     _, plan = robot_and_plan("pi_robot", "table")
     instances: dict[str, Any] = {
         instance.type: instance for instance in plan.instances if instance.type in ("arm", "servo_bus", "scene")
@@ -64,7 +65,8 @@ def test_the_oldest_pictures_go_and_other_files_stay(tmp_path: Path, monkeypatch
 
 
 @pytest.mark.timeout(120)
-def test_why_there_is_no_picture_is_told(tmp_path: Path) -> None:
+def test_why_there_is_no_picture_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rbxcompose.domains.body.picture.SIZE", 100)
     (tmp_path / "taken").write_text("a file")
     said = picture_of_failure(tmp_path / "taken", "right_arm", HandBench().works, {}, FAILURE)
     assert said.startswith("no picture: ")

@@ -43,6 +43,7 @@ from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
+from tests.components.slow_servos import with_slow_servos
 from tests.shipped import robot_and_plan
 
 pytestmark = pytest.mark.timeout(180)  # the libraries of arms are slow to import
@@ -61,7 +62,7 @@ class Client:
     """A program for MoveIt, and the robot in stepped time."""
 
     def __init__(self, plan: Plan) -> None:
-        self.bench = Bench(*(instance for instance in plan.instances if instance.type in TYPES))
+        self.bench = Bench(*(instance for instance in with_slow_servos(plan.instances) if instance.type in TYPES))
         self.states = self.bench.collect("/joint_states", JointState, Qos.STATE)
         self.scenes = self.bench.collect("/scene", SceneObjects, Qos.LATCHED)
         self.feedback: list[str] = []
@@ -93,6 +94,12 @@ class Client:
 
 @pytest.fixture
 def client(plan: Plan) -> Client:
+    return Client(plan)
+
+
+@pytest.fixture(scope="module")
+def client_at_rest(plan: Plan) -> Client:
+    """Return one whose goals are all refused, so that the arm stays where it is."""
     return Client(plan)
 
 
@@ -333,8 +340,8 @@ POINT = Constraints(position_constraints=(place(0.2, -0.1, 0.6),))
     ],
 )
 def test_what_cannot_be_has_a_code_and_a_text(
-    client: Client, goal: Constraints, fields: dict[str, Any], code: int, told: str
+    client_at_rest: Client, goal: Constraints, fields: dict[str, Any], code: int, told: str
 ) -> None:
-    end = client.move(goal, **fields)
+    end = client_at_rest.move(goal, **fields)
     assert end.outcome is Outcome.ABORTED
     assert (end.result.error_code.val, told in end.result.error_code.message) == (code, True), end.result.error_code

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -19,6 +18,7 @@ from rbxcompose.msgs.vision_msgs import (
     ObjectHypothesisWithPose,
 )
 from rbxcompose.testing import Bench
+from tests.components.slow_servos import with_slow_servos
 from tests.shipped import robot_and_plan
 
 TYPES = ("seen_objects", "scene", "servo_bus", "transforms")
@@ -28,10 +28,8 @@ TURNED = Quaternion(x=0.5, y=-0.5, z=0.5, w=0.5)  # upright, as the optical fram
 @pytest.fixture(scope="module")
 def parts() -> list[Instance]:
     _, plan = robot_and_plan("pi_robot", "seeing")
-    found = {instance.type: instance for instance in plan.instances if instance.type in TYPES}
-    servos = found["servo_bus"]
-    slow = servos.config.model_copy(update={"rate": 20.0})  # the arm hangs still
-    return [*(found | {"servo_bus": replace(servos, config=slow)}).values()]
+    slow = with_slow_servos(plan.instances, 5.0)  # the arm hangs still
+    return [instance for instance in slow if instance.type in TYPES]
 
 
 class Camera:

@@ -20,6 +20,7 @@ from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoin
 from rbxcompose.sdk.bound import Ended, Outcome
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
+from tests.soak import rare
 
 Follow = FollowJointTrajectory
 TICK = 0.00512  # [rad] of an AX-12
@@ -101,7 +102,7 @@ class Head:
         self.robot.advance(0.1)
 
 
-@pytest.fixture(params=["servo", "ideal"])
+@pytest.fixture(params=["servo", *rare("ideal")])
 def head(request: pytest.FixtureRequest) -> Head:
     return Head(twin=request.param)
 

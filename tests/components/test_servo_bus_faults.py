@@ -32,12 +32,14 @@ CONFIG: dict[str, Any] = {
 class Head:
     """Two joints on a twin, with faults by name: when, what, of which joint, how long."""
 
-    def __init__(self, *faults: tuple[float, str, str, float | None], twin: str = "servo") -> None:
+    def __init__(self, *faults: tuple[float, str, str, float | None], twin: str = "servo", rate: float = 100.0) -> None:
         named = {
             f"fault_{index}": {"at": at, "fault": fault, "joint": joint, "lasts": lasts}
             for index, (at, fault, joint, lasts) in enumerate(faults)
         }
-        self.robot = Bench(instance("servos", "servo_bus", {**CONFIG, "twin": twin, "faults": named}), start=False)
+        self.robot = Bench(
+            instance("servos", "servo_bus", {**CONFIG, "twin": twin, "faults": named, "rate": rate}), start=False
+        )
         self.states = self.robot.collect("/joint_states", JointState)
         driver = self.robot.component("servos")
         assert isinstance(driver, ServoBusDriver)
@@ -89,12 +91,12 @@ def test_a_driver_that_raises_ends_torque_as_declared_and_opens_its_port_again(
 
 @pytest.mark.parametrize("twin", ["servo", *rare("ideal")])
 def test_a_hot_joint_rests_and_can_be_used_again_when_it_has_cooled_down(twin: str) -> None:
-    head = Head((1.0, "overheat", "pan", 10.0), twin=twin)
+    head = Head((1.0, "overheat", "pan", 2.0), twin=twin, rate=25.0)
     head.robot.advance(0.5)
     head.go("pan", 1.0)
     head.robot.advance(1.5)
     assert head.modes() == [JointMode.RESTING, JointMode.RELAXED]
-    head.robot.advance(110.0)
+    head.robot.advance(80.0)
     assert head.modes() == [JointMode.RELAXED, JointMode.RELAXED]
     head.go("pan", 0.3)
     head.robot.advance(2.0)

@@ -15,7 +15,8 @@ ROOT = Path(__file__).parents[2]
 AXE = ROOT / "console/node_modules/axe-core/axe.min.js"
 CHROMIUM = shutil.which("chromium-headless-shell") or shutil.which("chromium")  # which draws windows as well
 _QUIET = ("quic", "background-networking", "component-update", "sync", "gpu")
-_ARGUMENTS = ["--no-sandbox", "--no-first-run", *(f"--disable-{name}" for name in _QUIET)]
+_SHORT_LIVED = "--js-flags=--single-threaded --no-opt --no-maglev"  # no page lives as long as optimising it pays
+_ARGUMENTS = ["--no-sandbox", "--no-first-run", _SHORT_LIVED, *(f"--disable-{name}" for name in _QUIET)]
 
 
 def _load_build() -> Any:

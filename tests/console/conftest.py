@@ -49,7 +49,8 @@ class Pages:
         if kind not in self.pages:
             self.pages[kind] = self.browser.new_context(**options).new_page()
         page = self.pages[kind]
-        page.goto("about:blank")
+        if page.url != "about:blank":
+            page.goto("about:blank")
         for key in HELD:
             page.keyboard.up(key)
         page.mouse.up()

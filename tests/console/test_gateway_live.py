@@ -413,7 +413,7 @@ def test_a_cut_socket_stops_the_robot_at_once(robot: Robot) -> None:
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
-def test_the_page_drives_the_robot(robot: Robot) -> None:
+def test_the_page_drives_the_robot_and_shows_its_world_at_its_time(robot: Robot) -> None:
     if not console.is_built():
         pytest.skip("the page cannot be built here")
     complaints: list[str] = []
@@ -435,14 +435,8 @@ def test_the_page_drives_the_robot(robot: Robot) -> None:
         page.keyboard.up("Shift")
         page.wait_for_timeout(500)
         assert commands.got[-1][1] == 0.0
-    assert complaints == []
-
-
-@pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
-def test_the_page_shows_the_world_at_the_time_of_the_robot(robot: Robot) -> None:
-    if not console.is_built():
-        pytest.skip("the page cannot be built here")
-    with chromium() as browser:
+        assert complaints == []
+        page.close()
         page = browser.new_page()
         page.goto(f"http://{HOST}/#model")
         scene = page.locator(".scene")

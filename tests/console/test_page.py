@@ -47,6 +47,11 @@ def expect_stop(page: Page, gateway: FakeGateway, since: float) -> None:
     assert all(command[1:] == (0, 0) for command in gateway.commands(first))
 
 
+def driven(gateway: FakeGateway, since: float) -> list[tuple[float, float, float]]:
+    """Return the commands since a moment [s], from the first one that moves on."""
+    return list(itertools.dropwhile(lambda command: command[1:] == (0, 0), gateway.commands(since)))
+
+
 def test_the_page_shows_the_robot_and_its_batteries(open_page: Callable[..., Page]) -> None:
     page = open_page(name="")
     expect(page).to_have_title("Drive · turtlebot")
@@ -87,25 +92,26 @@ def test_keys_alone_do_not_drive_and_say_why(open_page: Callable[..., Page], gat
     assert gateway.commands() == []
 
 
-@pytest.mark.parametrize(
-    "event",
-    [
+def test_who_looks_away_stops_and_hands_back(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+    page = open_page()
+    for away in (
         "window.dispatchEvent(new Event('blur'))",
         "window.dispatchEvent(new Event('pagehide'))",
         "Object.defineProperty(document, 'hidden', {value: true});"
         "document.dispatchEvent(new Event('visibilitychange'))",
-    ],
-    ids=["blur", "left", "hidden"],
-)
-def test_who_looks_away_stops_and_hands_back(open_page: Callable[..., Page], gateway: FakeGateway, event: str) -> None:
-    page = open_page()
-    drive_by_keys(page, gateway)
-    since = time.monotonic()
-    page.evaluate(event)
-    expect_stop(page, gateway, since)
-    assert gateway.calls("/console/drive")[-1] == {"take": False, "name": "Ada"}
+    ):
+        gateway.frames.clear()
+        drive_by_keys(page, gateway)
+        assert {command[1:] for command in gateway.commands()} == {(0.25, 0)}
+        since = time.monotonic()
+        page.evaluate(away)
+        expect_stop(page, gateway, since)
+        assert gateway.calls("/console/drive")[-1] == {"take": False, "name": "Ada"}, away
+        page.keyboard.up("ArrowUp")
+        page.keyboard.up("Shift")
 
 
+@pytest.mark.soak  # as a finger does
 def test_the_pad_drives_in_proportion_while_the_mouse_holds_it(
     open_page: Callable[..., Page], gateway: FakeGateway
 ) -> None:
@@ -127,22 +133,25 @@ def test_the_pad_drives_in_proportion_while_the_mouse_holds_it(
     expect_stop(page, gateway, since)
 
 
-@pytest.mark.parametrize("end", ["touchEnd", "touchCancel"])
-def test_a_finger_drives_until_it_is_lifted_or_taken_away(
-    open_page: Callable[..., Page], gateway: FakeGateway, end: str
-) -> None:
+def test_a_finger_drives_until_it_is_lifted_or_taken_away(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
     page = open_page(viewport=PHONE, has_touch=True, is_mobile=True)
     expect(page.locator(".hint").first).to_have_text("Touch the pad and drag. Lift your finger to stop.")
     box = page.locator("drive-pad").bounding_box()
     assert box is not None
     device = page.context.new_cdp_session(page)
     point = {"x": box["x"] + box["width"] * 0.8, "y": box["y"] + box["height"] * 0.8}
-    device.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [point]})
-    wait_for(lambda: len(gateway.commands()) > 2, page)
-    assert all(forward < 0 and turn < 0 for _, forward, turn in gateway.commands())
-    since = time.monotonic()
-    device.send("Input.dispatchTouchEvent", {"type": end, "touchPoints": []})
-    expect_stop(page, gateway, since)
+
+    def drive_until(end: str) -> None:
+        begin = time.monotonic()
+        device.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [point]})
+        wait_for(lambda: len(driven(gateway, begin)) > 2, page)
+        assert all(forward < 0 and turn < 0 for _, forward, turn in driven(gateway, begin))
+        since = time.monotonic()
+        device.send("Input.dispatchTouchEvent", {"type": end, "touchPoints": []})
+        expect_stop(page, gateway, since)
+
+    drive_until("touchEnd")
+    drive_until("touchCancel")
 
 
 def test_stop_needs_no_lease_and_nothing_moves_until_release(

@@ -119,6 +119,7 @@ def test_it_is_seen_who_commands_and_an_input_is_locked(open_page: Callable[...,
     assert violations(page) == []
 
 
+@pytest.mark.soak  # as one is locked
 def test_an_input_is_selected_where_inputs_are(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
     has_mux(gateway)
     gateway.windows[LOOK_AT] = a_mux("a", mode="select", a="holds", b="waits")
@@ -197,6 +198,7 @@ def test_the_log_grows_and_is_filtered(open_page: Callable[..., Page], gateway: 
     assert violations(page) == []
 
 
+@pytest.mark.soak
 def test_what_check_found_stands_above_the_log(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
     place = {"file": "robot.yaml", "line": 7, "column": 3}
     said = {"code": "RBX3141", "severity": "warning", "message": "joystick below navigation", "help": "raise it"}

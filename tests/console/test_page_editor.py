@@ -99,6 +99,7 @@ def test_a_mistake_is_marked_as_it_is_typed_and_a_button_fixes_it(
     expect(page.locator(".cm-content")).to_contain_text("tabel")
 
 
+@pytest.mark.soak  # findings of another origin, shown in the same list
 def test_what_check_finds_is_told_when_it_opens_and_until_then_that_it_is_checked(
     open_page: Callable[..., Page], project: Project, gateway: FakeGateway
 ) -> None:
@@ -241,17 +242,9 @@ def lines(page: Page) -> list[str]:
     return shown
 
 
-def test_the_outline_and_the_text_choose_the_same_block(open_page: Callable[..., Page], project: Project) -> None:
-    page = edits(open_page(page_name="mission"))
-    block(page, "wait 2 s").locator(".outline-row").click()
-    expect(page.locator(".cm-block")).to_have_text("  - wait: 2 s")
-    page.locator(".editor-text .cm-line", has_text="table").click()
-    expect(block(page, "go_to table")).to_have_attribute("aria-selected", "true")
-    expect(block(page, "wait 2 s")).to_have_attribute("aria-selected", "false")
-    assert violations(page) == []
-
-
-def test_steps_are_moved_copied_and_deleted_by_keys_alone(open_page: Callable[..., Page], project: Project) -> None:
+def test_steps_are_moved_copied_and_deleted_by_keys_and_added_behind_the_chosen_one_by_a_search(
+    open_page: Callable[..., Page], project: Project
+) -> None:
     page = edits(open_page(page_name="mission"))
     block(page, "go_to table").focus()
     page.keyboard.press("Home")
@@ -271,12 +264,6 @@ def test_steps_are_moved_copied_and_deleted_by_keys_alone(open_page: Callable[..
         page.keyboard.press("Control+z")
     expect(page.locator(".cm-line").nth(5)).to_contain_text("go_to: table")
     assert "\n".join(lines(page)) == FETCH
-
-
-def test_a_step_is_found_by_a_search_and_added_behind_the_chosen_one(
-    open_page: Callable[..., Page], project: Project
-) -> None:
-    page = edits(open_page(page_name="mission"))
     page.locator(".editor-text .cm-line", has_text="table").click()
     page.get_by_text("Add a step").click()
     expect(page.get_by_role("button", name=re.compile("^go_to Skill of"))).to_be_visible()
@@ -288,11 +275,15 @@ def test_a_step_is_found_by_a_search_and_added_behind_the_chosen_one(
     assert lines(page)[5:8] == ["  - go_to: table   # there", "  - wait: 5 s", "  - wait: 2 s"]
 
 
-def test_the_form_of_a_step_has_what_it_can_be_given_and_writes_it(
+def test_the_form_of_the_step_that_is_chosen_in_the_outline_or_the_text_has_what_it_can_be_given_and_writes_it(
     open_page: Callable[..., Page], project: Project
 ) -> None:
     page = edits(open_page(page_name="mission"))
+    block(page, "wait 2 s").locator(".outline-row").click()
+    expect(page.locator(".cm-block")).to_have_text("  - wait: 2 s")
     page.locator(".editor-text .cm-line", has_text="table").click()
+    expect(block(page, "go_to table")).to_have_attribute("aria-selected", "true")
+    expect(block(page, "wait 2 s")).to_have_attribute("aria-selected", "false")
     expect(page.get_by_text("Options of go_to")).to_be_visible()
     place = page.locator("#option-go_to")
     expect(place).to_have_value("table")
@@ -393,6 +384,7 @@ def test_a_robot_is_watched_paused_and_resumed_beside_the_editor_on_a_phone(
     expect(page.get_by_role("textbox", name=TEXT)).to_be_visible()
 
 
+@pytest.mark.soak  # what is made is tested without a browser
 def test_a_new_mission_is_made_from_a_template_and_opened(open_page: Callable[..., Page], project: Project) -> None:
     page = open_page(page_name="mission")
     page.get_by_role("button", name="New mission").click()

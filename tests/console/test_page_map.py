@@ -195,6 +195,7 @@ def test_without_the_tool_a_drag_moves_the_view_and_not_the_robot(
     assert is_goal(goal, 0.6, 0.2, 0.0)
 
 
+@pytest.mark.soak  # as the mouse does
 def test_a_finger_sends_the_same_goal_and_escape_gives_up(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
     page = open_page(page_name="map", has_touch=True)
     expect(page.get_by_text("Robot: x 1.00")).to_be_visible()
@@ -246,6 +247,7 @@ def test_a_grid_is_drawn_where_its_origin_and_its_frame_put_it(
     wait_for_colour(page, 0.25, 0.15, ground)
 
 
+@pytest.mark.soak  # as a grid is; where they lie needs no browser
 def test_a_path_and_a_scan_are_drawn_in_their_frames(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
     poses = [{"pose": pose(x, 0.0, 0.0)} for x in (0.0, 0.35)]
     rolling.latched["/plan"] = {"header": {"frame_id": "odom"}, "poses": poses}
@@ -363,6 +365,7 @@ def test_why_the_robot_does_not_go_is_said(open_page: Callable[..., Page], rolli
     expect(state(page)).to_contain_text("whether the robot still drives to Dock, or has arrived, is unknown")
 
 
+@pytest.mark.soak
 def test_a_running_mission_whose_goal_would_be_replaced_is_named(
     open_page: Callable[..., Page], rolling: FakeGateway
 ) -> None:
@@ -371,6 +374,7 @@ def test_a_running_mission_whose_goal_would_be_replaced_is_named(
     expect(page.get_by_label("Goal")).to_contain_text("Mission Patrol is running")
 
 
+@pytest.mark.soak  # by the same drag as a goal
 def test_the_robot_is_told_where_it_is_if_something_listens(
     open_page: Callable[..., Page], rolling: FakeGateway
 ) -> None:

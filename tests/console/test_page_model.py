@@ -154,6 +154,7 @@ def test_sliders_move_a_ghost_unless_they_may_move_the_robot(
     expect(page.get_by_text("Nothing of the robot moves slide joint by a goal")).to_be_visible()
 
 
+@pytest.mark.soak  # a real robot shows its world in the tests of its gateway
 def test_the_robot_stands_in_its_world_in_which_things_move(
     open_page: Callable[..., Page], crane_in_world: FakeGateway
 ) -> None:
@@ -191,6 +192,7 @@ def test_a_robot_without_a_world_is_asked_for_nothing_of_it(open_page: Callable[
     assert not asked & {"/world", "/tf", "/tf_static", "/scan"}
 
 
+@pytest.mark.soak  # what is planned and sent needs no browser
 def test_a_goal_of_an_arm_is_planned_shown_and_executed(open_page: Callable[..., Page], crane: FakeGateway) -> None:
     page = open_page(page_name="model", reduced_motion="reduce")
     page.get_by_role("button", name="Drag its tip").click()

@@ -138,6 +138,7 @@ def test_a_finger_scrolls_and_drags_after_a_rest(open_page: Callable[..., Page],
     expect(page.locator(".cm-line").nth(5)).to_contain_text("wait: 2 s")
 
 
+@pytest.mark.soak  # who may not configure is tested with the editor
 def test_who_may_not_configure_drags_nothing(
     open_page: Callable[..., Page], project: Project, gateway: FakeGateway
 ) -> None:
@@ -211,6 +212,7 @@ machine:
 """
 
 
+@pytest.mark.soak  # as a step is added; what it writes needs no browser
 def test_a_state_is_added_behind_the_chosen_one_and_given_a_name(
     open_page: Callable[..., Page], project: Project
 ) -> None:
@@ -268,6 +270,7 @@ def test_a_value_of_several_lines_is_edited_in_a_larger_field(open_page: Callabl
     expect_fit(page)
 
 
+@pytest.mark.soak  # the sentences are tested without a browser
 def test_the_mission_is_read_aloud_as_it_is_typed_and_a_sentence_chooses_its_block(page: Page) -> None:
     page.get_by_role("button", name="Read", exact=True).click()
     sentences = page.get_by_role("list", name="The mission in sentences")
@@ -359,6 +362,7 @@ def test_else_is_added_and_deleted_again(open_page: Callable[..., Page], project
     assert "\n".join(lines(page)) == text
 
 
+@pytest.mark.soak  # as in the tree of the page
 def test_the_state_in_which_the_robot_is_stands_out_in_the_graph(
     open_page: Callable[..., Page], project: Project, gateway: FakeGateway
 ) -> None:

@@ -142,6 +142,7 @@ def test_limits_stand_beside_the_field(open_page: Callable[..., Page], battery: 
     expect(page.get_by_text("Time from full to empty. 0 s to 100 s")).to_be_visible()
 
 
+@pytest.mark.soak  # which control a kind has needs no browser
 def test_each_kind_has_its_control_and_what_is_fixed_has_none(open_page: Callable[..., Page], battery: Battery) -> None:
     page = open_page(page_name="parameters")
     expect(page.get_by_label("Warn", exact=True)).to_have_value("50")

@@ -149,6 +149,7 @@ def test_without_a_way_to_the_map_no_drag_moves_a_place(
     expect(panel.get_by_role("button", name="Undo")).to_be_disabled()
 
 
+@pytest.mark.soak  # as one is moved by a drag
 def test_a_place_is_added_by_a_drag_and_gets_a_name(open_page: Callable[..., Page], project: EditedProject) -> None:
     page = open_page(page_name="map")
     panel = edits(page)
@@ -219,13 +220,14 @@ def test_many_mistakes_can_be_read_by_keys(open_page: Callable[..., Page], proje
     ("label", "text", "why"),
     [
         ("x", "NaN m", "must be a length"),
-        pytest.param("Name", "window_seat", "it is taken", marks=pytest.mark.soak),
-        pytest.param("x", "1e300", "must be a length", marks=pytest.mark.soak),
-        pytest.param("x", "9999999 m", "farther away", marks=pytest.mark.soak),
-        pytest.param("Heading", "3 m", "must be an angle", marks=pytest.mark.soak),
-        pytest.param("Name", "Big Table!", "cannot be the name of a place", marks=pytest.mark.soak),
+        ("Name", "window_seat", "it is taken"),
+        ("x", "1e300", "must be a length"),
+        ("x", "9999999 m", "farther away"),
+        ("Heading", "3 m", "must be an angle"),
+        ("Name", "Big Table!", "cannot be the name of a place"),
     ],
 )
+@pytest.mark.soak  # the editor refuses it without a browser
 def test_what_is_no_value_is_refused_and_stays_to_be_corrected(
     open_page: Callable[..., Page], project: EditedProject, label: str, text: str, why: str
 ) -> None:

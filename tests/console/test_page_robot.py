@@ -135,6 +135,7 @@ def test_a_component_that_nobody_knows_has_a_card_with_all_it_offers(
     assert violations(page) == []
 
 
+@pytest.mark.soak  # further cards are tested here
 def test_cards_of_what_is_known_show_what_matters(open_page: Callable[..., Page], robot: FakeGateway) -> None:
     page = open_page(page_name="robot")
     servos = page.get_by_label("servos", exact=True)
@@ -146,6 +147,7 @@ def test_cards_of_what_is_known_show_what_matters(open_page: Callable[..., Page]
     expect(page.get_by_label("base", exact=True)).to_contain_text("0.25\u202fm/s of 0.50\u202fm/s")
 
 
+@pytest.mark.soak
 def test_arms_go_to_their_poses_grippers_open_and_a_mux_names_who_commands(
     open_page: Callable[..., Page], robot: FakeGateway
 ) -> None:

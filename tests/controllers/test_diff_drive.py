@@ -16,6 +16,7 @@ from rbxcompose.domains.servos.controller_manager import SwitchControllers
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from tests.controllers.wheels import DISTANCE, RADIUS, STEP, Rover
+from tests.soak import rare
 
 QUARTER = 0.6, 0.15  # radius of the path [m], speed [m/s]
 UNIT = 0.02398 * RADIUS  # [m/s], the least step of a wheel's speed
@@ -34,7 +35,7 @@ def way_of_arbotix(ways: list[tuple[float, float]]) -> Pose2:
     return Pose2(x, y, heading)
 
 
-@pytest.mark.parametrize("model", ["XL430-W250", "MX-28"])
+@pytest.mark.parametrize("model", ["XL430-W250", *rare("MX-28")])
 def test_after_a_quarter_turn_at_ten_cycles_per_second_it_knows_where_it_is(model: str) -> None:
     rover, (radius, speed) = Rover(model, rate=10.0), QUARTER
     rover.drive(speed, speed / radius, radius * math.pi / 2 / speed)
@@ -138,7 +139,7 @@ def test_without_commands_it_brakes_within_its_limits() -> None:
 def test_a_timeout_of_zero_is_none() -> None:
     rover = Rover(command_timeout=0.0)
     rover.command(0.1)
-    rover.advance(5.0)
+    rover.advance(2.5)
     assert not rover.is_still
     rover.command(0.0)
     rover.advance(1.0)

@@ -70,7 +70,7 @@ class Lift:
         self.bench.advance(seconds)
 
 
-@pytest.mark.parametrize("joint", [{}, {"calibration": TABLE}, {"acceleration": 0.05}], ids=str)
+@pytest.mark.parametrize("joint", [{}, {"calibration": TABLE}, *rare({"acceleration": 0.05})], ids=str)
 @pytest.mark.parametrize("model", ["XL430-W250", *rare("MX-28")])
 def test_it_goes_where_it_should(model: str, joint: dict[str, Any]) -> None:
     lift = Lift(model=model, **joint)

@@ -22,7 +22,7 @@ ROBOT = Path("robots/cart/robot.yaml")
 TRIED = Path("missions/play.yaml")  # in which the page tells its reader to try the examples
 ENDS = ("success", "failure", "running")
 LONGEST = 500.0  # [s] of robot time
-LOW = 100.0  # [s] of robot time: the battery of a robot that begins with little is low once in it
+LOW = 45.0  # [s] of robot time: the battery of a robot that begins with little is low once in it
 SKIPS = "..."
 
 

@@ -203,6 +203,7 @@ def test_where_the_program_is_not_found_a_message_leads_to_the_settings(
     assert seen["then"][0]["message"] == SAID, "the server starts with the path that was set"
 
 
+@pytest.mark.soak  # the other button of the same message
 def test_a_program_that_was_installed_meanwhile_is_found_by_the_button(
     session: Session, quick: Path, tmp_path: Path
 ) -> None:
@@ -229,8 +230,11 @@ def test_yaml_of_others_starts_nothing(session: Session, tmp_path: Path) -> None
     ("path", "text"),
     [
         ("robots/new.yaml", ""),
-        ("elsewhere.yaml", "# yaml-language-server: $schema=../schemas/mission.schema.json\n"),
-        ("elsewhere.yaml", "# A robot.\nrbx: 1\n"),
+        pytest.param(
+            *("elsewhere.yaml", "# yaml-language-server: $schema=../schemas/mission.schema.json\n"),
+            marks=pytest.mark.soak,
+        ),
+        pytest.param("elsewhere.yaml", "# A robot.\nrbx: 1\n", marks=pytest.mark.soak),
     ],
     ids=["folder", "schema", "header"],
 )
@@ -246,5 +250,6 @@ def test_the_program_of_the_workspace_comes_first(session: Session, quick: Path,
     assert session("found", "")[0]["message"] == SAID
 
 
+@pytest.mark.soak  # the page of a mission that fails is shown above
 def test_a_mission_of_no_robot_has_a_page_that_says_so(session: Session, quick: Path) -> None:
     assert "error[RBX9040]" in session("no_robot", quick)

@@ -17,9 +17,11 @@ from rbxcompose.tools.exporting.foxglove import foxglove_layout
 from rbxcompose.tools.exporting.rviz import rviz_config
 from rbxcompose.tools.exporting.viewed_topics import driven
 from tests.shipped import ROOT, compiled
+from tests.soak import rare
 
 ROBOTS = sorted(f"robots/{path.parent.name}" for path in ROOT.glob("robots/*/robot.yaml"))
 HOUSE = "robots/house"
+SEVERAL = ("robots/turtlebot", HOUSE, "robots/pi_robot")  # with little, much, and an arm
 
 
 def plan_of(path: str) -> Plan:
@@ -74,7 +76,7 @@ def test_foxglove_shows_what_a_shipped_robot_has(repository: Path, golden: Golde
     assert {"3D", "Plot", "DiagnosticSummary", "Teleop"} <= kinds
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", [*SEVERAL, *rare(*(robot for robot in ROBOTS if robot not in SEVERAL))])
 def test_of_each_shipped_robot_only_its_topics_are_shown(repository: Path, robot: str) -> None:
     plan = plan_of(robot)
     known = topics_of(plan)

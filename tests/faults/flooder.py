@@ -1,4 +1,4 @@
-"""A program that floods a topic with what is no command: `python -m tests.faults.flooder ROUTER TOPIC RATE SECONDS`.
+"""A program that floods a topic with what is no command: `flooder.py ROUTER TOPIC RATE SECONDS`.
 
 It sends `RATE` messages a second, or as many as it can, and prints how many it has sent.
 """

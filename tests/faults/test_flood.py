@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Iterator
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
@@ -16,8 +17,10 @@ from rbxcompose.sdk.ports import Qos
 from tests.conftest import ROOT
 from tests.faults.observer import COMMAND, MOTION, Observer
 from tests.faults.patrol import Patrol
+from tests.forked import Forked
 from tests.soak import Soak
 
+FLOODER = str(Path(__file__).with_name("flooder.py"))
 RATE = 175_000  # [Hz]; beyond what a machine can send, it sends what it can
 QUICK, MANY = 2, 600  # [s]
 FEW = 30  # [s] of tokens: each costs Zenoh as much as many messages, so that a longer flood takes the whole machine
@@ -64,8 +67,8 @@ def test_a_flood_is_refused_and_told_while_the_patrol_goes_on(soak: Soak, patrol
     health = Health(observer)
     assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
     before = set(patrol.running())
-    words = [sys.executable, "-m", "tests.faults.flooder", observer.router, COMMAND, str(RATE), str(seconds)]
-    with subprocess.Popen(words, env=patrol.environment, cwd=ROOT, stdout=subprocess.PIPE, text=True) as flooder:
+    words = [sys.executable, FLOODER, observer.router, COMMAND, str(RATE), str(seconds)]
+    with Forked(words, env=patrol.environment, cwd=ROOT, stdout=subprocess.PIPE, text=True) as flooder:
         assert flooder.stdout is not None
         flooder.stdout.readline()  # it begins
         began = time.monotonic()
@@ -86,7 +89,7 @@ def test_a_flood_is_refused_and_told_while_the_patrol_goes_on(soak: Soak, patrol
     )
     soak.tell("flood of commands", sent, 0, text)
     assert refused > 1000 * seconds, text
-    assert len(told) >= TOLD * seconds - 1, f"diagnostics told of it {len(told)} times"
+    assert len(told) >= max(1, TOLD * seconds - 1), f"diagnostics told of it {len(told)} times"
     assert sum(began < at < ended for at in health.reports) >= TOLD * seconds - 1, "nobody told how the robot is"
     assert gap < LONGEST_GAP, text
     assert moving > MOVING, text

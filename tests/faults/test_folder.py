@@ -16,7 +16,7 @@ from tests.soak import rare
 
 __all__ = ["robot"]
 
-CALLERS = 4
+CALLERS = 3
 
 
 def test_of_many_that_start_it_at_once_one_does(robot: Robot) -> None:

@@ -107,7 +107,7 @@ ROBOTS = st.fixed_dictionaries({"joints": JOINTS}, optional=dict.fromkeys(("cont
 
 
 def test_whatever_is_in_a_file_the_result_is_a_manifest_or_none(soak: Soak) -> None:
-    @settings(max_examples=soak.examples(100, 3000), database=None)
+    @settings(max_examples=soak.examples(40, 3000), database=None)
     @given(TREES | ROBOTS)
     def law(tree: Any) -> None:
         with TemporaryDirectory() as folder:

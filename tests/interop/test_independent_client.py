@@ -21,9 +21,7 @@ from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.sdk.bound import Reply
 from rbxcompose.sdk.ports import Qos
-from tests.bus.conftest import Connected, Network, network
-
-__all__ = ["network"]
+from tests.bus.conftest import Connected, Network
 
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("zenoh_ros2_sdk") is None, reason="needs the package zenoh-ros2-sdk"
@@ -70,14 +68,21 @@ class Sdk:
         return self._process.stdout.readline() or '"the client has ended"'
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
+def network() -> Iterator[Network]:
+    made = Network()
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
 def ours(network: Network) -> Connected:
     return network.process()
 
 
-@pytest.fixture
-def theirs(network: Network, tmp_path: Path) -> Iterator[Sdk]:
-    made = Sdk(network, tmp_path)
+@pytest.fixture(scope="module")
+def theirs(network: Network, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Sdk]:
+    made = Sdk(network, tmp_path_factory.mktemp("home"))
     yield made
     made.close()
 

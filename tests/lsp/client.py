@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections import deque
@@ -12,6 +13,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from tests.conftest import ROOT
+from tests.forked import Forked
 
 OURS = (sys.executable, "-m", "rbxcompose", "lsp", "--stdio")
 
@@ -20,8 +22,9 @@ class Client:
     """Starts a server, ours or another, in a folder; leaving the context shuts it down and waits for its end."""
 
     def __init__(self, folder: Path, words: Sequence[str] = OURS) -> None:
-        self.process = subprocess.Popen(
-            words, cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        pipe, start = subprocess.PIPE, Forked if tuple(words[:3]) == OURS[:3] else subprocess.Popen
+        self.process: subprocess.Popen[Any] = start(
+            words, cwd=folder, env=os.environ.copy(), stdin=pipe, stdout=pipe, stderr=pipe
         )
         self.told: deque[dict[str, Any]] = deque()  # notifications that nobody has waited for yet
         self.number = 0

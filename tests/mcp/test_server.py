@@ -106,6 +106,10 @@ def test_missions_are_tested_and_tried_with_unsaved_texts(client: ToolClient, pr
     tried = client.told("dry_run", mission="patrol", robot=ROBOT, unsaved=four)
     assert (tried["outcome"], tried["story"][0]["text"]) == ("success", "1.1.1 Go to the corner: go_to corner_1")
     assert tried["time"] > 80.0
+
+
+@pytest.mark.soak  # as `plan` tells what is wrong
+def test_a_mission_that_is_not_there_is_not_tried(client: ToolClient) -> None:
     assert "did you mean 'patrol'?" in client.refusal("dry_run", mission="patrl", robot=ROBOT)
 
 
@@ -180,6 +184,7 @@ def test_the_language_the_findings_and_the_manifests_are_resources(client: ToolC
         assert client.read(uri) == f"there is no resource '{uri}'"
 
 
+@pytest.mark.soak  # how is tested without a server
 def test_an_answer_is_limited_and_says_what_is_left_out(client: ToolClient, project: Path) -> None:
     wrong = "".join(f"wrong_{number}_{'x' * 100}: 1\n" for number in range(300))
     told = client.told("check", paths=[ROBOT], unsaved=changed(project, ROBOT, "start: patrol\n", wrong))
@@ -188,6 +193,7 @@ def test_an_answer_is_limited_and_says_what_is_left_out(client: ToolClient, proj
     assert f"findings: {whole - shown} of {whole} items" in told["left_out"]
 
 
+@pytest.mark.soak  # what waits for what is tested without a server
 def test_many_calls_at_once_are_all_answered(client: ToolClient) -> None:
     assert client.at_once(3, "explain", code="RBX1001") == [False] * 3
 

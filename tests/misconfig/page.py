@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from tests.misconfig.corpus import Figures, Outcome, figures, kinds, outcomes
+from collections.abc import Sequence
+
+from tests.misconfig.corpus import Case, Figures, Outcome, figures, kinds, outcomes
 
 TOP = """# Misconfigurations
 
@@ -55,9 +57,14 @@ def _figures(count: Figures) -> list[str]:
     ]
 
 
-def _row(kind: str, about: str, found: list[Outcome]) -> str:
-    codes = sorted({code for outcome in found for _, _, code in outcome.case.expected})
+def row_start(kind: str, about: str, cases: Sequence[Case]) -> str:
+    """Return what the row of a kind says before it tells what came of its cases."""
+    codes = sorted({code for case in cases for _, _, code in case.expected})
     links = " ".join(f"[{code}](findings/{code}.md)" for code in codes)
+    return f"| `{kind}` | {about} | {len(cases)} | {links} |"
+
+
+def _row(kind: str, about: str, found: list[Outcome]) -> str:
     caught = sum(outcome.is_caught for outcome in found)
     told = "all" if caught == len(found) else f"{caught} of {len(found)}"
-    return f"| `{kind}` | {about} | {len(found)} | {links} | {told} |"
+    return f"{row_start(kind, about, [outcome.case for outcome in found])} {told} |"

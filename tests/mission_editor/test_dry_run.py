@@ -111,6 +111,7 @@ def test_the_tests_of_a_mission_run_with_coverage(editor: MissionEditor, project
     assert more["coverage"]["ways"] > told["coverage"]["ways"]
 
 
+@pytest.mark.soak  # a test that was kept runs so as well
 def test_tests_run_with_the_text_that_is_not_saved(editor: MissionEditor, project: Path) -> None:
     test = "rbx: 1\nkind: Test\nname: it_fetches\nrobot: ../robots/fetcher/robot.yaml\nmission: fetch\n"
     test += "expect:\n  outcome: success\n"

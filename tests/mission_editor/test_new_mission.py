@@ -9,11 +9,12 @@ from types import MappingProxyType
 import pytest
 
 from rbxcompose.base.requests import Refused
-from rbxcompose.compiler.compile import compile_robot, look_at_mission
+from rbxcompose.compiler.compile import look_at_mission
 from rbxcompose.tools.mission_editor.editor import MissionEditor
 from rbxcompose.tools.mission_editor.new_mission import filled, templates
 from tests.conftest import ROOT
 from tests.mission_editor.test_editor import FETCH, ROBOT, editor, project
+from tests.shipped import compiled
 
 __all__ = ["editor", "project"]
 
@@ -26,7 +27,7 @@ PI_ROBOT = ROOT / "robots/pi_robot/robot.yaml"
 def test_each_template_is_a_mission_without_findings(template: str) -> None:
     is_arm = template == "pick_and_place"
     file, profiles, name = (PI_ROBOT, ("table",), template) if is_arm else (PATROLLER, (), "patrol")
-    robot = compile_robot(str(file), environment=os.environ, profiles=profiles).robot
+    robot = compiled(str(file), environment=os.environ, profiles=profiles).robot
     assert robot is not None
     path = robot.manifest.missions[name].path
     text = filled(template, name, robot)

@@ -23,6 +23,7 @@ SOAKED = {  # of each there is another one, or what they do is tried in `tests/n
         "around_obstacles",
         "carry_a_tool",
         "carry_upright",
+        "deliver",  # in `tests/controllers/test_rover.py`
         "draw_triangle",
         "fast_and_slow",
         "fetch_and_carry",
@@ -31,16 +32,21 @@ SOAKED = {  # of each there is another one, or what they do is tried in `tests/n
         "follow_with_the_hand",
         "lead_by_hand",
         "look_around",
+        "look_at_target",
         "pedestal_pick_what_is_seen",
+        "pick_and_place",
         "pick_tagged",
         "pick_what_is_seen",
         "porter_follow_with_the_hand",
         "porter_pick_what_is_seen",
         "poses_and_gripper",
         "reach_and_shift",
+        "reach_out",
         "return_to_where_it_was",
+        "stretch_out",
         "tuck",
         "tucked_patrol",
+        "wander",
     )
 }
 PATROL = "missions/tests/patrol.test.yaml"

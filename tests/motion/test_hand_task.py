@@ -18,6 +18,7 @@ from rbxcompose.domains.arms.section_models import GraspModel
 from rbxcompose.domains.body.model import Geometry
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, PickObject, PlaceObject
 from tests.motion.pi_hand import HandBench
+from tests.soak import rare
 
 PICK, PLACE = PickObject.Goal(object="target"), PlaceObject.Goal(spot="table_right")
 ROOT = "base_footprint"
@@ -72,7 +73,7 @@ def test_it_stands_upright_again_wherever_the_arm_was_meanwhile() -> None:
     assert math.hypot(turn[0], turn[1]) < 0.01
 
 
-@pytest.mark.parametrize("shape", [Geometry("cylinder", (0.02, 0.12)), Geometry("sphere", (0.03,))])
+@pytest.mark.parametrize("shape", [Geometry("cylinder", (0.02, 0.12)), *rare(Geometry("sphere", (0.03,)))])
 def test_round_things_are_grasped_from_their_shape(shape: Geometry) -> None:
     height = 0.705 + (0.06 if shape.kind == "cylinder" else 0.03)
     placed_object = PlacedObject("target", shape, ROOT, Transform3((0.24, 0.0, height)))
@@ -83,11 +84,14 @@ def test_round_things_are_grasped_from_their_shape(shape: Geometry) -> None:
 @pytest.mark.parametrize(
     ("further", "stage", "reason", "told"),
     [
-        ((box("roof", (0.1, 0.1, 0.02), (0.24, 0, 0.85)),), "lift", "path_in_collision", "'roof' and 'target'"),
+        pytest.param((box("roof", (0.1, 0.1, 0.02), (0.24, 0, 0.85)),), "lift", "path_in_collision",
+                     "'roof' and 'target'", marks=pytest.mark.soak),
         ((box("wall", (0.02, 0.6, 0.3), (0.19, 0, 0.86)),), "grasp", "goal_in_collision", "'wall'"),
         ((box("crate", (0.1, 0.1, 0.1), (-0.1, -0.08, 0.55)),), "approach", "start_in_collision", "'crate'"),
-        ((box("lid", (0.06, 0.06, 0.01), (0.24, 0, 0.83)), box("left", (0.06, 0.01, 0.12), (0.24, 0.034, 0.765)),
-          box("right", (0.06, 0.01, 0.12), (0.24, -0.034, 0.765))), "grasp", "goal_in_collision", "'left'"),
+        pytest.param((box("lid", (0.06, 0.06, 0.01), (0.24, 0, 0.83)),
+                      box("left", (0.06, 0.01, 0.12), (0.24, 0.034, 0.765)),
+                      box("right", (0.06, 0.01, 0.12), (0.24, -0.034, 0.765))),
+                     "grasp", "goal_in_collision", "'left'", marks=pytest.mark.soak),
     ],
 )  # fmt: skip
 def test_a_blocked_table_tells_the_stage_and_the_reason(
@@ -196,7 +200,7 @@ def test_a_gripper_that_closes_farther_than_the_object_is_wide_has_missed_it() -
     assert bench.scene.objects["target"].link == ROOT
 
 
-@pytest.mark.parametrize("stage", ["open", "approach", "grasp", "close", "lift"])
+@pytest.mark.parametrize("stage", ["approach", "lift", *rare("open", "grasp", "close")])
 def test_picking_can_be_cancelled_in_each_stage(stage: str) -> None:
     bench = HandBench()
     bench.during = lambda now: bench.task.cancel() if now == stage else None
@@ -205,7 +209,7 @@ def test_picking_can_be_cancelled_in_each_stage(stage: str) -> None:
     assert is_held is (stage == "lift")  # what is held stays attached
 
 
-@pytest.mark.parametrize("stage", ["approach", "lower", "open", "retreat"])
+@pytest.mark.parametrize("stage", ["lower", "retreat", *rare("approach", "open")])
 def test_placing_can_be_cancelled_in_each_stage(stage: str) -> None:
     bench = holding()
     bench.during = lambda now: bench.task.cancel() if now == stage else None
@@ -287,7 +291,7 @@ def moving(bench: HandBench, *places: tuple[str, float] | tuple[str, None]) -> N
     bench.during = during
 
 
-@pytest.mark.parametrize("stage", ["approach", "grasp"])
+@pytest.mark.parametrize("stage", ["grasp", *rare("approach")])
 def test_an_object_that_has_moved_is_approached_again_and_grasped_where_it_is(stage: str) -> None:
     bench = HandBench()
     moving(bench, (stage, 0.03))

@@ -32,7 +32,7 @@ def test_all_limits_are_kept_from_rest_to_rest(seed: int, count: int, jerk: floa
     assert np.all(np.abs(jerks_between(found.times, found.velocities)) <= jerks * (1.0 + 1e-6))
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(SEEDS, st.integers(2, 7), st.floats(1.0, 100.0))
 def test_the_path_is_the_one_without_a_limit_of_jerk(seed: int, count: int, jerk: float) -> None:
     way = points(seed, count)

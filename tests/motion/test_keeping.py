@@ -40,7 +40,7 @@ def tilt(array: Array, other: Array) -> float:
     return math.acos(min(1.0, float((other[:3, :3] @ up)[2])))
 
 
-@settings(max_examples=3)
+@settings(max_examples=2)
 @given(st.integers(0, 2**31))
 def test_the_tip_is_kept_upright_on_the_very_curves(seed: int) -> None:
     kept = KeptTip(ARM, UPRIGHT, READY)

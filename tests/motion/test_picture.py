@@ -23,7 +23,7 @@ BALL = PlacedObject("ball", Geometry("sphere", (0.1,)), "ground", Transform3((0.
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(picture, "SIZE", 200)
+    monkeypatch.setattr(picture, "SIZE", 120)
 
 
 def shares(shown: ArmPicture) -> list[float]:

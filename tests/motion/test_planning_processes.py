@@ -23,7 +23,7 @@ from rbxcompose.runtime.processes import Process, wait_until_ended
 from tests.motion.pi_hand import made
 from tests.motion.test_ways_ahead import CONFINED, cluttered, outcome, planning
 from tests.motion.toy_arm import ended
-from tests.soak import rare
+from tests.soak import Soak, rare
 
 pytestmark = pytest.mark.timeout(100)  # each takes seconds to start
 TIMELESS = float  # a clock that stands still: so many positions are the limit, on any machine
@@ -74,9 +74,9 @@ def pair_warned() -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def both(pair_warned: list[str]) -> Iterator[list[PlanningProcess]]:
-    """Return two processes that nothing happens to."""
-    both = [started(pair_warned) for _ in range(2)]
+def both(pair_warned: list[str], soak: Soak) -> Iterator[list[PlanningProcess]]:
+    """Return processes that nothing happens to: two, where a test asks both."""
+    both = [started(pair_warned) for _ in range(soak.examples(1, 2))]
     yield both
     for process in both:
         process.close()

@@ -24,6 +24,7 @@ from rbxcompose.domains.arms.motion.pose_search import Posture, searched
 from tests.body.kinematics import Three, matrix
 from tests.motion.test_inverse_kinematics import ARM, DESCRIPTION, GROUP, SPACE
 from tests.motion.toy_arm import Array, ended
+from tests.soak import rare
 
 SEEDS = st.integers(0, 2**31)
 KINDS = st.sampled_from(({}, {"any_orientation": True}, {"any_position": True}))
@@ -31,7 +32,7 @@ OTHERS = Three(DESCRIPTION)
 LEFT = 0.7  # [rad] that the first joint does not turn beyond where that counts
 
 
-@pytest.fixture(scope="module", params=["plain", "compiled"])
+@pytest.fixture(scope="module", params=["compiled", *rare("plain")])
 def arm(request: pytest.FixtureRequest) -> ArmKinematics:
     """Return the arm, which searches by plain or by compiled code."""
     return ARM if request.param == "plain" else fast()

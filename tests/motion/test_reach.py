@@ -41,7 +41,7 @@ def found(seed: int, samples: int = 3_000, cut: Cut | None = None) -> ReachMap:
 def test_inverse_kinematics_reaches_each_cell_that_is_told_as_reached(seed: int) -> None:
     there = found(seed)
     assert len(there.cells) > 50
-    for cell, reached_cell in list(there.cells.items())[::10]:
+    for cell, reached_cell in list(there.cells.items())[::30]:
         assert np.abs(np.array(TOY.tip_pose(reached_cell.values).translation) / SIDE - cell).max() <= 0.5
         assert gap(TOY.body, reached_cell.values) > -1e-3
         assert not PLANNER.space.outside(reached_cell.values)

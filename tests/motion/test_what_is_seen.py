@@ -32,6 +32,7 @@ from tests.body.kinematics import description_of
 from tests.motion.test_coal_shapes import OBJ
 from tests.motion.test_sphere_trees import on_surface
 from tests.parts.project import Project
+from tests.soak import rare
 
 Array = NDArray[np.float64]
 NUMBERS = st.floats(-1.0, 1.0).map(lambda value: round(value, 3))
@@ -98,7 +99,7 @@ def _points(shape: Shape, rng: np.random.Generator) -> Array:
     return np.array([shape.origin.apply((x, y, z)) for x, y, z in points.tolist()])
 
 
-@pytest.mark.parametrize("planner", ["rrt_connect", FAST])
+@pytest.mark.parametrize("planner", [FAST, *rare("rrt_connect")])
 def test_what_is_seen_passes_a_pole_that_it_would_hit_otherwise(planner: str, tmp_path: Path) -> None:
     clear = {cover: _is_seen_clear_of_a_pole(cover, planner, tmp_path) for cover in ("collision", "visual")}
     assert clear == {"collision": False, "visual": True}

@@ -6,7 +6,7 @@ import shutil
 import time
 import traceback
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -39,9 +39,9 @@ class Found:
 
 
 class Project:
-    """The manifests in a folder of their own."""
+    """The manifests in a folder of their own; all robots are tried, or these, with the files that they read."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, robots: Collection[str] = ()) -> None:
         self.folder = folder
         self.files = originals()
         for name, data in self.files.items():
@@ -49,8 +49,12 @@ class Project:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
         shutil.copytree(ROOT / "parts/body", folder / "parts/body")  # as they are
-        self.unchanged = {name: self.compile(name) for name in self.files if name.endswith("robot.yaml")}
+        names = robots or [name for name in self.files if name.endswith("robot.yaml")]
+        self.unchanged = {name: self.compile(name) for name in names}
         self.read = {name: self.read_by(out) for name, out in self.unchanged.items()}
+        if robots:
+            read = set[str]().union(*self.read.values())
+            self.files = {name: data for name, data in self.files.items() if name in read}
 
     def read_by(self, out: Compilation) -> set[str]:
         """Return the files that a robot is made of, itself included."""

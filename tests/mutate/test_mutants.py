@@ -15,7 +15,9 @@ from tests.mutate.project import Found, Project
 from tests.soak import Soak
 
 FOUND = Path(__file__).parent / "found"
-QUICK, MANY = 4, 20_000
+QUICK, MANY = 12, 20_000
+OFTEN = ("robots/rooms/robot.yaml", "robots/turtlebot/robot.yaml")
+"""Robots that are tried without `--soak`."""
 
 
 def try_seeds(seeds: range) -> Found:
@@ -41,8 +43,8 @@ def keep(found: Found) -> None:
 
 
 @pytest.fixture(scope="module")
-def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
-    return Project(tmp_path_factory.mktemp("project"))
+def project(tmp_path_factory: pytest.TempPathFactory, soak: Soak) -> Project:
+    return Project(tmp_path_factory.mktemp("project"), () if soak.is_on else OFTEN)
 
 
 @pytest.mark.timeout(0)

@@ -48,7 +48,7 @@ def touches(grid: GridMap, poses: list[Pose2]) -> bool:
 
 
 @given(PLACES, PLACES, st.sampled_from([THROUGH_GAP, THROUGH_HOUSE]))
-@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
+@settings(max_examples=3, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
 def test_a_long_robot_reaches_goals_and_no_corner_of_it_touches_anything(
     start: Pose2, goal: Pose2, costs: LayeredCosts
 ) -> None:
@@ -86,7 +86,7 @@ def test_a_goal_at_which_the_robot_only_fits_along_a_wall_takes_its_heading_into
 
 
 @given(PLACES)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=8 * settings().max_examples)
 def test_the_clearance_of_a_pose_is_positive_only_if_nothing_touches_the_robot(pose: Pose2) -> None:
     clearance, (depth, _) = THROUGH_HOUSE.clear_at(pose), overlap(HOUSE, [], LONG, pose)
     assert depth == 0 or clearance < 0.005

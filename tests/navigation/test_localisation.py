@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
@@ -22,7 +22,6 @@ from rbxcompose.domains.worlds.world import SimulatedWorld
 from rbxcompose.domains.worlds.world_file import PERSON, read_world
 from rbxcompose.manifest.documents import Documents
 from tests.navigation.houses import ONE_WALL
-from tests.soak import rare
 
 ANGLES = np.linspace(-math.pi, math.pi, 180, endpoint=False)
 LASER = Pose2(0.1, 0.0, 0.0)
@@ -106,7 +105,8 @@ def test_people_around_the_robot_do_not_push_it_off() -> None:
     assert max(ride.errors[10:]) < 0.25
 
 
-@pytest.mark.parametrize("at", [Pose2(3.0, 3.9, 2.0), *rare(Pose2(4.7, 4.0, -1.0), Pose2(6.5, 1.2, 3.0))])
+@pytest.mark.soak  # one that was carried away does so, too
+@pytest.mark.parametrize("at", [Pose2(3.0, 3.9, 2.0), Pose2(4.7, 4.0, -1.0), Pose2(6.5, 1.2, 3.0)])
 def test_a_robot_finds_itself_from_anywhere_after_some_metres(at: Pose2) -> None:
     core = ParticleFilter(house().grid, RECOVERS)
     assert core.quality == 0.0
@@ -117,7 +117,7 @@ def test_a_robot_finds_itself_from_anywhere_after_some_metres(at: Pose2) -> None
 
 def test_a_robot_that_was_carried_away_notices_and_finds_itself_again() -> None:
     ride = from_dock(RECOVERS)
-    ride.through(ROUND[:2])
+    ride.through(ROUND[:1])
     known = ride.core.quality
     ride.at = Pose2(6.5, 1.2, 3.0)
     ride.core.see(LASER, ANGLES, ride.scan())
@@ -127,7 +127,6 @@ def test_a_robot_that_was_carried_away_notices_and_finds_itself_again() -> None:
 
 
 @given(POSES, st.lists(POSES, min_size=1, max_size=8))
-@settings(max_examples=15, deadline=None)
 def test_without_scans_the_particles_follow_odometry_in_any_direction(first: Pose2, steps: list[Pose2]) -> None:
     core = ParticleFilter(ONE_WALL, LocalisationSettings(turn_from_way=0.01, turn_from_turn=0.01, way_from_way=0.01))
     core.move(first)
@@ -193,7 +192,7 @@ def test_rays_without_echoes_are_left_out_of_a_scan() -> None:
 def test_the_same_seed_gives_the_same_poses() -> None:
     rides = [from_dock(RECOVERS), from_dock(RECOVERS)]
     for ride in rides:
-        ride.through(ROUND[:2])
+        ride.through(ROUND[:1])
     assert np.array_equal(rides[0].core.poses, rides[1].core.poses)
     assert rides[0].core.correction == rides[1].core.correction
 

@@ -29,7 +29,6 @@ name: tour
 do:
   - go_to: north
   - go_to: east
-  - go_to: south
 """
 PLACES = "places: {north: {x: 0 m, y: 2.2 m}, east: {x: 2 m, y: 0 m}, south: {x: 0 m, y: -2.2 m, heading: 180 deg}}\n"
 MAPPED = """  localisation: {type: fake}

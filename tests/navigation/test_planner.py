@@ -38,7 +38,7 @@ def test_in_the_open_it_is_straight() -> None:
 
 
 @given(PLACES, PLACES)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=3 * settings().max_examples)
 def test_no_pose_of_a_way_is_blocked_and_poses_are_close(start: Pose2, goal: Pose2) -> None:
     assume(not COSTS.is_blocked(start.x, start.y) and not COSTS.is_blocked(goal.x, goal.y))
     found = plan(COSTS, start, goal, 0.1)
@@ -71,7 +71,7 @@ def test_a_robot_that_touches_something_may_leave_it() -> None:
 
 
 @given(PLACES, PLACES)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=3 * settings().max_examples)
 def test_on_its_way_out_it_touches_nothing_more_than_at_first(start: Pose2, goal: Pose2) -> None:
     costs = LayeredCosts(HOUSE, CostSettings(radius=0.9, inflation=1.0))
     assume(costs.is_blocked(start.x, start.y) and not costs.is_wall(start.x, start.y))

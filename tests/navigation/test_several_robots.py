@@ -31,8 +31,8 @@ kind: Robot
 name: box
 world: world.yaml
 components:
-  base: {type: diff_drive_sim, rate: 25 Hz}
-  laser: {type: laser_sim, frame: base_footprint, rays: 180, rate: 5 Hz}
+  base: {type: diff_drive_sim, rate: 20 Hz}
+  laser: {type: laser_sim, frame: base_footprint, rays: 120, rate: 4 Hz}
 navigation: {}
 """
 SYSTEM = """rbx: 1

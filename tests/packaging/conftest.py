@@ -8,18 +8,25 @@ import pytest
 
 from release.build import build
 from tests.packaging.builds import NODE_MODULES
+from tests.soak import Soak
+
+MODULES = NODE_MODULES if NODE_MODULES.exists() else None
 
 
 @pytest.fixture(scope="package")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder with the wheel and the source distribution."""
     folder = tmp_path_factory.mktemp("built")
-    build(folder, node_modules=NODE_MODULES if NODE_MODULES.exists() else None)
+    build(folder, node_modules=MODULES)
     return folder
 
 
 @pytest.fixture(scope="package")
-def wheel(built: Path) -> Path:
-    """The wheel."""
+def wheel(request: pytest.FixtureRequest, soak: Soak, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel; only where tests of the source distribution run as well, both are built."""
+    if soak.is_on:
+        built: Path = request.getfixturevalue("built")
+    else:
+        build(built := tmp_path_factory.mktemp("wheel"), wheel_only=True, node_modules=MODULES)
     [wheel] = built.glob("*.whl")
     return wheel

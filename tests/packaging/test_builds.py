@@ -74,7 +74,7 @@ def test_the_wheel_alone_makes_checks_and_runs_a_robot(wheel: Path, tmp_path: Pa
     assert done.returncode == 0, done.stderr
     (empty := tmp_path / "empty").mkdir()
     program = str(python.with_name("rbxcompose"))
-    for words in (["new", "robot", "x", "--yes"], ["check"], ["up", "--for", "3s", "--rate", "max"]):
+    for words in (["new", "robot", "x", "--yes"], ["check"], ["up", "--for", "1s", "--rate", "max"]):
         said = subprocess.run(
             [program, *words], cwd=empty, env=without_ours(tmp_path), capture_output=True, text=True, check=False
         )

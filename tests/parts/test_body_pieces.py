@@ -20,6 +20,7 @@ from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.urdf import read_body
 from rbxcompose.domains.body.xacro import Expanded, XacroFile, expand_all
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
+from tests.soak import rare
 
 PARTS = Path(__file__).parents[2] / "parts"
 HERE = Span("robot.yaml", 1, 1, 1, 1)
@@ -47,6 +48,8 @@ WHOLE: dict[str, tuple[str, list[str], list[str], tuple[float, float]]] = {  # r
     "parallel_gripper": ("link", ["right_finger_link", "grasp"], ["left_finger_joint"], (1, 2)),
     "gripper": ("link", ["static_finger_link", "finger_link", "grasp"], ["finger_joint"], (0.1, 0.3)),
 }
+OFTEN = ("box_base", "cylinder_base", "arm", "lift")
+"""Those that are tried in other sizes; others are under `--soak` alone."""
 PIECES = sorted(path.name.split(".")[0] for path in PARTS.glob("body/*.urdf.xacro"))
 MIRRORED = {f"{text}_joint" for text in ARM} - {"shoulder_lift_joint", "forearm_flex_joint"}  # turn the other way
 
@@ -72,7 +75,7 @@ def xacro(name: str, arguments: dict[str, str]) -> XacroFile:
 @pytest.fixture(scope="module", autouse=True)
 def _expanded_at_once() -> None:
     """Expand all pieces in one process; its answers are kept."""
-    expand_all([xacro(name, arguments) for name in WHOLE for arguments in ({}, scaled(name))])
+    expand_all([*(xacro(name, {}) for name in WHOLE), *(xacro(name, scaled(name)) for name in OFTEN)])
 
 
 @cache
@@ -123,7 +126,7 @@ def test_a_piece_has_its_frames_joints_and_mass(name: str) -> None:
     assert least <= sum(link.inertial.mass for link in body.links.values() if link.inertial) <= most
 
 
-@pytest.mark.parametrize("name", WHOLE)
+@pytest.mark.parametrize("name", [*OFTEN, *rare(*(name for name in WHOLE if name not in OFTEN))])
 def test_a_piece_may_have_other_sizes(name: str) -> None:
     usual, other = piece(name), piece(name, **scaled(name))
     assert other.links.keys() == usual.links.keys()

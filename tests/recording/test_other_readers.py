@@ -16,6 +16,7 @@ from rbxcompose.runtime.recording.reader import RecordingReader
 from tests.forked import run_command
 from tests.shipped import ROOT
 
+SHORT = "--set=missions.patrol.with.rounds=1", "--set=components.battery.runtime=20s"  # it recharges all the same
 pytestmark = pytest.mark.timeout(100)
 
 
@@ -25,7 +26,7 @@ def tape(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("tape")
     path = folder / "patrol.mcap"
     # In a process of its own: a robot forks, and this one may have had sessions of Zenoh, whose threads forbid that.
-    up = ("up", str(ROOT / "robots/turtlebot"), "--rate", "max", "--record", str(path))
+    up = ("up", str(ROOT / "robots/turtlebot"), "--rate", "max", "--record", str(path), *SHORT)
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder)}
     run_command(up, environment, 60.0).check_returncode()
     return path

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from rbxcompose.base.requests import Refused
-from tests.robot_editor.test_robot_editor import ask, editor_of, save
+from tests.robot_editor.test_robot_editor import Refuser, ask, editor_of, save, written
 
 BUILT = """rbx: 1
 kind: Robot
@@ -37,12 +37,17 @@ body:
 XTION = "rbx:parts/xtion.yaml"
 
 
+FILES = {"robots/fetcher/robot.yaml": BUILT, "parts/pole.yaml": POLE}
+
+
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
-    for file, text in {"robots/fetcher/robot.yaml": BUILT, "parts/pole.yaml": POLE}.items():
-        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / file).write_text(text, encoding="utf-8")
-    return tmp_path
+    return written(tmp_path, FILES)
+
+
+@pytest.fixture(scope="module")
+def refuser(tmp_path_factory: pytest.TempPathFactory) -> Refuser:
+    return Refuser(written(tmp_path_factory.mktemp("refused"), FILES), "include")
 
 
 def part(name: str, op: str = "set", **values: Any) -> dict[str, Any]:
@@ -143,10 +148,10 @@ def test_a_part_is_taken_off_and_what_it_carried_is_named(project: Path) -> None
         ({"op": "rename", "path": ["include", "torso"], "name": "trunk"}, "only values can be changed"),
     ],
 )
-def test_what_is_no_change_of_a_part_is_refused(project: Path, change: dict[str, Any], why: str) -> None:
+def test_what_is_no_change_of_a_part_is_refused(refuser: Refuser, change: dict[str, Any], why: str) -> None:
     with pytest.raises(Refused, match=why):
-        save(editor_of(project), change, subject="include")
-    assert text_of(project) == BUILT
+        refuser.save(change)
+    assert text_of(refuser.project) == BUILT
 
 
 def test_a_link_that_is_not_there_is_found(project: Path) -> None:

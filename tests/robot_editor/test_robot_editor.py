@@ -39,16 +39,19 @@ FETCH = "rbx: 1\nkind: Mission\nname: fetch\ndo:\n  - go_to: table\n"
 Json = dict[str, Any]
 
 
+def written(folder: Path, files: dict[str, str]) -> Path:
+    for file, text in files.items():
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        (folder / file).write_text(text, encoding="utf-8")
+    return folder
+
+
+FILES = {"robots/fetcher/robot.yaml": ROBOT, "parts/rooms.yaml": ROOMS, "missions/fetch.yaml": FETCH}
+
+
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
-    for file, text in {
-        "robots/fetcher/robot.yaml": ROBOT,
-        "parts/rooms.yaml": ROOMS,
-        "missions/fetch.yaml": FETCH,
-    }.items():
-        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / file).write_text(text, encoding="utf-8")
-    return tmp_path
+    return written(tmp_path, FILES)
 
 
 @pytest.fixture
@@ -72,6 +75,22 @@ def ask(editor: RobotEditor, do: str, *changes: Json, subject: str = "places", *
 def save(editor: RobotEditor, *changes: Json, subject: str = "places") -> Any:
     hashes = ask(editor, "look", subject=subject)["hashes"]
     return ask(editor, "save", *changes, subject=subject, hashes=hashes)
+
+
+class Refuser:
+    """An editor that saves nothing of what it is asked for: it looks once, for many changes."""
+
+    def __init__(self, project: Path, subject: str) -> None:
+        self.project, self.editor, self.subject = project, editor_of(project), subject
+        self.hashes = ask(self.editor, "look", subject=subject)["hashes"]
+
+    def save(self, change: Json) -> None:
+        ask(self.editor, "save", change, subject=self.subject, hashes=self.hashes)
+
+
+@pytest.fixture(scope="module")
+def refuser(tmp_path_factory: pytest.TempPathFactory) -> Refuser:
+    return Refuser(written(tmp_path_factory.mktemp("refused"), FILES), "places")
 
 
 def place(name: str, op: str = "set", **values: Any) -> Json:
@@ -209,12 +228,10 @@ def test_if_one_of_two_files_cannot_be_written_neither_is(
         ({"op": "eat", "path": ["places", "dock"]}, "no change of a robot"),
     ],
 )
-def test_what_is_no_change_is_refused_with_the_reason(
-    editor: RobotEditor, project: Path, change: Json, why: str
-) -> None:
+def test_what_is_no_change_is_refused_with_the_reason(refuser: Refuser, change: Json, why: str) -> None:
     with pytest.raises(Refused, match=why):
-        save(editor, change)
-    assert text_of(project) == ROBOT
+        refuser.save(change)
+    assert text_of(refuser.project) == ROBOT
 
 
 def test_too_many_changes_are_refused(editor: RobotEditor) -> None:

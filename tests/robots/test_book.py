@@ -55,7 +55,7 @@ def test_a_robot_has_no_findings(robot: str) -> None:
     assert list(compiled(robot, "tired").report) == []
 
 
-@pytest.mark.parametrize("robot", ["rooms", *rare("patroller")])
+@pytest.mark.parametrize("robot", rare("rooms", "patroller"))  # three missions of the first are run below
 def test_each_mission_does_what_it_should(robot: str, subtests: pytest.Subtests) -> None:
     for mission in missions_of(robot):
         with subtests.test(mission):
@@ -82,6 +82,7 @@ def test_a_chore_is_never_done_at_the_dock() -> None:
         assert " Go to " in did[at + 1]
 
 
+@pytest.mark.soak  # a test of its mission says so, too
 def test_the_cleaning_machine_runs_the_house_in_its_fixed_order() -> None:
     did = told(ran("rooms", "clean_house_machine"))
     rooms = [text.partition(" Go to ")[2] for text in did if " Go to " in text]

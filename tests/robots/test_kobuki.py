@@ -121,7 +121,7 @@ def test_it_bumps_backs_off_turns_away_and_goes_on(folder: Path) -> None:
     assert robot.pose.distance(before) > 0.1
 
 
-@pytest.mark.parametrize(("y", "side"), [(-0.15, -1), (0.15, 1)])
+@pytest.mark.parametrize(("y", "side"), [(-0.15, -1), pytest.param(0.15, 1, marks=pytest.mark.soak)])
 def test_it_turns_away_from_the_side_on_which_it_bumps(folder: Path, y: float, side: int) -> None:
     post = WALL.replace(
         "{box: [20 cm, 4 m, 50 cm], at: {x: 1 m}}", "{cylinder: {radius: 5 cm, length: 1 m}, at: {x: 1 m}}"
@@ -173,6 +173,7 @@ def test_a_base_that_check_does_not_warn_of_stops_before_any_edge(
         assert not world.over_holes(base.pose, wheels).any()
 
 
+@pytest.mark.soak  # priorities are tried in `tests/mux`
 def test_a_joystick_wins_over_wandering_and_loses_to_safety(folder: Path) -> None:
     robot = Kobuki(plan_in(WALL, folder))
     robot.drive(1.0, wander=0.3)

@@ -51,12 +51,17 @@ def driver(name: str, profile: str = "") -> Any:
         ("pi_robot", "", PI),
         ("head_only", "", HEAD),
         ("pedestal_pi", "", PI),
-        ("pedestal_pi", "head_only", HEAD),
         ("pedestal_pi", "no_gripper", {name: id_ for name, id_ in PI.items() if id_ != 9}),
-        ("box_robot", "pan_tilt_head", HEAD),
-        ("box_robot", "telescoping", PI),
         ("box_robot", "two_arms", PI | LEFT),
-        ("porter", "", PORTER),
+        *(
+            pytest.param(*values, marks=pytest.mark.soak)
+            for values in (
+                ("pedestal_pi", "head_only", HEAD),
+                ("box_robot", "pan_tilt_head", HEAD),
+                ("box_robot", "telescoping", PI),
+                ("porter", "", PORTER),
+            )
+        ),
     ],
 )
 def test_one_bus_has_all_joints_of_all_parts(name: str, profile: str, ids: dict[str, int]) -> None:

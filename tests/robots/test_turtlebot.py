@@ -89,9 +89,11 @@ def test_it_docks_when_the_battery_is_low_and_resumes_at_the_corner_that_was_cut
 
 
 def test_two_runs_write_the_same_log_to_the_byte() -> None:
-    assert ran().log == run_again().log
+    once = "missions.patrol.with.rounds=1"
+    assert ran(once).log == run_again(once).log
 
 
+@pytest.mark.soak  # `--set` has tests of its own
 def test_a_corner_that_was_moved_is_visited_where_it_is_now() -> None:
     run = ran("places.corner_4.x=-50 cm", "missions.patrol.with.rounds=1")
     assert pose(run.bench).distance(Pose2(-0.5, 0.0)) < 0.05
@@ -107,7 +109,8 @@ def test_the_threshold_decides_how_often_it_docks() -> None:
 
 
 def test_a_profile_changes_the_robot() -> None:
-    docked = [sum(text == "2.1.2 Recharge" for text in done(ran(profiles=profiles))) for profiles in ((), ("tired",))]
+    runs = [ran("missions.patrol.with.rounds=1", profiles=profiles) for profiles in ((), ("tired",))]
+    docked = [sum(text == "2.1.2 Recharge" for text in done(run)) for run in runs]
     assert docked[1] > docked[0]
 
 

@@ -44,6 +44,10 @@ def test_it_hauls_to_the_end_and_charges_each_battery_when_that_is_low() -> None
 
 def test_what_is_given_to_one_instance_does_not_change_the_other() -> None:
     assert charged(ran("include.lift.with.runtime=1 h")) == {"drive": 1, "lift": 0}
+
+
+@pytest.mark.soak  # `test_turtlebot` has a profile, too
+def test_a_profile_changes_both_batteries() -> None:
     assert charged(ran(profiles=("tired",)))["drive"] > 1
 
 

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -109,9 +110,11 @@ def robot(ros2_python: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterat
     (made.file.parent / "ask.yaml").write_text(MISSION)
     up = made.do("up", "-d", str(made.file))
     assert up.returncode == 0, up.stdout + up.stderr
-    until(made, lambda: "true" in made.do("service", "call", "beep").stdout)
-    yield made
-    made.do("down")
+    try:
+        until(made, lambda: "true" in made.do("service", "call", "beep").stdout)
+        yield made
+    finally:
+        made.do("down")
     used = in_use()
     for path in shared_memory() - before:  # Fast DDS leaves what killed nodes had
         if str(path).removesuffix("_el") not in used:
@@ -131,11 +134,13 @@ def in_use() -> set[str]:
     return found
 
 
-def until(robot: Robot, holds: object, rounds: int = 200) -> None:
-    """Ask again until something holds; each round takes as long as a command."""
-    for _ in range(rounds):
+def until(robot: Robot, holds: object, within: float = 60.0) -> None:
+    """Ask again until something holds; it must within so many seconds."""
+    deadline = time.monotonic() + within
+    while time.monotonic() < deadline:
         if holds():  # type: ignore[operator]
             return
+        time.sleep(0.05)
     raise AssertionError(robot.do("logs").stdout)
 
 

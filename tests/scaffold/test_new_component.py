@@ -8,6 +8,8 @@ import sys
 import tomllib
 from pathlib import Path
 
+import pytest
+
 from rbxcompose.commands.new_files import write_new
 from rbxcompose.testing import Golden
 from rbxcompose.tools.scaffold import component_files, read_component_name
@@ -67,6 +69,7 @@ def test_installed_it_is_a_type_like_any_other(tmp_path: Path) -> None:
     assert told.endswith("\n1 error; it can be fixed with 'check --fix'\n"), "the other one is fine"
 
 
+@pytest.mark.soak  # that suite tries all types that ship, and one of somebody else
 def test_it_keeps_what_every_type_keeps(tmp_path: Path) -> None:
     path = installed(tmp_path)
     suite = Path(__file__).parents[1] / "components/test_conformance.py"

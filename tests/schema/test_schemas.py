@@ -32,6 +32,7 @@ from tests.conftest import ROOT
 from tests.soak import rare
 
 NAMES = [kind.lower() for kind in makers()]
+LIKE_ROBOTS = ("part", "overlay")  # whose definitions are those of robots
 ROBOT = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
 MISSION = "rbx: 1\nkind: Mission\nname: m\n"
 
@@ -82,7 +83,11 @@ def manifests() -> list[Path]:
     return sorted(path for path in files if not path.stem.endswith("_map"))
 
 
-@pytest.mark.parametrize("path", manifests(), ids=lambda path: str(path.relative_to(ROOT)))
+@pytest.mark.parametrize(
+    "path",
+    [path if not number % 5 else pytest.param(path, marks=pytest.mark.soak) for number, path in enumerate(manifests())],
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
 def test_the_manifests_of_the_project_are_right(path: Path) -> None:
     assert mistakes(path.read_text(encoding="utf-8")) == []
 
@@ -96,7 +101,7 @@ def test_the_files_are_small() -> None:
     assert sum(len(text.encode()) for text in texts().values()) <= 370_000
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*(name for name in NAMES if name not in LIKE_ROBOTS), *rare(*LIKE_ROBOTS)])
 def test_a_schema_and_its_definitions_are_of_draft_7(name: str) -> None:
     for schema in [schemas()[name], *schemas()[name]["$defs"].values()]:
         Draft7Validator.check_schema(schema)

@@ -5,14 +5,18 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Self
 
+from tests.forked import Forked
+
 SWITCH, DEVICE = "switch", "cable"
 PATIENCE = 10.0  # [s] for what is asked to end
 _OWN_MEMORY = 'mount -t tmpfs tmpfs /dev/shm && exec "$@"'  # hosts share no memory
+_INSIDE = str(Path(__file__).with_name("inside.py"))
 _NUMBERS = iter(range(1000))
 
 
@@ -82,8 +86,12 @@ class Hosts:
         """Start a command on a host; what it prints is collected."""
         folder = self.folder / host
         own = {"XDG_RUNTIME_DIR": folder, "TMPDIR": folder / "temporary", "XDG_CONFIG_HOME": folder / "config"}
-        process = subprocess.Popen(
-            ["ip", "netns", "exec", self.namespace(host), "sh", "-c", _OWN_MEMORY, "sh", *words],
+        namespace, python = self.namespace(host), (sys.executable, "-m")
+        command = ["ip", "netns", "exec", namespace, "sh", "-c", _OWN_MEMORY, "sh", *words]
+        # Any other variable, such as `LD_PRELOAD`, may be for the start itself.
+        is_forked = words[:2] == python and not (environment or {}).keys() - {"PYTHONPATH"}
+        process = (Forked if is_forked else subprocess.Popen)(
+            [sys.executable, _INSIDE, namespace, *words[2:]] if is_forked else command,
             env={
                 **os.environ,
                 **{name: str(path) for name, path in own.items()},

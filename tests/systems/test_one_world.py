@@ -103,7 +103,7 @@ class Hall:
 def test_robots_that_drive_at_each_other_stop_where_they_touch_and_feel_it(tmp_path: Path) -> None:
     hall = Hall(tmp_path)
     pressed = {name: robot.collect("/bumper", Switches) for name, robot in hall.bench.robots.items()}
-    assert hall.drive(6.0, a=0.5, b=0.3) > -OVERLAP
+    assert hall.drive(3.0, a=0.5, b=0.3) > -OVERLAP
     assert abs(hall.apart("a", "b")) < OVERLAP
     assert {name: {message.data for message in heard} for name, heard in hall.touched.items()} == {
         "a": {"b"},
@@ -148,7 +148,7 @@ def test_a_robot_that_says_nothing_stands_where_it_was_and_is_reported(tmp_path:
 def test_two_runs_are_alike(tmp_path: Path) -> None:
     def driven() -> tuple[list[Pose2], list[str]]:
         hall = Hall(tmp_path, SYSTEM + THIRD)
-        hall.drive(3.0, a=0.5, b=0.4, c=0.3)
+        hall.drive(2.0, a=0.5, b=0.5, c=0.3)
         logs = [record.to_json() for robot in hall.bench.robots.values() for record in robot.records]
         return [hall.base(name).core.pose for name in "abc"], logs
 
@@ -179,7 +179,7 @@ def test_starts_that_cannot_be_are_findings(tmp_path: Path, old: str, new: str, 
 def test_in_physics_robots_stop_at_each_other_too(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     hall = Hall(tmp_path, robot=ROBOT + "simulator: physics\n")
-    assert hall.drive(5.0, a=0.5, b=0.3) > -0.02
+    assert hall.drive(3.0, a=0.5, b=0.3) > -0.02
     assert abs(hall.apart("a", "b")) < 0.02
     assert hall.touched["a"][0] == String(data="b")
 

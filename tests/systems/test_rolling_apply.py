@@ -49,6 +49,7 @@ def test_all_hosts_change_or_none_unless_in_part(patrol: PatrolOnHosts) -> None:
     run("down", "system.yaml")
 
 
+@pytest.mark.soak  # `tests/runtime/test_other_hosts` tells when a robot waits for another host
 @pytest.mark.timeout(150)
 def test_the_robot_starts_without_an_optional_host_which_joins_later(patrol: PatrolOnHosts) -> None:
     patrol.change_system("  d: {}", "  d: {optional: true}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -15,9 +16,11 @@ import pytest
 from rbxcompose.bus.zenoh_session import tls_settings
 from rbxcompose.compiler.systems.certificates import make_authority, make_certificate, tls_of
 from tests.conftest import ROOT
+from tests.forked import Forked
 from tests.soak import rare
 from tests.systems.test_links import free_port
 
+ROUTER = str(Path(__file__).with_name("linked_router.py"))
 pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl")
 
 
@@ -43,8 +46,9 @@ class Routers:
 
     def start(self, listen: str, dial: str, tls: Mapping[str, object]) -> tuple[subprocess.Popen[str], str]:
         """Return a router's process, whose further output are those that it is linked with, and its identity."""
-        words = [sys.executable, "-m", "tests.systems.linked_router", listen, dial, json.dumps(tls)]
-        process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT)
+        words = [sys.executable, ROUTER, listen, dial, json.dumps(tls)]
+        pipe = subprocess.PIPE
+        process = Forked(words, stdin=pipe, stdout=pipe, text=True, cwd=ROOT, env=os.environ)
         self._until.enter_context(process)
         self._until.callback(process.kill)
         assert process.stdout

@@ -56,8 +56,8 @@ def test_one_command_starts_shows_stops_and_ends_the_robot_on_all_hosts_over_ssh
         assert "40 %" in run("param", "get", "battery", "warn", "--robot", "system.yaml")
         assert "diff_drive_sim" in run("top", "system.yaml")
         assert "is there" in run("logs", "system.yaml")
-    run("param", "set", "battery", "runtime", "500 s", "--robot", "system.yaml")
-    assert "500 s" in run("param", "get", "battery", "runtime", "--robot", "system.yaml"), "it is on the other host"
+        run("param", "set", "battery", "runtime", "500 s", "--robot", "system.yaml")
+        assert "500 s" in run("param", "get", "battery", "runtime", "--robot", "system.yaml"), "it is on the other host"
     assert "stopped" in run("stop", "system.yaml")
     assert all(state is not None and state.stop is not None for state in map(patrol.state, ADDRESSES))
     assert "released" in run("release", "--robot", "system.yaml")

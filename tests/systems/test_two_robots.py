@@ -31,6 +31,7 @@ do:
 """
 
 
+@pytest.mark.soak  # goals end with a link in `test_shared_calls`, and the base stands in time in `test_two_hosts`
 @pytest.mark.timeout(100)
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl")
 def test_a_robot_stops_in_time_if_the_one_that_sent_it_is_cut_off_and_stays_there(tmp_path: Path) -> None:

@@ -95,6 +95,7 @@ def test_its_robot_is_checked_and_its_mission_runs_to_the_end_and_its_component_
     assert "/lamp/light" in differs
 
 
+@pytest.mark.soak  # skills of components in other processes are tried with ours
 def test_its_orders_and_their_ends_go_from_one_process_to_another(installed: Installed) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

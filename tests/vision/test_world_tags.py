@@ -19,8 +19,9 @@ from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.vision_msgs import Detection3DArray
 from tests.navigation.test_eyes import LEVEL
 from tests.navigation.test_robot import Room
-from tests.navigation.test_sensors import SIMULATORS, skip_without_pictures
+from tests.navigation.test_sensors import skip_without_pictures
 from tests.parts.project import Project
+from tests.soak import rare
 
 cv2 = pytest.importorskip("cv2", reason="OpenCV is not installed")
 CAMERA = Intrinsics.of_view(640, 480, math.radians(60))
@@ -101,7 +102,7 @@ objects:
 """
 
 
-@SIMULATORS
+@pytest.mark.parametrize("simulator", ["physics", *rare("ideal")])
 def test_a_camera_sees_tags_of_what_stands_what_is_loose_and_who_walks(tmp_path: Path, simulator: str) -> None:
     (tmp_path / "robots/one").mkdir(parents=True)
     (tmp_path / "robots/one/eye.urdf").write_text(LEVEL)

@@ -40,7 +40,7 @@ def shot(world: SimulatedWorld, x: float = 0, y: float = 0, heading: float = 0, 
     return WorldView(world).seen(optical(x, y, heading), CAMERA, time, 50.0)
 
 
-@settings(max_examples=60)
+@settings(max_examples=4 * settings().max_examples)
 @given(grids(), shapes(), st.floats(-2, 2), st.floats(-2, 2), ANGLES)
 def test_depths_are_those_of_the_laser(
     grid: GridMap, found: tuple[WorldShape, ...], x: float, y: float, heading: float
