@@ -16,7 +16,7 @@ from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.navigation.costs import CostSettings, LayeredCosts
 from rbxcompose.domains.navigation.follower import FollowState
 from rbxcompose.domains.navigation.manoeuvres import Manoeuvre, ManoeuvreState, SpinManoeuvre
-from rbxcompose.domains.navigation.planner import NoPathError, plan
+from rbxcompose.domains.navigation.planner import NoPathError, PlannedPath, plan
 from rbxcompose.domains.worlds.contact import first_contact, overlap
 from rbxcompose.domains.worlds.grid_map import GridMap, map_files
 from rbxcompose.domains.worlds.shapes import PolygonFootprint
@@ -109,6 +109,14 @@ def test_a_long_robot_does_not_turn_where_a_corner_of_it_would_touch_a_wall() ->
     assert state is ManoeuvreState.BLOCKED
     assert pose.heading < math.radians(120)
     assert moved(SpinManoeuvre(math.pi, 1.0, 1.5), Pose2(-1.5, 0.0), THROUGH_GAP)[1] is ManoeuvreState.DONE
+
+
+def test_a_way_is_blocked_where_the_robot_would_come_to_a_turn_with_a_corner_in_something() -> None:
+    turn = Pose2(2.5, 0.0, math.pi / 2)  # beside a wall
+    way = PlannedPath((Pose2(2.0, 0.0), turn, Pose2(2.5, 0.5, math.pi / 2)))
+    assert THROUGH_GAP.clear_at(*way.poses) > 0
+    assert way.is_blocked(Pose2(2.0, 0.0), THROUGH_GAP)
+    assert not way.is_blocked(turn, THROUGH_GAP)
 
 
 @pytest.mark.soak

@@ -44,7 +44,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/devices": Cost(code=1966, files=23, small=0, imports=211),
     "domains/diagnostics": Cost(code=2354, files=24, small=4, imports=214),
     "domains/muxes": Cost(code=2044, files=14, small=1, imports=117),
-    "domains/navigation": Cost(code=4042, files=30, small=2, imports=385),
+    "domains/navigation": Cost(code=4045, files=30, small=2, imports=385),
     "domains/policies": Cost(code=856, files=9, small=0, imports=91),
     "domains/power": Cost(code=461, files=6, small=0, imports=37),
     "domains/programs": Cost(code=3909, files=30, small=1, imports=398),
@@ -62,7 +62,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 115508,
+    "lines of code": 115511,
     "files": 948,
     "files of 1 to 30 lines of code": 75,
     "lines of imports": 11330,

@@ -26,6 +26,7 @@ SLOWEST = 0.25  # share of the speed that costs and curves leave
 WALKS, REACTS = 0.8, 0.3  # [m/s] of people indoors, [s] until a scan has an effect
 SEARCHED = 1.5  # [m] of the way ahead in which the robot's place on it is searched
 IN_CORNER = 0.02  # [m] before a corner in which the robot turns on the spot that it is there
+LAG = 0.1  # [s] from a pose until the command that follows from it has an effect
 SETTLED = 2.5  # tolerances from the goal at which it is driven to directly
 
 
@@ -208,7 +209,7 @@ class PathFollower:
         self._at += int(np.hypot(near[:, 0] - pose.x, near[:, 1] - pose.y).argmin())
         self.left = self._until = float(self._behind[-1] - self._behind[self._at])
         if corner is not None:
-            self._until = math.dist((pose.x, pose.y), self._points[corner].tolist()) - IN_CORNER
+            self._until = math.dist((pose.x, pose.y), self._points[corner].tolist()) - IN_CORNER - LAG * self._speed
 
     def _carrot(self, pose: Pose2, reach: float, corner: int | None) -> tuple[float, float]:
         """Return how far the place on the way is that lies `reach` [m] ahead, and its bearing [rad].

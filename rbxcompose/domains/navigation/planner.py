@@ -55,6 +55,13 @@ class PlannedPath:
         """Return how long it is [m]."""
         return sum(before.distance(after) for before, after in pairwise(self.poses))
 
+    def is_blocked(self, pose: Pose2, costs: LayeredCosts) -> bool:
+        """Return whether something is on the rest of it, which a robot comes to with the heading of the pose before."""
+        near = min(range(len(self.poses)), key=lambda index: self.poses[index].distance(pose))
+        rest = self.poses[near:]
+        arrivals = [Pose2(after.x, after.y, before.heading) for before, after in pairwise(rest)]
+        return costs.clear_at(*rest, *arrivals) < 0
+
 
 def plan(costs: LayeredCosts, start: Pose2, goal: Pose2, tolerance: float) -> PlannedPath:
     """Return the cheapest way from a pose to another in `map`, or to a place within `tolerance` [m] of it.

@@ -368,7 +368,7 @@ class Navigator(sdk.Component[NavigatorConfig]):
             self.aim_at_next()
         if self.now - self.looked >= AGAIN:
             self.looked = self.now
-            if self.path is None or self.approaches or self.is_blocked(self.path, pose, costs):
+            if self.path is None or self.approaches or self.path.is_blocked(pose, costs):
                 self.find_way(goal, pose, costs)
         if self.path is None:
             if goal is self.goal:
@@ -506,11 +506,6 @@ class Navigator(sdk.Component[NavigatorConfig]):
             self.approaches = False
         self.follower.start(self.path)
         self.plan(path_message(self.path, Header(stamp=to_time(self.stamp), frame_id=MAP_FRAME)))
-
-    def is_blocked(self, path: PlannedPath, pose: Pose2, costs: LayeredCosts) -> bool:
-        """Return whether something is on the rest of the way."""
-        near = min(range(len(path.poses)), key=lambda index: path.poses[index].distance(pose))
-        return costs.clear_at(*path.poses[near:]) < 0
 
     def wait(self, goal: NavigatorGoal, why: str) -> None:
         """Stand until there is a way, but not for ever."""
