@@ -136,7 +136,6 @@ def test_a_run_that_is_stopped_says_where_goes_on_and_takes_steps(
     expect(step).to_be_visible()
 
 
-@pytest.mark.soak  # what is asked of the robot needs no browser
 def test_a_step_is_ended_by_hand_and_a_machine_is_brought_into_a_state(
     open_page: Callable[..., Page], patrol: FakeGateway
 ) -> None:

@@ -247,7 +247,6 @@ def test_a_grid_is_drawn_where_its_origin_and_its_frame_put_it(
     wait_for_colour(page, 0.25, 0.15, ground)
 
 
-@pytest.mark.soak  # as a grid is; where they lie needs no browser
 def test_a_path_and_a_scan_are_drawn_in_their_frames(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
     poses = [{"pose": pose(x, 0.0, 0.0)} for x in (0.0, 0.35)]
     rolling.latched["/plan"] = {"header": {"frame_id": "odom"}, "poses": poses}
@@ -374,7 +373,6 @@ def test_a_running_mission_whose_goal_would_be_replaced_is_named(
     expect(page.get_by_label("Goal")).to_contain_text("Mission Patrol is running")
 
 
-@pytest.mark.soak  # by the same drag as a goal
 def test_the_robot_is_told_where_it_is_if_something_listens(
     open_page: Callable[..., Page], rolling: FakeGateway
 ) -> None:

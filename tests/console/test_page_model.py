@@ -192,7 +192,6 @@ def test_a_robot_without_a_world_is_asked_for_nothing_of_it(open_page: Callable[
     assert not asked & {"/world", "/tf", "/tf_static", "/scan"}
 
 
-@pytest.mark.soak  # what is planned and sent needs no browser
 def test_a_goal_of_an_arm_is_planned_shown_and_executed(open_page: Callable[..., Page], crane: FakeGateway) -> None:
     page = open_page(page_name="model", reduced_motion="reduce")
     page.get_by_role("button", name="Drag its tip").click()
