@@ -98,6 +98,9 @@ class Context(Protocol):
         """Subscribe to the topic of an input, named like one of `ports` or anew, instead of what its name had before.
 
         Its messages go where those of the component's own ports go.
+
+        Raises:
+            Refused: if its topic is no name of ROS, or one on which the component itself publishes.
         """
         ...
 

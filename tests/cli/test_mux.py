@@ -84,6 +84,7 @@ def test_inputs_are_added_selected_and_deleted(robot: Robot) -> None:
         (("select", "head_vel"), "name one input of 'head_vel'"),
         (("select", "cmd_vel", "teleop"), "its mode is 'priority'"),
         (("add", "cmd_vel", "bumper"), "an input needs a priority and a timeout"),
+        (("add", "cmd_vel", "my-bumper", "--priority", "50", "--timeout", "0.2s"), "'my-bumper' cannot be the name"),
         (("unlock", "head_vel"), "nothing is locked by hand"),
     ],
 )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from rbxcompose.base.requests import Refused
+from rbxcompose.domains.muxes.components.mux import Mux
 from rbxcompose.domains.muxes.requests import (
     NONE,
     AddMuxInput,
@@ -24,7 +26,7 @@ from rbxcompose.msgs.std_msgs import Bool, Float64, String
 from rbxcompose.msgs.topic_tools_interfaces import MuxAdd, MuxDelete, MuxList, MuxSelect
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.sdk.robot_events import ComponentNoted
-from rbxcompose.testing import Bench, instance
+from rbxcompose.testing import Bench, check_text, instance
 
 SLOW, FAST, ZERO = Twist(linear=Vector3(x=0.1)), Twist(linear=Vector3(x=0.4)), Twist()
 RANKED = {"teleop": {"priority": 100, "timeout": "0.5 s"}, "navigation": {"priority": 10, "timeout": "0.5 s"}}
@@ -204,8 +206,16 @@ def test_an_input_with_a_priority_can_be_added_while_the_robot_runs() -> None:
     AddMuxInput("cmd_vel", "teleop", priority=1, timeout=1.0),
     AddMuxInput("cmd_vel", "bumper"),
     AddMuxInput("cmd_vel", "output", priority=1, timeout=1.0),
+    AddMuxInput("cmd_vel", "my-bumper", priority=1, timeout=1.0),
+    AddMuxInput("cmd_vel", "", priority=1, timeout=1.0),
+    AddMuxInput("cmd_vel", "x" * 61, priority=1, timeout=1.0),
+    AddMuxInput("cmd_vel", "bumper", "/front bumper", priority=1, timeout=1.0),
+    AddMuxInput("cmd_vel", "bumper", "x" * 250, priority=1, timeout=1.0),
+    AddMuxInput("cmd_vel", "bumper", priority=100, timeout=1.0),
+    *(AddMuxInput("cmd_vel", "bumper", priority=1, timeout=time) for time in (0.0, -1.0, math.nan, math.inf)),
     DeleteMuxInput("cmd_vel", "bumper"),
     LockMuxInputs("cmd_vel", ("bumper",)),
+    *(LockMuxInputs("cmd_vel", ("teleop",), time) for time in (0.0, -5.0, math.nan, 1e308)),
     UnlockMuxInputs("cmd_vel"),
 ])  # fmt: skip
 def test_an_order_without_a_meaning_is_refused_and_changes_nothing(order: Any) -> None:
@@ -213,7 +223,49 @@ def test_an_order_without_a_meaning_is_refused_and_changes_nothing(order: Any) -
     before = look(robot)
     with pytest.raises(Refused):
         robot.host.ask("cmd_vel", order)
+    robot.advance(0.0)
     assert look(robot) == before
+
+
+def test_no_input_takes_what_the_mux_publishes_itself(tmp_path: Path) -> None:
+    text = "bus: {namespace: rover}\nmuxes: {drive: {topic: wheels/cmd_vel, mode: select, inputs: {teleop: {}}}}\n"
+    robot = Bench(plan=check_text(f"rbx: 1\nkind: Robot\nname: helper\n{text}", tmp_path).plan)
+    for topic in ("wheels/cmd_vel", "/rover/wheels/cmd_vel", "drive/active"):
+        with pytest.raises(Refused, match=r"publishes on '/rover/.*' itself"):
+            robot.host.ask("drive", AddMuxInput("drive", "echo", topic))
+    robot.host.ask("drive", AddMuxInput("drive", "other", "/wheels/cmd_vel"))
+
+
+def test_what_was_deleted_and_added_in_its_place_outlives_a_restart() -> None:
+    robot = bench()
+    robot.host.ask("cmd_vel", DeleteMuxInput("cmd_vel", "teleop"))
+    robot.host.ask("cmd_vel", AddMuxInput("cmd_vel", "joystick", priority=100, timeout=0.5))
+    robot.host.ask("cmd_vel", AddMuxInput("cmd_vel", "teleop", "/far/teleop", priority=50, timeout=0.5))
+    before = look(robot).inputs
+    robot.host.failed("cmd_vel", RuntimeError("planted"))
+    robot.advance(1.0)
+    assert look(robot).inputs == before
+
+
+def test_what_was_selected_first_stays_deleted_after_a_restart() -> None:
+    robot = selecting()
+    robot.host.ask("cmd_vel", AddMuxInput("cmd_vel", "three"))
+    robot.host.ask("cmd_vel", SelectMuxInput("cmd_vel", "three"))
+    robot.host.ask("cmd_vel", DeleteMuxInput("cmd_vel", "one"))
+    before = look(robot)
+    robot.host.failed("cmd_vel", RuntimeError("planted"))
+    robot.advance(1.0)
+    assert (look(robot).selected, look(robot).inputs) == (before.selected, before.inputs)
+
+
+def test_an_order_that_fails_after_a_restart_is_not_repeated_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = bench()
+    robot.host.ask("cmd_vel", AddMuxInput("cmd_vel", "bumper", priority=200, timeout=0.5))
+    robot.host.ask("cmd_vel", LockMuxInputs("cmd_vel", ("teleop",)))
+    monkeypatch.setattr(Mux, "add_input", lambda *_: 1 / 0)
+    robot.host.failed("cmd_vel", RuntimeError("planted"))
+    robot.advance(2.0)
+    assert [(one.name, one.why) for one in look(robot).inputs] == [("teleop", "by hand"), ("navigation", "")]
 
 
 def test_another_configuration_keeps_what_was_selected_locked_and_added() -> None:

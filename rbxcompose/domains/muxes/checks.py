@@ -13,7 +13,7 @@ from rbxcompose.compiler.checks.wiring import is_command
 from rbxcompose.compiler.model.build import MISSION
 from rbxcompose.compiler.model.flow import Wrong, is_written, period_of, setting_span
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, resolve
-from rbxcompose.domains.muxes.config import HIGHEST, MODE_OF, OWN_NAMES, HoldFirst, MuxConfig
+from rbxcompose.domains.muxes.config import HIGHEST, MODE_OF, TIMELESS, HoldFirst, MuxConfig, is_own
 from rbxcompose.domains.muxes.core import RAMPS
 from rbxcompose.domains.muxes.requests import NONE
 from rbxcompose.domains.muxes.sections.muxes import MuxModel, muxes
@@ -60,7 +60,7 @@ def mux_name(robot: Robot) -> Iterator[Finding]:
     for mux, entry in robot.manifest.contents.of(muxes).items():
         names = [("inputs", name) for name in entry.inputs] + [("locks", name) for name in entry.locks]
         for key, name in names:
-            if name in OWN_NAMES or name.startswith("lock_"):
+            if is_own(name):
                 yield mux_name.at(
                     robot.key("muxes", mux, key, name),
                     f"mux '{mux}' needs the name '{name}' itself",
@@ -75,7 +75,7 @@ def mux_no_time(robot: Robot) -> Iterator[Finding]:
         timeouts = [("inputs", name, mux_input.timeout) for name, mux_input in entry.inputs.items()]
         timeouts += [("locks", name, lock.timeout) for name, lock in entry.locks.items()]
         for key, name, timeout in timeouts:
-            if timeout == 0 and entry.profile not in ("twist_mux", "yocs"):
+            if timeout == 0 and entry.profile not in TIMELESS:
                 yield mux_no_time.at(
                     robot.value("muxes", mux, key, name, "timeout"),
                     f"{key[:-1]} '{name}' of mux '{mux}' has no time at all",
@@ -86,17 +86,19 @@ def mux_no_time(robot: Robot) -> Iterator[Finding]:
 @check("RBX3111")
 def mux_of_mux(robot: Robot) -> Iterator[Finding]:
     """An input of a mux takes from a mux."""
-    known = robot.manifest.contents.of(muxes)
+    known, namespace = robot.manifest.contents.of(muxes), robot.manifest.bus.namespace or ""
     for mux, entry in known.items():
+        own = resolve(entry.topic or mux, namespace)
         for name, mux_input in entry.inputs.items():
-            source = mux if mux_input.topic == mux else (mux_input.source or "").partition(".")[0]
+            is_own_topic = resolve(mux_input.topic or "", namespace) == own
+            source = mux if is_own_topic else (mux_input.source or "").partition(".")[0]
             if source not in known:
                 continue
             is_loop = source == mux
             message = "takes its own output" if is_loop else f"takes from the mux '{source}'"
             inputs = ", ".join(f"'{each}'" for each in known[source].inputs)
             yield mux_of_mux.at(
-                robot.value("muxes", mux, "inputs", name, "topic" if mux_input.topic == mux else "from"),
+                robot.value("muxes", mux, "inputs", name, "topic" if is_own_topic else "from"),
                 f"input '{name}' of mux '{mux}' {message}",
                 help="remove this input" if is_loop else f"give this mux the inputs of that one: {inputs}",
                 related=[Related(robot.key("muxes", source), "the mux that it takes from")],

@@ -8,9 +8,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from rbxcompose.base.config import Acceleration, AngularAcceleration, Config, Frequency, Live, Time
+from rbxcompose.base.config import Acceleration, AngularAcceleration, Config, Frequency, Live, Name, Time
 from rbxcompose.domains.muxes import core
 from rbxcompose.domains.muxes.requests import NONE
+from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.types import Message
 
@@ -29,6 +30,13 @@ HIGHEST = 255
 """The highest priority of twist_mux."""
 OWN_NAMES = frozenset({"output", "announced", "active", "selected", "select", "add", "delete", "list"})
 """Names that a mux needs itself, below its topic or among its ports; so are those that begin with `lock_`."""
+TIMELESS: frozenset[MuxProfile] = frozenset({"twist_mux", "yocs"})
+"""Profiles in which a timeout may be 0."""
+
+
+def is_own(name: str) -> bool:
+    """Return whether a mux needs a name itself, so that no input or lock can have it."""
+    return name in OWN_NAMES or name.startswith("lock_")
 
 
 class HoldFirst(Config):
@@ -69,7 +77,7 @@ NOBODY: Mapping[MuxProfile, str] = {"yocs": "idle"}
 class MuxInputConfig(Config):
     """An input."""
 
-    topic: str | None = None
+    topic: TopicName | None = None
     """Its topic, if that is not `<output>/<name>`."""
     priority: int = 0
     """The input with the highest priority wins, where priorities count."""
@@ -79,6 +87,13 @@ class MuxInputConfig(Config):
     """Most messages from one publisher in another process; the rest is dropped and reported. Default: 1000 Hz."""
     zero_releases: bool = False
     """Whether its zero lets go of the output at once."""
+
+
+class AddedInput(MuxInputConfig):
+    """An input that is added while the robot runs."""
+
+    name: Name | None = None
+    """Its name, if that is not its topic."""
 
 
 class MuxLockConfig(Config):

@@ -373,7 +373,7 @@ class Hosted:
             self.do("start", component.start)
             self.note_start()
             for request in self._repeated:
-                self.do("command", partial(self._repeat, component, request))
+                self.do("command", partial(self._repeat, component, request, self._repeated))
         self.host.bus.open(self.instance.name)  # those who found it before it was active have waited
 
     def note_start(self) -> None:
@@ -567,8 +567,13 @@ class Hosted:
 
     def listen(self, port: In[Any]) -> None:
         """Subscribe to the topic of an input, instead of what its name had before."""
+        try:
+            topic = resolve(port.topic, self.host.plan.bus.namespace)
+        except ValueError as error:
+            raise Refused(str(error)) from error
+        if any(wire.topic == topic for wire in self.instance.wires if wire.kind == "out"):
+            raise Refused(f"'{self.instance.name}' publishes on '{topic}' itself")
         self.mute(port.name)
-        topic = resolve(port.topic, self.host.plan.bus.namespace)
         component, name = self._made(), self.instance.name
         self._ends[port.name] = component.bound[port.name] = subscribe(
             component, name, topic, port, self.host.bus, self
@@ -581,11 +586,14 @@ class Hosted:
         if end is not None:
             self.host.bus.withdraw(self.instance.name, end)
 
-    def _repeat(self, component: Component[Any], request: Command) -> None:
+    def _repeat(self, component: Component[Any], request: Command, requests: Sequence[Command]) -> None:
         try:
             component.handle(request)
         except Refused as refusal:
             self.log(Level.WARN, f"{request.words}: {refusal}")
+        except Exception:  # it must not fail again at each restart
+            self.repeat([one for one in requests if one is not request])
+            raise
 
 
 def _in_turn(*calls: Callable[[], None]) -> None:

@@ -5,13 +5,26 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import partial
 from typing import Any
+
+from pydantic import ValidationError
 
 from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.requests import Command, Refused, answers
+from rbxcompose.base.units import MOST
 from rbxcompose.domains.muxes import requests
 from rbxcompose.domains.muxes.account import lock_states, states_of, why
-from rbxcompose.domains.muxes.config import NOBODY, MuxConfig, MuxInputConfig, core_of, handover_limits, source_of
+from rbxcompose.domains.muxes.config import (
+    NOBODY,
+    TIMELESS,
+    AddedInput,
+    MuxConfig,
+    core_of,
+    handover_limits,
+    is_own,
+    source_of,
+)
 from rbxcompose.domains.muxes.core import NEVER
 from rbxcompose.domains.muxes.requests import AddMuxInput, DeleteMuxInput, LockMuxInputs, SelectMuxInput
 from rbxcompose.msgs import registry
@@ -43,7 +56,6 @@ class MuxOrders:
         match order:
             case AddMuxInput():
                 self.added[order.input] = order
-                self._deleted.pop(order.input, None)
             case DeleteMuxInput():
                 if self.added.pop(order.input, None) is None:
                     self._deleted[order.input] = order
@@ -62,9 +74,10 @@ class MuxOrders:
 
     @property
     def all(self) -> tuple[Command, ...]:
-        """Return all that hold."""
+        """Return all that hold; what was deleted first, since what was added may have its name, topic or priority."""
         selected = (self._selected,) if self._selected else ()
-        return (*self.added.values(), *selected, *self._deleted.values(), *self._locked.values())
+        free = [SelectMuxInput(order.component, requests.NONE) for order in selected]  # what is selected stays
+        return (*free, *self._deleted.values(), *self.added.values(), *selected, *self._locked.values())
 
 
 def input_at(text: str, topics: Mapping[str, str]) -> str | None:
@@ -86,6 +99,12 @@ def noted(locked: Iterable[tuple[str, float]]) -> str:
 LOCK = "lock_"  # prefix of the ports of locks
 ANNOUNCED = "announced"  # the port at which it publishes who holds the output
 KEPT = 200  # changes that can be read later
+_WORD = "lower-case letters, digits and '_', starting with a letter"
+NEEDED = {
+    "name": f"it has {_WORD}, at most 60 of them",
+    "topic": f"it has words of {_WORD}, joined by '/'",
+    "timeout": "it is a finite time of at least 0 s",
+}  # by field of an input that is added
 
 
 @component("mux")
@@ -159,8 +178,7 @@ class Mux(Component[MuxConfig]):
     def take_over(self, old: Mux) -> None:
         """Take over who was sending, what was selected, and what people have locked and added."""
         for order in old.orders.added.values():
-            if order.input not in self.core.inputs:
-                self.add_input(order)
+            if order.input not in self.core.inputs and self.does(partial(self.add_input, order)):
                 self.orders.keep(order)
         self.core.take_over(old.core)
         self.received_at = old.received_at
@@ -268,12 +286,6 @@ class Mux(Component[MuxConfig]):
     @answers(requests.AddMuxInput)
     def add(self, request: requests.AddMuxInput) -> str:
         """Add an input."""
-        if any(text and input_at(text, self.topics) is not None for text in (request.input, request.topic)):
-            raise Refused(f"'{self.name}' already has the input '{request.input}'")
-        if request.input == requests.NONE or request.input in self.bound or LOCK + request.input in self.bound:
-            raise Refused(f"'{request.input}' cannot be the name of an input")
-        if self.config.has_priorities and (request.priority is None or request.timeout is None):
-            raise Refused("an input needs a priority and a timeout")
         self.add_input(request)
         self.orders.keep(request)
         self.changed()
@@ -295,6 +307,8 @@ class Mux(Component[MuxConfig]):
     def lock(self, request: requests.LockMuxInputs) -> str:
         """Lock inputs by hand; what they had commanded ends as with any lock."""
         names = [self.known(name) for name in request.inputs] or list(self.core.inputs)
+        if request.seconds is not None and not 0 < request.seconds < MOST:  # false for NaN, too
+            raise Refused("a lock takes a finite time above 0 s")
         self.core.lock(names, NEVER if request.seconds is None else self.now + request.seconds, self.now)
         self.orders.keep(requests.LockMuxInputs(self.name, tuple(names), request.seconds))
         self.send(self.core.tick(self.now))
@@ -334,8 +348,8 @@ class Mux(Component[MuxConfig]):
         """Return the topics of all inputs."""
         return MuxList.Response(topics=tuple(self.topics.values()))
 
-    def does(self, order: Callable[[], str]) -> bool:
-        """Carry out an order; a refusal is logged, since the answer has no room for its reason."""
+    def does(self, order: Callable[[], object]) -> bool:
+        """Carry out an order; a refusal is logged, since nobody gets its reason as an answer."""
         try:
             order()
         except Refused as refusal:
@@ -346,10 +360,48 @@ class Mux(Component[MuxConfig]):
     # Inputs
 
     def add_input(self, request: requests.AddMuxInput) -> None:
-        """Add an input to the core."""
-        config = MuxInputConfig(topic=request.topic or None, priority=request.priority or 0, timeout=request.timeout)
-        self.core.add(request.input, source_of(config, self.config), self.now)
-        self.topics[request.input] = request.topic or f"{self.config.output}/{request.input}"
+        """Add an input by the rules of the section `muxes`.
+
+        Raises:
+            Refused: if it breaks one, or its topic is one of the mux itself; then nothing has changed.
+        """
+        name, topic = request.input, request.topic or f"{self.config.output}/{request.input}"
+        if any(input_at(text, self.topics) is not None for text in (name, topic)):
+            raise Refused(f"'{self.name}' already has the input '{name}'")
+        if is_own(name) or name in self.config.locks:
+            raise Refused(f"'{name}' cannot be the name of an input: '{self.name}' needs it itself")
+        config = self.checked(request)
+        self.context.listen(_input(name, topic, self.config, None))
+        self.listening.add(name)
+        self.core.add(name, source_of(config, self.config), self.now)
+        self.topics[name] = topic
+
+    def checked(self, request: requests.AddMuxInput) -> AddedInput:
+        """Return what an input is to be.
+
+        Raises:
+            Refused: if the section `muxes` would not take it.
+        """
+        mode, priority, timeout = self.config.mode, request.priority, request.timeout
+        if self.config.has_priorities and (priority is None or timeout is None):
+            raise Refused("an input needs a priority and a timeout")
+        if priority is not None and not self.config.has_priorities:
+            raise Refused(f"a priority has no meaning in the mode '{mode}'")
+        if timeout is None and mode != "select":
+            raise Refused("an input needs a timeout")
+        if timeout == 0 and self.config.profile not in TIMELESS:
+            raise Refused("an input with the timeout 0 has no time at all")
+        same = [name for name, source in self.core.inputs.items() if source.priority == priority]
+        if same and self.config.profile == "default":
+            raise Refused(f"'{same[0]}' already has the priority {priority}: give each input its own")
+        topic = request.topic or None
+        name = None if topic and request.input == topic.strip("/") else request.input  # topic_tools names by the topic
+        try:
+            return AddedInput(name=name, topic=topic, priority=priority or 0, timeout=timeout)
+        except ValidationError as error:
+            field = error.errors()[0]["loc"][0]
+            value = request.input if field == "name" else getattr(request, str(field))
+            raise Refused(f"'{value}' cannot be the {field} of an input: {NEEDED[str(field)]}") from error
 
     def known(self, text: str) -> str:
         """Return the input of this name or topic.
