@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -181,6 +182,9 @@ def test_a_request_begins_at_once_and_what_makes_no_sense_is_refused() -> None:
     for wrong in (InjectFault("mtue", "1"), InjectFault("mute", "9"), InjectFault(UNPLUG, "1")):
         with pytest.raises(Refused, match=wrong.fault if wrong.fault == "mtue" else wrong.joint):
             broken.script.inject(wrong, 3.2)
+    for time in (-1.0, 0.0, math.inf, math.nan):
+        with pytest.raises(Refused, match="above 0 s"):
+            broken.script.inject(InjectFault("mute", "1", time), 3.2)
 
 
 @given(

@@ -8,6 +8,7 @@ from typing import Protocol
 from rbxcompose.base.config import Config
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import Command, Query, Refused
+from rbxcompose.base.units import MOST
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_faults import FAULTS, UNPLUG, FaultName, servo_faults
 
@@ -88,6 +89,8 @@ class FaultScript:
             raise Refused(f"no fault is called '{request.fault}'")
         if request.joint and (request.joint not in self._servos or request.fault == UNPLUG):
             raise Refused(f"'{request.joint}' is no joint that can have the fault '{request.fault}'")
+        if request.lasts is not None and not 0 < request.lasts < MOST:  # false for NaN, too
+            raise Refused("a fault lasts for a finite time above 0 s, or without one for good")
         self._faults.append(TwinFault(at=now, fault=request.fault, joint=request.joint, lasts=request.lasts))
         return f"{request.words} begins"
 
