@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from rbxcompose.base.levels import Level
 from rbxcompose.commands.main import main
 from rbxcompose.domains.diagnostics.commands import diag
 from rbxcompose.domains.diagnostics.commands.diag import change_line, tree_lines
-from rbxcompose.domains.diagnostics.requests import DiagnosticsTree, LevelChange, TreeLine
+from rbxcompose.domains.diagnostics.requests import DiagnosticsTree, LevelChange, ListChanges, TreeLine
 from rbxcompose.runtime.folder import RobotFolder
 
 OK, WARN, ERROR, STALE = Level
@@ -70,3 +71,13 @@ def test_the_exit_code_of_tree_is_the_level_of_the_robot(
     assert (told["robot"], told["level"]) == ("turtlebot", level.name.lower())
     assert main(["diag"]) == int(level)
     assert capsys.readouterr().out == f"turtlebot  {level.name}\n"
+
+
+def test_the_history_of_a_group_that_is_not_there_is_refused_with_those_that_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tree = replace(TREE, left_out=0)
+    monkeypatch.setattr(diag, "find_robot", lambda name: RobotFolder(tmp_path / "turtlebot"))
+    monkeypatch.setattr(diag, "answer_of", lambda folder, wanted: () if isinstance(wanted, ListChanges) else tree)
+    assert [main(["diag", "history", path]) for path in ("", "motion/", "/power/charger", "nosuch")] == [0, 0, 0, 1]
+    assert "there is no group '/nosuch'; groups: /power, /motion" in capsys.readouterr().err

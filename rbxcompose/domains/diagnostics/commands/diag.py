@@ -14,11 +14,12 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
+from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import fitted, plain
 from rbxcompose.base.requests import to_data
-from rbxcompose.commands.console import emit, has_colour
-from rbxcompose.commands.lookup import add_asking_options, answer_of, find_robot, pass_on
+from rbxcompose.commands.console import NotDoneError, emit, has_colour
+from rbxcompose.commands.lookup import REFUSED, add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.commands.options import Subcommand, add_actions, argument, run_action
 from rbxcompose.commands.terminal import LiveScreen, is_terminal
 from rbxcompose.domains.diagnostics import requests
@@ -131,9 +132,10 @@ def _changes(folder: RobotFolder, number: int = 0) -> Iterator[requests.LevelCha
 
 
 def _history(arguments: argparse.Namespace) -> int:
-    above = f"/{arguments.path.strip('/')}".rstrip("/")
-    known = _changes(find_robot(arguments.robot))
-    changes = [change for change in known if f"{change.path}/".startswith(f"{above}/")]
+    above, folder = f"/{arguments.path.strip('/')}".rstrip("/"), find_robot(arguments.robot)
+    changes = [change for change in _changes(folder) if f"{change.path}/".startswith(f"{above}/")]
+    if above and not changes:
+        _know(above, folder)
     if arguments.json:
         emit(json.dumps([change_data(change) for change in changes]))
     elif not changes:
@@ -141,6 +143,18 @@ def _history(arguments: argparse.Namespace) -> int:
     else:
         emit("\n".join(change_line(change, has_colour(sys.stdout)) for change in changes))
     return 0
+
+
+def _know(path: str, folder: RobotFolder) -> None:
+    """Check that the tree has a group or a part with this path.
+
+    Raises:
+        NotDoneError: if it has not.
+    """
+    tree = answer_of(folder, requests.ShowDiagnostics())
+    if not tree.left_out and all(line.path != path for line in tree.lines):
+        groups = [line.path for line in tree.lines if line.is_group]
+        raise NotDoneError(REFUSED.at(None, clauses(f"there is no group '{path}'", suggest(path, groups, "groups"))))
 
 
 def _acknowledge(arguments: argparse.Namespace) -> int:
