@@ -207,11 +207,16 @@ def signed(dimension: Dimension) -> Callable[[str], float]:
     return lambda text: _quantity(text, dimension)
 
 
-def count(text: str) -> int:
-    """Read a whole number of at least 1."""
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
+def count(text: str, least: int = 1) -> int:
+    """Read a whole number of at least `least`."""
+    if not text.isdecimal() or int(text) < least:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of at least {least}")
     return int(text)
+
+
+def count_from_zero(text: str) -> int:
+    """Read a whole number of at least 0: `-n 0 -f` follows only what is new."""
+    return count(text, least=0)
 
 
 def _positive(text: str, dimension: Dimension) -> float:

@@ -249,6 +249,9 @@ def test_logs_shows_the_last_run_also_when_the_robot_is_down(capsys: pytest.Capt
     assert capsys.readouterr().out.splitlines() == ["    1.00  base   text 1", "    2.00  base   text 2"]
     assert command.main(["logs", "-n", "0", "a"]) == 0
     assert capsys.readouterr().out == ""
+    with pytest.raises(SystemExit, match="2"):
+        command.main(["logs", "-n", "-5"])
+    assert "'-5' is not a whole number of at least 0" in capsys.readouterr().err
 
 
 def test_logs_shows_who_is_asked_for_from_the_level_that_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:

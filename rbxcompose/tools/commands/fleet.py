@@ -18,7 +18,7 @@ from rbxcompose.base.levels import LOG_LEVELS
 from rbxcompose.commands import hosts
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, table
 from rbxcompose.commands.lookup import NO_ANSWER, NO_SUPERVISOR, NOT_UP
-from rbxcompose.commands.options import add_system_options
+from rbxcompose.commands.options import add_system_options, count_from_zero
 from rbxcompose.missions.execution.requests import MISSION
 
 GROUP = "system"
@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     logs = actions.add_parser("logs", help="show the logs of all, each line with its robot")
     logs.add_argument("--level", choices=LOG_LEVELS, default="info", help="the lowest level to show")
     logs.add_argument("-f", "--follow", action="store_true", help="follow new records, until interrupted")
-    logs.add_argument("-n", "--lines", type=int, metavar="N", help="start with the last N records of each")
+    logs.add_argument("-n", "--lines", type=count_from_zero, metavar="N", help="start with the last N records of each")
     for subparser in (ls, run_, logs):
         subparser.add_argument("paths", metavar="SYSTEM", nargs="*", help="files of systems")
         subparser.add_argument(

@@ -15,7 +15,7 @@ from rbxcompose.base.findings import suggest
 from rbxcompose.base.levels import LOG_LEVELS
 from rbxcompose.commands.console import NotDoneError, emit, has_colour
 from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, known_state
-from rbxcompose.commands.options import EACH, add_system_options
+from rbxcompose.commands.options import EACH, add_system_options, count_from_zero
 from rbxcompose.commands.story import StoryWriter
 from rbxcompose.runtime.folder import RobotFolder, base_folder
 from rbxcompose.runtime.log import NAME, Follower, Record
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_system_options(parser)
     parser.add_argument("--level", choices=LOG_LEVELS, default="info", help="the lowest level to show")
     parser.add_argument("-f", "--follow", action="store_true", help="follow new records, until interrupted")
-    parser.add_argument("-n", "--lines", type=int, metavar="N", help="start with the last N records")
+    parser.add_argument("-n", "--lines", type=count_from_zero, metavar="N", help="start with the last N records")
     parser.add_argument("--json", action="store_true", help="one JSON object per record, as the log file has them")
 
 

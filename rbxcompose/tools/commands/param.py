@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     words = "this one, as `history` calls it: battery:3"
     change = options.argument("--change", metavar="CHANGE", default="", help=words)
-    last = options.argument("-n", "--last", metavar="N", type=int, default=0, help="only the last N")
+    last = options.argument("-n", "--last", metavar="N", type=options.count, default=0, help="only the last N")
     dry = options.argument("--dry-run", action="store_true", help="only show what would be written")
     words = "only if a dry run told this hash, so that what is written is what was shown"
     seen = options.argument("--only-as", metavar="HASH", default="", help=words)
