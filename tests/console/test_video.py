@@ -45,7 +45,14 @@ def test_an_address_says_what_is_wanted(query: dict[str, str], want: Picture) ->
 
 @pytest.mark.parametrize(
     "query",
-    [{}, {"topic": "/"}, {"topic": "a", "type": "h264"}, {"topic": "a", "width": "x"}, {"topic": "a", "width": "1e9"}],
+    [
+        {},
+        {"topic": "/"},
+        {"topic": "a", "type": "h264"},
+        {"topic": "a", "width": "x"},
+        {"topic": "a", "width": "1e9"},
+        {"topic": "a", "quality": "0"},
+    ],
     ids=str,
 )
 def test_an_address_that_makes_no_sense_is_refused(query: dict[str, str]) -> None:

@@ -16,7 +16,7 @@ IMAGES = (Image.TYPE, CompressedImage.TYPE)
 LARGEST = 4096  # pixels of a side
 _FORMS = {"mjpeg": "jpeg", "jpeg": "jpeg", "png": "png", "ros_compressed": "jpeg"}
 _QUALITY = {"jpeg": 95, "png": 3}
-_BEST = {"jpeg": 100, "png": 9}
+_QUALITIES = {"jpeg": (1, 100), "png": (0, 9)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +53,14 @@ def wanted(query: Mapping[str, str]) -> Picture:
     return Picture(
         f"/{topic.lstrip('/')}",
         form,  # type: ignore[arg-type]
-        _whole(query, "width", 0, LARGEST),
-        _whole(query, "height", 0, LARGEST),
-        _whole(query, "quality", _QUALITY[form], _BEST[form]),
+        _whole(query, "width", 0, (0, LARGEST)),
+        _whole(query, "height", 0, (0, LARGEST)),
+        _whole(query, "quality", _QUALITY[form], _QUALITIES[form]),
         "invert" in query,
     )
 
 
-def _whole(query: Mapping[str, str], name: str, otherwise: int, most: int) -> int:
+def _whole(query: Mapping[str, str], name: str, otherwise: int, ends: tuple[int, int]) -> int:
     text = query.get(name, "").strip()
     if not text:
         return otherwise
@@ -68,8 +68,8 @@ def _whole(query: Mapping[str, str], name: str, otherwise: int, most: int) -> in
         value = round(float(text))  # pages compute sizes
     except (ValueError, OverflowError) as error:
         raise WrongPictureError(f"'{name}' is a number") from error
-    if not 0 <= value <= most:
-        raise WrongPictureError(f"'{name}' is between 0 and {most}")
+    if not ends[0] <= value <= ends[1]:
+        raise WrongPictureError(f"'{name}' is between {ends[0]} and {ends[1]}")
     return value
 
 
@@ -116,7 +116,7 @@ def encoded(message: Image | CompressedImage, want: Picture) -> bytes:
         picture = picture.transpose(Pictures.Transpose.ROTATE_180)
     written = BytesIO()
     if want.form == "jpeg":
-        picture.save(written, "JPEG", quality=max(1, want.quality))
+        picture.save(written, "JPEG", quality=want.quality)
     else:
         picture.save(written, "PNG", compress_level=want.quality)
     return written.getvalue()
