@@ -33,6 +33,7 @@ from rbxcompose.bus.zenoh_session import open_client, open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport, direct
 from rbxcompose.commands import options
 from rbxcompose.commands.console import NotDoneError, emit, table
+from rbxcompose.commands.interrupts import ENDINGS
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place
 from rbxcompose.runtime.process_group.connection import CallbackInbox
 from rbxcompose.sdk.ports import Qos
@@ -195,15 +196,14 @@ class Guest:
 
         A second one ends the process.
         """
-        numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        before = {number: signal.getsignal(number) for number in numbers}
+        before = {number: signal.getsignal(number) for number in ENDINGS}
 
         def note(number: int, frame: FrameType | None) -> None:
             self.is_interrupted = True
             signal.signal(number, before[signal.Signals(number)])
             self._inbox.put(NAME, interrupted)
 
-        for number in numbers:
+        for number in ENDINGS:
             signal.signal(number, note)
         try:
             yield

@@ -24,6 +24,7 @@ from rbxcompose.base.files import alone_in, read_regular, replace_file
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import NotDoneError, ReportedError, emit, refuse, write_report
+from rbxcompose.commands.interrupts import INTERRUPTED, noted_interrupts
 from rbxcompose.commands.lookup import NOT_UP, find_robot
 from rbxcompose.commands.options import BUS, EACH, system_and_robot
 from rbxcompose.runtime.folder import made_base, system_record
@@ -39,9 +40,7 @@ WHICH = kind("RBX6121")
 NOBODY_THERE = kind("RBX6122")
 AT_ONCE = 16  # commands whose answers are awaited, so that a fleet does not need a machine of its own
 CONNECT = 10  # [s] to reach a host
-INTERRUPTED = 130
 _LOOK = 0.05  # [s] between two looks at what runs
-_ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 SSH_FAILED = 255  # exit code of ssh, if it fails itself
 _OF_SYSTEM = ("--ssh-config", "--profile")
 _LASTING = ("watch", "echo")  # actions that go on until an interrupt, which show one host alone
@@ -290,13 +289,7 @@ def follow_commands(commands: Mapping[str, Sequence[str]], optional: Collection[
 
     Those of the labels that are `optional` may fail.
     """
-    interrupts: list[int] = []
-
-    def note(number: int, frame: FrameType | None) -> None:
-        interrupts.append(number)
-
-    before = {number: signal.signal(number, note) for number in _ENDINGS}
-    try:
+    with noted_interrupts() as interrupts:
         running = [Running(label, command) for label, command in commands.items()]
         needed = [one for label, one in zip(commands, running, strict=True) if label not in optional]
         while any(item.poll() is None for item in running):
@@ -307,9 +300,6 @@ def follow_commands(commands: Mapping[str, Sequence[str]], optional: Collection[
         for one in running:
             one.wait()
         codes = [item.wait() for item in needed]
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
     failed = [code for code in codes if code > 0]
     return INTERRUPTED if interrupts else min(failed, default=0)
 

@@ -13,7 +13,8 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import alone_in
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.base.printable import plain
-from rbxcompose.commands.console import NotDoneError, emit
+from rbxcompose.commands.console import NotDoneError, ReportedError, emit, refuse
+from rbxcompose.commands.interrupts import INTERRUPTED, noted_interrupts
 from rbxcompose.domains.policies.episode import Episode, NoEpisodeError, Sample, features_of, role_of, sample_of
 from rbxcompose.domains.policies.lerobot import Dataset, DatasetError
 from rbxcompose.msgs import registry
@@ -73,21 +74,32 @@ class WantedDataset:
 def write_dataset(wanted: WantedDataset, recordings: Sequence[Path]) -> None:
     """Make a data set with an episode of each recording, or add them; a new one is there wholly or not at all.
 
+    An interrupt ends it between two messages: no file of an episode is half written.
+
     Raises:
         NotDoneError: if that cannot be.
+        ReportedError: after an interrupt.
     """
     try:
         if wanted.is_added:
-            with alone_in(wanted.folder):  # two recorders would write the same episode
-                _add_all(Dataset.read(wanted.folder, wanted.rate), wanted, recordings)
+            # Two recorders would write the same episode; while it waits, an interrupt finds nothing to clear up.
+            with alone_in(wanted.folder), noted_interrupts() as interrupts:
+                for told in _added(Dataset.read(wanted.folder, wanted.rate), wanted, recordings, interrupts):
+                    emit(told)
             return
-        folder = Path(tempfile.mkdtemp(prefix=f".{wanted.folder.name}.", dir=wanted.folder.parent))
-        try:
-            _add_all(Dataset.new(folder, wanted.robot, wanted.rate), wanted, recordings)
-            folder.chmod(0o755)
-            os.rename(folder, wanted.folder)
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
+        with noted_interrupts() as interrupts:
+            folder = Path(tempfile.mkdtemp(prefix=f".{wanted.folder.name}.", dir=wanted.folder.parent))
+            try:
+                episodes = [*_added(Dataset.new(folder, wanted.robot, wanted.rate), wanted, recordings, interrupts)]
+                folder.chmod(0o755)
+                os.rename(folder, wanted.folder)
+            finally:
+                shutil.rmtree(folder, ignore_errors=True)
+        emit("\n".join(episodes))
+    except _InterruptedError:
+        kept = "gets no further episode" if wanted.is_added else "is not made"
+        refuse(NO_DATASET.at(None, f"interrupted: '{plain(str(wanted.folder))}' {kept}"))
+        raise ReportedError(INTERRUPTED) from None
     except DatasetError as error:  # it has changed since the recording began
         raise NotDoneError(NO_DATASET.at(None, plain(str(error)))) from error
     except OSError as error:
@@ -95,28 +107,37 @@ def write_dataset(wanted: WantedDataset, recordings: Sequence[Path]) -> None:
         raise NotDoneError(NO_DATASET.at(None, words)) from error
 
 
-def _add_all(dataset: Dataset, wanted: WantedDataset, recordings: Sequence[Path]) -> None:
+class _InterruptedError(Exception):
+    """Raised between two messages, after an interrupt."""
+
+
+def _added(
+    dataset: Dataset, wanted: WantedDataset, recordings: Sequence[Path], interrupts: Sequence[int]
+) -> Iterator[str]:
+    """Add an episode of each recording, and yield what it has."""
     for path in recordings:
         name = plain(str(path))
         try:
-            features = features_of(_samples(path, wanted.topics, warns=True))
+            features = features_of(_samples(path, wanted.topics, interrupts, warns=True))
             episode = Episode(features, wanted.rate)
-            length = dataset.add(features, episode.frames(_samples(path, wanted.topics)), wanted.task)
+            length = dataset.add(features, episode.frames(_samples(path, wanted.topics, interrupts)), wanted.task)
         except DatasetError as error:
             raise NotDoneError(NO_DATASET.at(None, f"'{name}' is not added: {plain(str(error))}")) from error
         except (NoEpisodeError, WrongPictureError) as error:
             raise NotDoneError(NO_DATASET.at(None, f"'{name}' is no episode: {plain(str(error))}")) from error
-        emit(f"episode {dataset.info['total_episodes'] - 1}: {length} frames in {length / wanted.rate:.1f} s")
+        yield f"episode {dataset.info['total_episodes'] - 1}: {length} frames in {length / wanted.rate:.1f} s"
         for camera, count in episode.repeated.items():
             if count:
-                emit(f"  {camera}: {count} of them have the picture before")
+                yield f"  {camera}: {count} of them have the picture before"
 
 
-def _samples(path: Path, topics: EpisodeTopics, *, warns: bool = False) -> Iterator[Sample]:
+def _samples(path: Path, topics: EpisodeTopics, interrupts: Sequence[int], *, warns: bool = False) -> Iterator[Sample]:
     """Yield the samples of a recording; one with an earlier time than the one before came together with that one."""
     latest = 0
     with opened(path) as reader:
         for message in reader.messages():
+            if interrupts:
+                raise _InterruptedError
             topic = message.topic
             if (role := role_of(topic.name, topic.type)) is None or not topics.takes(topic):
                 continue

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +33,7 @@ from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.sensor_msgs import CompressedImage, Image
 from rbxcompose.tools import datasets
+from rbxcompose.tools.commands import record
 from tests.commands import command
 from tests.conftest import ROOT
 from tests.policies.recordings import BEGIN, SIZE, Timed, arm_with_cameras, joints, jpeg, picture, write_recording
@@ -214,7 +217,10 @@ def test_what_does_not_fit_is_refused_and_nothing_is_lost(data_set: Path, tmp_pa
     for words, said in [
         (("--from", "other.mcap", "-o", "picks"), "error[RBX3802]: 'picks' is there already"),
         (("--from", "other.mcap", "-o", "nowhere/picks"), "there is no folder 'nowhere'"),
-        (("--from", "other.mcap", "-o", "new"), "'other.mcap' is no episode: nothing on 'joint_commands'"),
+        (
+            ("--from", "blind.mcap", "other.mcap", "-o", "new"),
+            "'other.mcap' is no episode: nothing on 'joint_commands'",
+        ),
         (("--from", "missing.mcap", "-o", "new"), "error[RBX9201]: 'missing.mcap' cannot be read"),
         (("--from", "text.mcap", "-o", "new"), "error[RBX9201]: 'text.mcap' is not a recording"),
         (("--append", "--from", "other.mcap", "-o", "new"), "'new' is no data set of LeRobot"),
@@ -233,7 +239,9 @@ def test_what_does_not_fit_is_refused_and_nothing_is_lost(data_set: Path, tmp_pa
             "'observation.images.front' is missing here, and a video of 64 x 48",
         ),
     ]:
-        assert said in made(tmp_path, *words, code=1)
+        told = made(tmp_path, *words, code=1)
+        assert said in told
+        assert "episode 0" not in told
     assert {path: path.read_bytes() for path in sorted(copy.rglob("*")) if path.is_file()} == before
     assert other.exists()
     assert not [path for path in tmp_path.iterdir() if "new" in path.name]
@@ -245,6 +253,41 @@ def test_what_does_not_fit_is_refused_and_nothing_is_lost(data_set: Path, tmp_pa
         assert said in made(tmp_path, *words, code=2)
     done = command("record", "--append", environment={}, folder=tmp_path)
     assert (done.returncode, "need --format lerobot" in done.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_leaves_neither_files_nor_a_doubt_about_what_stays(
+    data_set: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    taken = count()
+
+    def interrupted(*given: Any) -> Sample | None:
+        if next(taken) % 300 == 250:  # while it films
+            signal.raise_signal(number)
+            signal.raise_signal(number)
+        return sample_of(*given)
+
+    def recorded(arguments: object, place: object, path: Path, topics: object) -> int:
+        write_recording(path, arm_with_cameras())
+        return 0
+
+    shutil.copytree(data_set, tmp_path / "picks")
+    write_recording(tmp_path / "r.mcap", arm_with_cameras())
+    before = sorted(tmp_path.rglob("*"))
+    monkeypatch.setattr(datasets, "sample_of", interrupted)
+    monkeypatch.setattr(record, "_record", recorded)
+    handler = signal.signal(number, lambda *_: pytest.fail("it ends in the middle"))
+    try:
+        told = made(tmp_path, "--from", "r.mcap", "-o", "new", code=130)
+        assert "error[RBX3802]: interrupted: 'new' is not made\n" in told
+        told = made(tmp_path, "--append", "--fps", "10", "--from", "r.mcap", "-o", "picks", code=130)
+        assert "error[RBX3802]: interrupted: 'picks' gets no further episode\n" in told
+        assert sorted(tmp_path.rglob("*")) == before
+        told = made(tmp_path, "--router", "tcp/127.0.0.1:1", "-o", "live", code=130)
+    finally:
+        signal.signal(number, handler)
+    (left,) = {*tmp_path.rglob("*")} - {*before}
+    assert f"the recording stays: {left.name}\n" in told
 
 
 def test_messages_that_came_together_may_stand_in_any_order(tmp_path: Path) -> None:

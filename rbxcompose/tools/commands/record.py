@@ -26,7 +26,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.bus.names import data_key, decode_attachment
 from rbxcompose.bus.tokens import SPACE, EndpointToken, parse_token
 from rbxcompose.bus.transport import Arrival
-from rbxcompose.commands.console import NotDoneError, emit, misused, refuse
+from rbxcompose.commands.console import NotDoneError, ReportedError, emit, misused, refuse
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place, find_robot
 from rbxcompose.commands.options import add_json_option, out_option, seconds
@@ -125,6 +125,8 @@ def _write_dataset(wanted: WantedDataset, recordings: list[Path]) -> int:
         write_dataset(wanted, recordings)
     except NotDoneError as error:
         return refuse(error.finding)
+    except ReportedError as error:
+        return error.exit_code
     emit(f"data set {wanted.folder}")
     return 0
 
