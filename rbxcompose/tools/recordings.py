@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.base.files import NotRegularError, open_regular
-from rbxcompose.base.findings import Finding, Report
+from rbxcompose.base.findings import Finding, Report, Severity
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import NotDoneError, table, write_report
+from rbxcompose.commands.guest import NO_NAME
 from rbxcompose.runtime.recording.codes import RECOVERED, UNREADABLE
 from rbxcompose.runtime.recording.files import recover_all
 from rbxcompose.runtime.recording.reader import NotARecordingError, RecordingReader
@@ -52,6 +54,15 @@ def warn(finding: Finding) -> None:
     report = Report()
     report.add(finding)
     write_report(report, {})
+
+
+def warn_of_unmatched(patterns: Iterable[str], names: Iterable[str]) -> None:
+    """Warn of patterns that match no topic, and suggest which of these names was meant."""
+    others = sorted({name.lstrip("/") for name in names})
+    for pattern in patterns:
+        words = f"no topic matches '{plain(pattern, 60)}'"
+        finding = NO_NAME.misspelt(None, words, pattern.lstrip("/"), others, "topics")
+        warn(replace(finding, severity=Severity.WARNING))
 
 
 def count_table(counts: Mapping[RecordedTopic, int]) -> str:

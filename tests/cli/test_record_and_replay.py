@@ -195,8 +195,13 @@ def test_a_full_disk_ends_the_recording_with_a_finding_and_what_was_written_is_r
 
 
 def test_two_seconds_of_a_robot_and_a_recorder_that_is_killed(robot: Shell) -> None:
-    topics = ("odom", "/cmd_vel*", "tf_static")
-    told = json.loads(robot.do("record", "--for", "2s", "-o", "whole.mcap", "--json", "--topics", *topics))
+    topics = ("odom", "/cmd_vel*", "tf_static", "tf_statc")
+    warned, _, answer = robot.do("record", "--for", "2s", "-o", "whole.mcap", "--json", "--topics", *topics).rpartition(
+        "\n{"
+    )
+    assert "no topic matches 'tf_statc'" in warned
+    told = json.loads(f"{{{answer}")
+    assert told["unmatched"] == ["tf_statc"]
     assert told["files"] == ["whole.mcap"]
     assert told["messages"]["/odom"] > 60  # of 100
     whole, damage = robot.messages("whole.mcap")
@@ -287,6 +292,23 @@ def test_nothing_to_replay_is_a_finding(tmp_path: Path, capsys: pytest.CaptureFi
     path.write_bytes(written(MESSAGES))
     assert "error[RBX9205]" in refused(["replay", str(path), "--topics", "nothing"], capsys)
     assert "error[RBX9205]" in refused(["replay", str(path), "--from", "10s"], capsys)
+
+
+def test_a_pattern_that_matches_no_topic_is_a_warning(
+    tmp_path: Path, router: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, bus = tmp_path / "a.mcap", ["--router", router]
+    path.write_bytes(written(MESSAGES))
+    assert command.main(["replay", str(path), *bus, "--rate", "100x", "--topics", "odom", "odmo", "["]) == 0
+    shown = capsys.readouterr()
+    assert "warning[RBX9022]: no topic matches 'odmo'\n  = help: did you mean 'odom'?" in shown.err
+    assert "no topic matches '['" in shown.err
+    assert "'odom'\n" not in shown.err
+    words = ["-o", f"{tmp_path}/b", "--for", "0.01s", "--topics", "odom", "odom", "*x*", "--json"]
+    assert command.main(["record", *bus, *words]) == 0
+    shown = capsys.readouterr()
+    assert shown.err.count("warning[RBX9022]: no topic matches") == 2
+    assert json.loads(shown.out)["unmatched"] == ["odom", "*x*"]
 
 
 def test_a_file_that_is_there_is_not_overwritten(

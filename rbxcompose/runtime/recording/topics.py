@@ -112,8 +112,12 @@ class Selection:
 
     def names(self, topic: RecordedTopic) -> bool:
         """Return whether a topic has one of the selected names."""
-        name = topic.name.lstrip("/")
-        return not self.patterns or any(fnmatchcase(name, pattern.lstrip("/")) for pattern in self.patterns)
+        return not self.patterns or any(matches(topic.name, pattern) for pattern in self.patterns)
+
+
+def matches(name: str, pattern: str) -> bool:
+    """Return whether the name of a topic matches a pattern, both with or without their leading slash."""
+    return fnmatchcase(name.lstrip("/"), pattern.lstrip("/"))
 
 
 def definition_of(name: str) -> str:

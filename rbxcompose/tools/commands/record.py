@@ -32,9 +32,9 @@ from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place, fi
 from rbxcompose.commands.options import add_json_option, out_option, seconds
 from rbxcompose.runtime.recording.codes import LOST, UNWRITABLE
 from rbxcompose.runtime.recording.files import ENDING, Recorder, Split
-from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, definition_of, topic_of
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, definition_of, matches, topic_of
 from rbxcompose.sdk.ports import Qos
-from rbxcompose.tools.recordings import count_table, recover_in, warn
+from rbxcompose.tools.recordings import count_table, recover_in, warn, warn_of_unmatched
 
 if TYPE_CHECKING:
     from rbxcompose.tools.datasets import WantedDataset
@@ -158,6 +158,7 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: b
         return refuse(UNWRITABLE.at(None, f"'{plain(str(recorder.paths[-1]))}' cannot be written: {_reason(error)}"))
     if tap.lost:
         warn(LOST.at(None, f"{tap.lost:,} messages came too fast to be recorded", help="choose fewer with '--topics'"))
+    warn_of_unmatched(tap.unmatched, tap.others)
     counts = recorder.counts
     if is_json:
         emit(
@@ -165,6 +166,7 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: b
                 {
                     "files": [str(path) for path in recorder.paths],
                     "messages": {topic.name: number for topic, number in counts.items()},
+                    "unmatched": tap.unmatched,
                 }
             )
         )
@@ -238,7 +240,10 @@ def _class(text: str) -> Qos:
 
 
 class Tap:
-    """Receives the messages of all selected topics, including those that appear while it runs."""
+    """Receives the messages of all selected topics, including those that appear while it runs.
+
+    `unmatched` are the patterns that no topic has matched so far, and `others` the names of topics that none matches.
+    """
 
     def __init__(self, guest: Guest, wanted: Selection) -> None:
         self._guest, self._wanted = guest, wanted
@@ -247,6 +252,8 @@ class Tap:
         self._arrivals = count(1)
         self._arrived = self._taken = 0
         self._keys: set[str] = set()
+        self.unmatched = list(dict.fromkeys(wanted.patterns))
+        self.others: set[str] = set()
         guest.transport.watch(f"{SPACE}/{guest.domain}/**", self._noticed)
 
     @property
@@ -269,7 +276,12 @@ class Tap:
     def _subscribe(self, key: str) -> None:
         token = parse_token(key)
         topic = topic_of(token) if isinstance(token, EndpointToken) else None
-        if topic is None or not self._wanted.takes(topic) or len(self._keys) >= MOST_TOPICS:
+        if topic is None:
+            return
+        self.unmatched = [pattern for pattern in self.unmatched if not matches(topic.name, pattern)]
+        if not self._wanted.names(topic) and len(self.others) < MOST_TOPICS:
+            self.others.add(topic.name)
+        if not self._wanted.takes(topic) or len(self._keys) >= MOST_TOPICS:
             return
         data = data_key(self._guest.domain, topic.name, topic.type, topic.hash)
         if data in self._keys:

@@ -39,11 +39,11 @@ from rbxcompose.runtime.recording import codes
 from rbxcompose.runtime.recording.files import PART, Recorder, write_problem
 from rbxcompose.runtime.recording.reader import RecordingReader, RecordingSummary, playlist, summary_of
 from rbxcompose.runtime.recording.tape import PLAN
-from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, by_name, is_replayable
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, by_name, is_replayable, matches
 from rbxcompose.runtime.replay import ReplayResult, RunDifference, missing_topics, replayed
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.tools.commands.record import add_selection_options, selection_of
-from rbxcompose.tools.recordings import count_table, opened, recover_in, warn
+from rbxcompose.tools.recordings import count_table, opened, recover_in, warn, warn_of_unmatched
 
 GROUP = "data"
 _MATCHING = 1.0  # [s] maximum wait until subscribers have found a new publisher
@@ -187,7 +187,9 @@ def _left_out(names: list[str]) -> Finding:
 
 
 def _chosen(summary: RecordingSummary, wanted: Selection) -> list[RecordedTopic]:
-    """Return the topics to publish, and report which selected ones are left out."""
+    """Return the topics to publish, and report which selected ones are left out, or are not there."""
+    known = {topic.name for topic in summary.counts}
+    warn_of_unmatched((one for one in wanted.patterns if not any(matches(name, one) for name in known)), known)
     topics = sorted((topic for topic in summary.counts if wanted.takes(topic)), key=lambda topic: topic.name)
     unfit = [topic.name for topic in topics if not is_replayable(topic)]
     commands = [topic.name for topic in topics if topic.qos is Qos.COMMAND and not wanted.patterns]
