@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field
 from itertools import pairwise
+from keyword import iskeyword
 from pathlib import Path
 
 from rbxcompose.base.dataclass import dataclass
@@ -30,6 +31,7 @@ MOST_MISTAKES = 10  # in one text, which is not read any further
 LARGEST = 100_000  # [B] of a text
 _PACKAGE = re.compile(r"(?!.*__)[a-z][a-z0-9_]*(?<!_)")
 _TYPE = re.compile(r"[A-Z][A-Za-z0-9]*")
+_WORD = "a word of Python, which could not import it"
 NOTHING = {"msg": "", "srv": "---\n", "action": "---\n---\n"}
 
 
@@ -54,13 +56,15 @@ def wrong_package(name: str) -> str:
     """Return why a package cannot have this name, or nothing."""
     if not _PACKAGE.fullmatch(name):
         return f"'{plain(name, 60)}' cannot be the name of a package: small letters, digits and single '_'"
+    if iskeyword(name):
+        return f"a package cannot be named '{name}', {_WORD}"
     return f"a package cannot be named '{name}': 'rbxcompose.msgs.{name}' is ours" if name in registry.TAKEN else ""
 
 
 def wrong_type(name: str) -> str:
     """Return why a type cannot have this name, or nothing."""
     if _TYPE.fullmatch(name):
-        return ""
+        return f"a type cannot be named '{name}', {_WORD}" if iskeyword(name) else ""
     return f"'{plain(name, 60)}' cannot be the name of a type: a capital letter, then letters and digits"
 
 

@@ -156,12 +156,28 @@ def test_a_new_type_can_be_used_at_once(robot: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["Foo", "my_msgs/foo", "My/Foo", "my_msgs/what/Foo", "images/Foo", "my_msgs/msg/a/Foo"]
+    ("name", "said"),
+    [
+        ("Foo", "no name of a type"),
+        ("my_msgs/foo", "a capital letter"),
+        ("My/Foo", "small letters"),
+        ("my_msgs/what/Foo", "no name of a type"),
+        ("images/Foo", "is ours"),
+        ("my_msgs/msg/a/Foo", "no name of a type"),
+        ("class/Foo", "a package cannot be named 'class', a word of Python"),
+        ("my_msgs/srv/None", "a type cannot be named 'None', a word of Python"),
+        ("std_msgs/String", "'std_msgs/String' is a standard type"),
+        ("std_srvs/srv/SetBool", "'std_srvs/srv/SetBool' is a standard type"),
+    ],
 )
-def test_a_name_that_no_type_can_have_is_refused(robot: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_name_that_no_type_can_have_is_refused(
+    robot: Path, name: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = sorted(robot.rglob("*"))
     assert main(["msg", "new", name]) == 1
-    assert "RBX9102" in capsys.readouterr().err
-    assert not [path for path in robot.rglob("*.*") if path.stem.lower() == "foo"]
+    told = capsys.readouterr().err
+    assert ("RBX9102" in told, said in told) == (True, True)
+    assert sorted(robot.rglob("*")) == before
 
 
 def test_an_existing_type_is_not_overwritten(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:

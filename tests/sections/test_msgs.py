@@ -100,8 +100,10 @@ def test_an_unknown_type_is_found_as_any_other(tmp_path: Path, name: str) -> Non
         ("my_msgs/action/Go.action", "---\n---\nFoo x\n", "RBX3027 Go.action:3:1"),
         ("my_msgs/msg/small.msg", "bool a\n", "RBX3026 small.msg:1:1"),
         ("my_msgs/msg/Two_Words.msg", "bool a\n", "RBX3026 Two_Words.msg:1:1"),
+        ("my_msgs/msg/None.msg", "bool a\n", "RBX3026 None.msg:1:1"),
         ("std_msgs/msg/String.msg", "int32 data\n", "RBX3029 String.msg:1:1"),
         ("Upper/msg/A.msg", "bool a\n", "RBX1322 robot.yaml:6:8"),
+        ("class/msg/A.msg", "bool a\n", "RBX1322 robot.yaml:6:8"),
         ("images/msg/A.msg", "bool a\n", "RBX1322 robot.yaml:6:8"),
     ],
 )

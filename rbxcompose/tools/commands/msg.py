@@ -140,6 +140,8 @@ def _new(arguments: argparse.Namespace) -> int:
     name = f"{package}/{kind_}/{bare}"
     if why := wrong_package(package) or wrong_type(bare):
         return refuse(NAME.at(None, why))
+    if registry.standard_text(name) is not None:
+        return refuse(NAME.at(None, f"'{arguments.type}' is a standard type", help="choose another name"))
     path = f"{name}.{kind_}"
     if finding := write_new(arguments.into, {path: _BEGUN[kind_]}):
         return refuse(finding)
