@@ -339,7 +339,15 @@ def test_without_a_router_nothing_is_left_behind(tmp_path: Path, capsys: pytest.
 
 
 @pytest.mark.parametrize(
-    "words", [["--split", "5 apples"], ["--class", "fast"], ["--for", "-1s"], ["--topics"], ["--domain", "x"]]
+    "words",
+    [
+        ["--split", "5 apples"],
+        ["--split", "0kB"],
+        ["--class", "fast"],
+        ["--for", "-1s"],
+        ["--topics"],
+        ["--domain", "x"],
+    ],
 )
 def test_wrong_options_are_wrong_usage(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="2"):

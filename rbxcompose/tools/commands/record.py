@@ -191,12 +191,14 @@ def _reason(error: OSError) -> str:
 
 def _split(text: str) -> Split:
     """Read `500MB` or `10min`."""
-    if found := _SIZE.fullmatch(text.strip()):
-        return Split(size=max(1, int(float(found[1]) * _TIMES[found[2]])))
+    if (found := _SIZE.fullmatch(text.strip())) and (size := int(float(found[1]) * _TIMES[found[2]])):
+        return Split(size=size)
     try:
         return Split(time=seconds(text))
     except argparse.ArgumentTypeError:
-        raise argparse.ArgumentTypeError(f"'{text}' is neither a size nor a time; write '500MB' or '10min'") from None
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is neither a size nor a time above zero; write '500MB' or '10min'"
+        ) from None
 
 
 def _rate(text: str) -> int:
