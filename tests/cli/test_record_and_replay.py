@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import pytest
@@ -329,6 +330,14 @@ def test_a_recording_goes_into_a_folder_that_is_named(tmp_path: Path, router: st
     assert command.main(["record", "--router", router, "--for", "0.01s", "-o", f"{folder}{end}"]) == 0
     (file,) = tmp_path.rglob("*.mcap")
     assert re.fullmatch(r"runs/recording-\d{8}-\d{6}\.mcap", str(file.relative_to(tmp_path)))
+
+
+def test_a_recording_does_not_need_a_reader_of_what_it_prints(tmp_path: Path, router: str) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    with open(writing, "w", encoding="utf-8") as out, redirect_stdout(out):
+        assert command.main(["record", "--router", router, "--for", "0.01s", "-o", f"{tmp_path}/a"]) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
 
 
 def test_without_a_router_nothing_is_left_behind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,6 +16,7 @@ import math
 import re
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 from itertools import count
@@ -140,7 +141,8 @@ def _record(arguments: argparse.Namespace, place: BusPlace, path: Path, topics: 
             return refuse(UNWRITABLE.at(None, f"'{plain(str(path))}' cannot be written: {_reason(error)}"))
         tap = Tap(guest, topics)
         if not arguments.json:
-            emit(f"recording to {recorder.paths[0]}; Ctrl-C ends it")
+            with suppress(BrokenPipeError):  # who does not want to read it may still want the recording
+                emit(f"recording to {recorder.paths[0]}; Ctrl-C ends it")
         end = math.inf if arguments.duration is None else start + arguments.duration
         return _write(recorder, tap, guest, end, is_json=arguments.json)
 
