@@ -25,6 +25,7 @@ from rbxcompose.commands import main as command
 from rbxcompose.runtime.processes import titled
 from rbxcompose.runtime.recording.reader import RecordingReader
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
+from rbxcompose.tools.commands.record import Tap
 from tests.commands import command as at_once
 from tests.forked import RBXCOMPOSE, Forked, run_command
 from tests.recording.samples import some, written
@@ -189,10 +190,27 @@ def test_a_full_disk_ends_the_recording_with_a_finding_and_what_was_written_is_r
     player.communicate(timeout=PATIENCE)
     assert recorder.returncode == 1
     assert "error[RBX9203]: 'b.mcap' cannot be written: File too large" in output
+    told = re.search(
+        r"help: once there is space, 'rbxcompose replay b.mcap --info' recovers at least (\d+) mess", output
+    )
+    assert told, output
     assert "b.mcap' was unfinished" in shell.do("replay", "b.mcap", "--info")
     found, damage = shell.messages("b.mcap")
     assert damage == ""
-    assert found
+    assert len(found) >= int(told[1])
+
+
+def test_a_split_recording_that_cannot_be_written_any_further_names_its_finished_files(
+    tmp_path: Path, router: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def taken(tap: Tap) -> list[Recorded]:
+        if (tmp_path / "b_1.mcap").exists():
+            (tmp_path / "b_3.mcap").touch()  # cannot be created
+        return MESSAGES
+
+    monkeypatch.setattr(Tap, "take", taken)
+    told = refused(["record", "--router", router, "--split", "0.001s", "-o", f"{tmp_path}/b"], capsys)
+    assert f"help: finished: {tmp_path}/b_0.mcap to {tmp_path}/b_2.mcap\n" in told
 
 
 def test_two_seconds_of_a_robot_and_a_recorder_that_is_killed(robot: Shell) -> None:

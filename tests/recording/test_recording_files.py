@@ -139,6 +139,7 @@ def test_a_file_has_its_name_only_once_it_is_finished(tmp_path: Path) -> None:
     for message in MESSAGES:
         recorder.add(message)
     recorder.keep(0.6)
+    assert recorder.kept == len(MESSAGES)
     assert not path.exists()
     assert read(part_of(path).read_bytes())[0] == MESSAGES
     assert list(recover_all(tmp_path)) == []  # its writer is at it

@@ -197,6 +197,7 @@ class Split:
 class Recorder:
     """Writes messages to `path`, or to `NAME_0.mcap`, `NAME_1.mcap`... if it is split.
 
+    `kept` is how many messages of the present file a recovery finds at least, if it cannot be written any further.
     All methods raise `OSError` if a file cannot be created or written.
     """
 
@@ -224,7 +225,7 @@ class Recorder:
         """Do what is due; call it several times a second."""
         if now - self._flushed >= FLUSH:
             self._writer.flush()
-            self._flushed = now
+            self._flushed, self.kept = now, self._writer.counts.total()
         if now - self._synced >= SYNC:
             os.fsync(self._file.fileno())
             self._synced = now
@@ -251,3 +252,4 @@ class Recorder:
         self.paths.append(path)
         self._writer = RecordingWriter(self._file)
         self._opened = self._flushed = self._synced = now
+        self.kept = 0

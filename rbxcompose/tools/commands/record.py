@@ -23,6 +23,7 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rbxcompose.base.findings import clauses
 from rbxcompose.base.printable import plain
 from rbxcompose.bus.names import data_key, decode_attachment
 from rbxcompose.bus.tokens import SPACE, EndpointToken, parse_token
@@ -157,7 +158,8 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: b
         recorder.finish()
     except OSError as error:
         recorder.abandon()
-        return refuse(UNWRITABLE.at(None, f"'{plain(str(recorder.paths[-1]))}' cannot be written: {_reason(error)}"))
+        words = f"'{plain(str(recorder.paths[-1]))}' cannot be written: {_reason(error)}"
+        return refuse(UNWRITABLE.at(None, words, help=_left_by(recorder)))
     if tap.lost:
         warn(LOST.at(None, f"{tap.lost:,} messages came too fast to be recorded", help="choose fewer with '--topics'"))
     warn_of_unmatched(tap.unmatched, tap.others)
@@ -176,6 +178,15 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: b
     paths = ", ".join(map(str, recorder.paths))
     emit(f"{count_table(counts)}\nrecorded {counts.total():,} messages to {paths}")
     return 0
+
+
+def _left_by(recorder: Recorder) -> str:
+    """Return what there is of a recording that cannot be written any further."""
+    path = plain(str(recorder.paths[-1]))
+    finished = [plain(str(one)) for one in recorder.paths if one.exists()]
+    recovers = f"once there is space, 'rbxcompose replay {path} --info' recovers at least {recorder.kept:,} messages"
+    whole = f"finished: {' to '.join(dict.fromkeys((finished[0], finished[-1])))}" if finished else ""
+    return clauses("" if path in finished else recovers, whole)
 
 
 def _path(arguments: argparse.Namespace) -> Path:
