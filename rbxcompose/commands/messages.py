@@ -3,8 +3,10 @@
 import argparse
 import json
 import math
+import os
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, TypeVar
 
 import yaml
@@ -122,9 +124,26 @@ def _known(name: str, category: str, look: Callable[[str], type[T]]) -> type[T]:
     try:
         return look(name)
     except KeyError:
+        if _finds_types_here():
+            return _known(name, category, look)
         full = registry.full_name(name, category)
         words = f"unknown type '{full}'"
         raise NotDoneError(NO_TYPE.misspelt(None, words, full, registry.names(category), "known types")) from None
+
+
+def _finds_types_here() -> bool:
+    """Let names mean the types of the only robot in this folder, unless they mean those of one; return if it has any.
+
+    On a bus that no robot of this machine has, they are the best guess; a hash tells whether it is right.
+    """
+    if registry.chosen().texts:
+        return False
+    from rbxcompose.commands.targets import robot_path  # the imports of a compiler, which known types do not need
+    from rbxcompose.compiler.compile import compile_robot
+
+    with suppress(NotDoneError):
+        compile_robot(robot_path(None, may_run=False), environment=os.environ)
+    return bool(registry.chosen().texts)
 
 
 def _cut(data: Any) -> Any:

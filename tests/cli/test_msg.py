@@ -9,7 +9,9 @@ from xml.etree import ElementTree
 
 import pytest
 
+from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.main import main
+from rbxcompose.commands.messages import message_type
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import parse
 from rbxcompose.msgs.nav_msgs import Odometry
@@ -183,6 +185,20 @@ def test_a_name_that_no_type_can_have_is_refused(
 def test_an_existing_type_is_not_overwritten(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["msg", "new", "my_msgs/Grasp"]) == 1
     assert "already exists" in capsys.readouterr().err
+
+
+def test_types_of_the_robot_in_this_folder_are_known_on_a_bus_of_others(
+    robot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    registry.choose({})
+    assert message_type("my_msgs/Grasp")().width == 0.0  # type: ignore[attr-defined]
+    with pytest.raises(NotDoneError, match="unknown type 'my_msgs/msg/Grsp'"):
+        message_type("my_msgs/Grsp")
+    registry.choose({})
+    (robot / "elsewhere").mkdir()
+    monkeypatch.chdir(robot / "elsewhere")
+    with pytest.raises(NotDoneError, match="unknown type"):
+        message_type("my_msgs/Grasp")
 
 
 def test_stubs_tell_a_type_checker_what_a_type_has(robot: Path) -> None:
