@@ -115,6 +115,7 @@ def test_without_a_size_a_tag_has_no_pose() -> None:
     assert found.pose is None
     (found,) = TagFinder(sizes={7: SIZE}).find(picture({7: facing(0, 0, 1)}, SIZE), CAMERA)
     assert found.pose is not None
+    assert TagFinder(sizes={7: 0.0}).find(picture({7: facing(0, 0, 1)}, SIZE), CAMERA) == []
 
 
 def test_a_board_is_where_its_tags_are_and_steadier_than_one() -> None:

@@ -60,7 +60,7 @@ class KnownTags(Config):
     """The side of the black square of a tag; without it, tags have no pose."""
     names: dict[Name, Annotated[int, Field(ge=0)]] = {}
     """Numbers of tags by name."""
-    sizes: dict[Name, Length] = {}
+    sizes: dict[Name, Annotated[Length, Field(gt=0)]] = {}
     """Sizes of tags with another `size`, by name."""
     boards: dict[Name, TagBoard] = {}
     """Boards by name."""

@@ -91,10 +91,14 @@ def _posed(number: int, corners: Numbers, size: float, camera: Intrinsics) -> Se
     ways: list[tuple[float, Numbers, Numbers]] = []
     # The first fails for a square that the camera faces exactly, where there is no second pose either.
     for method in (cv2.SOLVEPNP_IPPE_SQUARE, cv2.SOLVEPNP_ITERATIVE):
-        _, turns, shifts, misses = cv2.solvePnPGeneric(
-            points, corners, camera.matrix, camera.coefficients, flags=method
-        )
-        for off, turn, shift in zip(np.ravel(misses), turns, shifts, strict=True):
+        try:
+            _, turns, shifts, misses = cv2.solvePnPGeneric(
+                points, corners, camera.matrix, camera.coefficients, flags=method
+            )
+        except cv2.error:  # the square is too small for its arithmetic
+            continue
+        # A pose that it could not compute has no error.
+        for off, turn, shift in zip(np.ravel(misses), turns, shifts, strict=False):
             if shift[2, 0] > 0 and np.isfinite(turn).all():
                 ways.append((float(off), np.asarray(turn, float), np.asarray(shift, float)))
         ways.sort(key=lambda way: way[0])
