@@ -278,6 +278,19 @@ def validate(
     return None
 
 
+def refusals(
+    model: Any, error: ValidationError, root: tree.TreeNode, path: tree.KeyPath, places: Mapping[str, tree.KeyPath]
+) -> Iterator[Finding]:
+    """Turn the errors about what was made of the value at `path` of a manifest into findings.
+
+    `places` are where `root` has what was made of other values, by field.
+    """
+    for details in error.errors(include_url=False):
+        loc = details["loc"]
+        there = (*places.get(str(loc[0]), (*path, loc[0])), *loc[1:]) if loc else path
+        yield _finding(model, tree.MappingNode(span=tree.value_span(root, there)), path, loc, details)
+
+
 def _findings(
     model: Any, node: tree.TreeNode, path: tree.KeyPath, errors: list[ErrorDetails], also: tuple[str, ...]
 ) -> Iterator[Finding]:

@@ -26,11 +26,13 @@ name: room
 objects: {crate: {box: [20 cm, 20 cm, 20 cm], at: {x: 1 m}, tags: {back: {number: 7, size: 16 cm}}}}
 """
 LENS = CameraFile(320, 240, 300.0, 300.0, 159.5, 119.5, (-0.1, 0.02, 0.0, 0.0, 0.0))
+STRONG = CameraFile(320, 240, 200.0, 200.0, 159.5, 119.5, (-0.9, 0.0, 0.0, 0.0, 0.0))
 
 
 def project(folder: Path) -> Project:
     (folder / "room.yaml").write_text(WORLD)
     (folder / "front.yaml").write_text(LENS.text)
+    (folder / "strong.yaml").write_text(STRONG.text)
     return Project(folder)
 
 
@@ -69,9 +71,12 @@ def test_without_a_world_it_is_the_real_one_with_the_same_topics(tmp_path: Path)
     [
         ("rate: 10 Hz", "calibration: ../../back.yaml", "RBX1301", "back.yaml"),
         ("rate: 10 Hz", "calibration: ../../room.yaml", "RBX3721", "its 'image_width' is no number of pixels"),
+        ("rate: 10 Hz", "calibration: ../../strong.yaml", "RBX1003", "no lens bends a picture like this"),
+        ("size: [320, 240]", "size: [3840, 2160]", "RBX1005", "'size[0]' must be at most 2048"),
         ("size: [320, 240], rate: 10 Hz", "calibration: ../../front.yaml", "RBX3721", "it is of 320 x 240 pixels"),
         ("size: 16 cm, names", "camera: back, size: 16 cm, names", "RBX1004", "back"),
         ("  front: {frame", "  back: {frame: base_footprint}\n  front: {frame", "RBX3722", "one of back, front"),
+        ("names: {box: 7}", "names: {box: 7}, sizes: {box: 0 cm}", "RBX1005", "'box' must be greater than 0 m"),
         ("names: {box: 7}", "names: {box: 7, dock: 7}", "RBX1003", "the same number"),
     ],
 )

@@ -4,6 +4,8 @@ from bisect import bisect_left, insort
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import field, replace
 
+from pydantic import ValidationError
+
 from rbxcompose.base.config import Config, is_live, key_of, leaves
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Itself, Report, once
@@ -27,6 +29,7 @@ from rbxcompose.compiler.sections.missions import missions
 from rbxcompose.manifest.registry import sections_in_use
 from rbxcompose.manifest.section import ROBOT, Contents, WantedComponent
 from rbxcompose.manifest.tree import MappingNode, at
+from rbxcompose.manifest.validate import refusals
 from rbxcompose.missions.analysis.effects import sent_by, settings_of
 from rbxcompose.missions.analysis.uses import Using
 from rbxcompose.missions.engine.inputs import bind_inputs
@@ -113,7 +116,7 @@ def build_robot(
     outside: Outside = NOTHING,
 ) -> Robot:
     """Return the whole robot, with what it has of others; errors in its mission files go into `report`."""
-    written = written_components(manifest)
+    written = written_components(manifest, report)
     components = {**written, **own_components(manifest, written)}
     values, topics, services = (
         values_of(manifest, components),
@@ -141,14 +144,35 @@ def with_missions(robot: Robot, names: Collection[str]) -> Robot:
     return replace(left, components={**robot.components, **runs})
 
 
-def written_components(manifest: RobotManifest) -> dict[str, RobotComponent]:
+def written_components(manifest: RobotManifest, report: Report) -> dict[str, RobotComponent]:
     """Return the wired components that the sections request: first those named by users, then those of sections."""
     wires = _Wires(manifest.bus.namespace or "")
     given = _given_topics(manifest.contents)
     for section in sorted(sections_in_use(ROBOT), key=lambda one: not one.names):
         for wanted in section.components(manifest.contents, wires):
-            wires.add(_component(manifest, wanted, given.get(wanted.name, {})))
+            if (accepted := _accepted(manifest, wanted, report)) is not None:
+                wires.add(_component(manifest, accepted, given.get(wanted.name, {})))
     return wires.components
+
+
+def _accepted(manifest: RobotManifest, wanted: WantedComponent, report: Report) -> WantedComponent | None:
+    """Return a request with a configuration that its type accepts: what that refuses is reported, and left out.
+
+    None if too little is left.
+    """
+    if isinstance(wanted.config, Config):
+        return wanted
+    model, data, is_sound = component_type(wanted.type_name).config_type(), wanted.config, wanted.is_sound
+    while True:
+        try:
+            return replace(wanted, config=model(**data), is_sound=is_sound)
+        except ValidationError as error:
+            if data is wanted.config:
+                report.extend(refusals(model, error, manifest.root, wanted.path, wanted.places))
+            refused = {str(details["loc"][0]) for details in error.errors() if details["loc"]}
+        if not refused & data.keys():
+            return None
+        data, is_sound = {name: value for name, value in data.items() if name not in refused}, False
 
 
 def _given_topics(contents: Contents) -> dict[str, dict[str, str]]:

@@ -30,7 +30,7 @@ class CameraModel(Config):
     frame: str
     """The link that looks along its x, or along its z if the name ends in `optical_frame`."""
     size: tuple[Side, Side] = (640, 480)
-    """Width and height of its pictures in pixels."""
+    """Width and height of its pictures in pixels; of a simulated one, 2048 at most."""
     rate: Frequency = Field(15.0, gt=0, le=100)
     """Pictures a second."""
     calibration: FileName | None = None
@@ -68,7 +68,9 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
                 known = CameraFile.read(file)
                 plain = known.distortion if len(known.distortion) <= 5 else ()
                 config |= {"view": f"{known.intrinsics.view!r} rad", "distortion": list(plain)}
-            yield WantedComponent(name, "camera_sim", config, ("cameras", name))
+            lens = ("cameras", name, "calibration")
+            places = {"view": lens, "distortion": lens} if file is not None else {}
+            yield WantedComponent(name, "camera_sim", config, ("cameras", name), places=places)
             continue
         width, height = model.size
         config |= {"width": width, "height": height, "device": model.device, "exposure": model.exposure}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from rbxcompose import sdk
 from rbxcompose.base.levels import Level
@@ -75,13 +75,16 @@ class CameraSimConfig(SensorConfig):
     by_physics: bool = False
     """Whether a physics engine draws its pictures; with `simulator: physics`, that is the default."""
 
-    @model_validator(mode="after")
-    def _is_lens(self) -> CameraSimConfig:
-        if len(self.distortion) not in (0, 4, 5):
+    @field_validator("distortion")
+    @classmethod
+    def _is_lens(cls, distortion: list[float], info: ValidationInfo) -> list[float]:
+        if len(distortion) not in (0, 4, 5):
             raise ValueError("a distortion has four or five coefficients")
-        if self.distortion and not self.intrinsics.is_lens:
-            raise ValueError("no lens bends a picture like this: the distortion is too strong for its view")
-        return self
+        if distortion and {"size", "view"} <= info.data.keys():
+            width, height = info.data["size"]
+            if not Intrinsics.of_view(width, height, info.data["view"], tuple(distortion)).is_lens:
+                raise ValueError("no lens bends a picture like this: the distortion is too strong for its view")
+        return distortion
 
     @property
     def optical_frame(self) -> str:
