@@ -196,6 +196,7 @@ def test_noise_is_as_large_as_it_says_and_the_same_again() -> None:
     on_box = np.concatenate([numbers(one)[10:30, 35:45].ravel() for one in first])
     assert on_box.mean() == pytest.approx(1.5, abs=2e-3)
     assert on_box.std() == pytest.approx(0.01 * 1.5**2, rel=0.1)
+    assert np.isposinf(numbers(first[-1])[0, :5]).all()  # REP 117: beside the box, above the horizon
 
 
 def test_pictures_come_as_late_as_they_say_with_the_time_when_they_were_taken() -> None:

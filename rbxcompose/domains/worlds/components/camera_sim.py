@@ -230,7 +230,7 @@ class CameraSim(WorldSensor[CameraSimConfig]):
         """Return depths with noise; -inf is too near, and inf too far, as REP 117 says it."""
         config = self.config
         if config.noise:
-            with np.errstate(invalid="ignore"):
-                depths = depths + self.random.normal(0.0, config.noise, depths.shape).astype(np.float32) * depths**2
+            spread = np.where(np.isfinite(depths), depths, 0) ** 2  # noise of what is nowhere would be nan
+            depths = depths + self.random.normal(0.0, config.noise, depths.shape).astype(np.float32) * spread
         found = np.where(depths > config.farthest, np.float32(math.inf), depths)
         return np.where(found < config.nearest, np.float32(-math.inf), found)
