@@ -130,10 +130,13 @@ def test_a_lens_that_cannot_be_is_refused() -> None:
 
 
 class Seeing:
-    """A camera on a base that stands before a box."""
+    """A camera on a base that stands before a box, and far from a tower."""
 
     def __init__(self, **config: object) -> None:
-        objects = {"box": {"box": ["20 cm", "80 cm", "80 cm"], "at": {"x": "1.6 m"}, "colour": "red"}}
+        objects = {
+            "box": {"box": ["20 cm", "80 cm", "80 cm"], "at": {"x": "1.6 m"}, "colour": "red"},
+            "tower": {"box": ["4 m", "4 m", "40 m"], "at": {"x": "62 m", "y": "20 m"}},
+        }
         self.bench = Bench(
             instance("world", "world", {"name": "test", "objects": objects}),
             instance("base", "diff_drive_sim", {"in_world": True}),
@@ -197,6 +200,19 @@ def test_noise_is_as_large_as_it_says_and_the_same_again() -> None:
     assert on_box.mean() == pytest.approx(1.5, abs=2e-3)
     assert on_box.std() == pytest.approx(0.01 * 1.5**2, rel=0.1)
     assert np.isposinf(numbers(first[-1])[0, :5]).all()  # REP 117: beside the box, above the horizon
+
+
+@pytest.mark.parametrize(("farthest", "depth"), [("50 m", math.inf), ("100 m", 60.0)])
+def test_depths_reach_as_far_as_it_says(farthest: str, depth: float) -> None:
+    seen = numbers(Seeing(depth=True, farthest=farthest).taken("/camera/depth/image_raw", Image)[-1])
+    assert seen[10, 17] == pytest.approx(depth)
+
+
+def test_pictures_that_nobody_wants_count_once_each_in_diagnostics() -> None:
+    seeing = Seeing(depth=True)
+    found = [seeing.bench.statuses(f"camera: camera/{topic}") for topic in ("image_raw", "points")]
+    seeing.taken("/camera/depth/image_raw", Image, 5.0)
+    assert [statuses[-1].message for statuses in found] == ["10 Hz", "10 Hz"]
 
 
 def test_pictures_come_as_late_as_they_say_with_the_time_when_they_were_taken() -> None:

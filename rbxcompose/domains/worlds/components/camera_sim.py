@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 PICTURES = ("image", "depth", "points")
 SILENCE = 5.0  # [s] without a picture of the engine after which that is reported
-SIGHT = 50.0  # how far pictures show something [m]
+SIGHT = 50.0  # how far pictures show something, at least [m]
 Colours = NDArray[np.uint8]
 Depths = NDArray[np.float32]
 Side = Annotated[int, Field(ge=16, le=2048)]
@@ -63,7 +63,7 @@ class CameraSimConfig(SensorConfig):
     nearest: sdk.Length = Field(0.3, ge=0)
     """What is nearer has no depth."""
     farthest: sdk.Length = Field(10.0, gt=0, le=200)
-    """What is farther has no depth."""
+    """What is farther has no depth; a physics engine draws nothing beyond 50 m."""
     noise: sdk.Length = Field(0.0, ge=0, le=1)
     """Standard deviation of a depth at 1 m; it grows with the square of the depth, as with stereo."""
     grain: Annotated[float, Field(ge=0, le=100)] = 0.0
@@ -159,6 +159,7 @@ class CameraSim(WorldSensor[CameraSimConfig]):
         self.viewed: tuple[WorldShape, ...] = ()  # of which that is
         self.asked_at: float | None = None  # since when the engine is asked for pictures [s]
         self.is_blind = False
+        self.wanted: set[str] = set()
 
     def step(self, dt: float) -> None:
         """Take a picture, if somebody wants one and it is known where the camera is."""
@@ -169,6 +170,8 @@ class CameraSim(WorldSensor[CameraSimConfig]):
             frame = Header(stamp=header.stamp, frame_id=config.frame)
             self.bound["tf"](TFMessage(transforms=(TransformStamped(frame, header.frame_id, mounted),)))
         self.tell(self.bound["info"], info_message(header, self.camera))
+        # Asked once for each picture: diagnostics count what nobody wants, too.
+        self.wanted = {name for name in PICTURES if name in self.bound and self.bound[name].is_wanted}
         if config.by_physics:
             self.shoot()
         if not self.wanted or config.by_physics or self.seen is None or (pose := self.pose()) is None:
@@ -176,7 +179,8 @@ class CameraSim(WorldSensor[CameraSimConfig]):
         if self.view is None or self.viewed is not self.seen.shapes:
             self.view, self.viewed = self.make_view(self.seen), self.seen.shapes
         optical = pose if config.frame == header.frame_id else pose.compose(TO_OPTICAL)
-        seen = self.view.seen(optical, self.camera.unbent, self.now, SIGHT, self.seen.robots_standing(self.now))
+        sight, robots = max(SIGHT, config.farthest), self.seen.robots_standing(self.now)
+        seen = self.view.seen(optical, self.camera.unbent, self.now, sight, robots)
         self.show(header, seen.colours, seen.depths)
 
     def shoot(self) -> None:
@@ -200,11 +204,6 @@ class CameraSim(WorldSensor[CameraSimConfig]):
         header = Header(stamp=message.header.stamp, frame_id=self.config.optical_frame)
         depths = np.frombuffer(message.data, "<f4").reshape(message.height, message.width)
         self.show(header, pixels(colour), depths)
-
-    @property
-    def wanted(self) -> set[str]:
-        """Return the pictures that somebody wants."""
-        return {name for name in PICTURES if name in self.bound and self.bound[name].is_wanted}
 
     def show(self, header: Header, colours: Colours, depths: Depths) -> None:
         """Publish what was seen without distortion as this camera shows it."""
