@@ -25,7 +25,8 @@ kind: World
 name: room
 objects: {crate: {box: [20 cm, 20 cm, 20 cm], at: {x: 1 m}, tags: {back: {number: 7, size: 16 cm}}}}
 """
-LENS = CameraFile(320, 240, 300.0, 300.0, 159.5, 119.5, (-0.1, 0.02, 0.0, 0.0, 0.0))
+RATIONAL = (-0.1, 0.02, 0.0, 0.0, 0.0, 0.05, 0.01, 0.002)
+LENS = CameraFile(320, 240, 300.0, 310.0, 170.0, 110.0, RATIONAL, "rational_polynomial")
 STRONG = CameraFile(320, 240, 200.0, 200.0, 159.5, 119.5, (-0.9, 0.0, 0.0, 0.0, 0.0))
 
 
@@ -52,8 +53,7 @@ def test_a_calibrated_camera_has_its_lens_in_the_simulation(tmp_path: Path) -> N
     assert checked.compilation.plan is not None, checked.text
     (config,) = (one.config for one in checked.compilation.plan.instances if one.type == "camera_sim")
     assert isinstance(config, CameraSimConfig)
-    assert config.distortion == pytest.approx(LENS.distortion)
-    assert config.intrinsics.fx == pytest.approx(300.0)
+    assert config.intrinsics == LENS.intrinsics
 
 
 def test_without_a_world_it_is_the_real_one_with_the_same_topics(tmp_path: Path) -> None:

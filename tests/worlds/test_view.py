@@ -105,8 +105,15 @@ def test_a_lamp_makes_bright_what_faces_it_in_its_colour() -> None:
     assert red[1:] == pytest.approx(dark[1:], abs=1)
 
 
-def test_a_lens_bends_pictures_as_it_bends_points() -> None:
-    bent = Intrinsics.of_view(161, 121, math.radians(70), (-0.2, 0.03, 0.001, -0.002))
+@pytest.mark.parametrize(
+    "bent",
+    [
+        Intrinsics.of_view(161, 121, math.radians(70), (-0.2, 0.03, 0.001, -0.002)),
+        Intrinsics(161, 121, 110, 130, 90, 50),
+        Intrinsics(161, 121, 110, 130, 90, 50, (-0.1, 0.03, 0.001, -0.002, 0.0, 0.05, -0.02, 0.01)),
+    ],
+)
+def test_a_lens_bends_pictures_as_it_bends_points(bent: Intrinsics) -> None:
     box = WorldShape("box", WorldBox((0.2, 0.6, 0.6)), Pose2(1.6, 0.1))
     view = WorldView(SimulatedWorld("", shapes=(box,), colours=("red",))).seen(optical(0, 0, 0), bent.unbent, 0, 50)
     colours, depths = Lens(bent).bent(view.colours, view.depths)
@@ -127,6 +134,8 @@ def test_a_lens_that_cannot_be_is_refused() -> None:
     for distortion in ([-5.0, 0, 0, 0], [1e9, 0, 0, 0], [-0.9, 3.0, 0, 0, -9.0]):
         with pytest.raises(ValueError, match="no lens bends"):
             instance("camera", "camera_sim", {"distortion": distortion, "view": "120 deg"})
+    with pytest.raises(ValueError, match="no lens bends"):
+        instance("camera", "camera_sim", {"pinhole": [200.0, 200.0, 5000.0, 120.0]})
 
 
 class Seeing:

@@ -96,7 +96,7 @@ def _focal_length(camera: RobotComponent) -> float | None:
     """Return the focal length of a camera [px], None if that is not known."""
     config: Any = camera.config
     if camera.type_name == SIMULATED:
-        return float(config.size[0] / 2 / math.tan(config.view / 2))
+        return float(config.intrinsics.fx)
     if camera.type_name == REAL and config.calibration:
         from rbxcompose.domains.vision.camera_file import CameraFile, CameraFileError  # imports numpy
 

@@ -97,10 +97,11 @@ class Intrinsics:
 
     def _bending(self, straight: Numbers) -> tuple[Numbers, Numbers]:
         """Return by which directions (n, 2) are multiplied (n, 1), and what is then added to them (n, 2)."""
-        k1, k2, p1, p2, k3 = (*self.distortion, *(0.0,) * 5)[:5]
+        k1, k2, p1, p2, k3, k4, k5, k6 = (*self.distortion, *(0.0,) * 8)[:8]
         x, y = straight.T
         square = x * x + y * y
         radial = 1 + square * (k1 + square * (k2 + square * k3))
+        radial = radial / (1 + square * (k4 + square * (k5 + square * k6)))
         right = 2 * p1 * x * y + p2 * (square + 2 * x * x)
         down = p1 * (square + 2 * y * y) + 2 * p2 * x * y
         return radial[:, None], np.stack((right, down), 1)
@@ -114,24 +115,26 @@ class Intrinsics:
 
     @property
     def is_lens(self) -> bool:
-        """Return whether the distortion can be undone within the picture, and widens it to three times at most."""
+        """Return whether `unbent` can draw it: it can be undone, and is at most three times as wide as a picture."""
         with np.errstate(all="ignore"):
             straight = self.rays[:, :, :2].reshape(-1, 2)
             radial, aside = self._bending(straight)
             pixels = (straight * radial + aside) * (self.fx, self.fy) + (self.cx, self.cy)
             across, down = np.meshgrid(np.arange(self.width), np.arange(self.height))
             off = np.abs(pixels - np.column_stack((across.ravel(), down.ravel()))).max()
-            half = np.abs(straight).max(0) * (self.fx, self.fy)
+            half = np.abs(straight).max(0) * max(self.fx, self.fy)
         return bool(off < 0.1 and (half <= MOST_BENT / 2 * np.array((self.width, self.height))).all())
 
     @cached_property
     def unbent(self) -> Intrinsics:
-        """Return a camera without distortion that sees all that this one does, with the axis in its middle."""
-        if not any(self.distortion):
+        """Return a camera with square pixels, no distortion and its axis in the middle that sees all of this one."""
+        middle = (self.width - 1) / 2, (self.height - 1) / 2
+        if not any(self.distortion) and self.fx == self.fy and (self.cx, self.cy) == middle:
             return self
-        half = np.abs(self.rays[:, :, :2]).max((0, 1)) * (self.fx, self.fy)
+        focal = max(self.fx, self.fy)
+        half = np.abs(self.rays[:, :, :2]).max((0, 1)) * focal
         width, height = (int(2 * math.ceil(one) + 3) for one in half)
-        return Intrinsics(width, height, self.fx, self.fy, (width - 1) / 2, (height - 1) / 2)
+        return Intrinsics(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
 
 
 def info_message(header: Header, camera: Intrinsics) -> CameraInfo:

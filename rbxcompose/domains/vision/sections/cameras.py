@@ -17,7 +17,7 @@ from rbxcompose.manifest.fields import FileName
 from rbxcompose.manifest.files import resolve
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring
-from rbxcompose.manifest.tree import at
+from rbxcompose.manifest.tree import KeyPath, at
 
 CAMERA = "camera"
 NO_CALIBRATION = kind("RBX3721")
@@ -62,14 +62,14 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         if contents.is_simulated and contents.of(world) is not None:
             config |= {"size": model.size, "topic": name, "depth": model.depth, "noise": model.noise}
             config["view"] = f"{model.view!r} rad"
+            places = dict[str, KeyPath]()
             if file is not None:
                 from rbxcompose.domains.vision.camera_file import CameraFile  # imports numpy
 
                 known = CameraFile.read(file)
-                plain = known.distortion if len(known.distortion) <= 5 else ()
-                config |= {"view": f"{known.intrinsics.view!r} rad", "distortion": list(plain)}
-            lens = ("cameras", name, "calibration")
-            places = {"view": lens, "distortion": lens} if file is not None else {}
+                config["pinhole"] = (known.fx, known.fy, known.cx, known.cy)
+                config["distortion"] = list(known.distortion)
+                places = dict.fromkeys(("pinhole", "distortion"), ("cameras", name, "calibration"))
             yield WantedComponent(name, "camera_sim", config, ("cameras", name), places=places)
             continue
         width, height = model.size

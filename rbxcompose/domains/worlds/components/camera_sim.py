@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -41,6 +42,7 @@ SIGHT = 50.0  # how far pictures show something, at least [m]
 Colours = NDArray[np.uint8]
 Depths = NDArray[np.float32]
 Side = Annotated[int, Field(ge=16, le=2048)]
+FocalLength = Annotated[float, Field(gt=0)]
 
 
 class CameraSimConfig(SensorConfig):
@@ -52,8 +54,10 @@ class CameraSimConfig(SensorConfig):
     """Width and height of its pictures in pixels."""
     view: sdk.Angle = Field(math.radians(60), gt=0.01, lt=3)
     """From its left to its right edge."""
-    distortion: list[float] = Field([], max_length=5)
-    """Of its lens: k1, k2, p1, p2 and k3 of the model `plumb_bob`."""
+    pinhole: tuple[FocalLength, FocalLength, float, float] | None = None
+    """In place of the `view`, as a calibration has it: focal lengths fx and fy, and the middle cx and cy [px]."""
+    distortion: list[float] = Field([], max_length=8, validate_default=True)
+    """Of its lens: k1, k2, p1, p2 and k3 of the model `plumb_bob`; with k4, k5 and k6, `rational_polynomial`."""
     rate: sdk.Frequency = Field(10.0, gt=0, le=100)
     """Pictures a second, as long as somebody wants them."""
     depth: bool = False
@@ -78,12 +82,12 @@ class CameraSimConfig(SensorConfig):
     @field_validator("distortion")
     @classmethod
     def _is_lens(cls, distortion: list[float], info: ValidationInfo) -> list[float]:
-        if len(distortion) not in (0, 4, 5):
-            raise ValueError("a distortion has four or five coefficients")
-        if distortion and {"size", "view"} <= info.data.keys():
-            width, height = info.data["size"]
-            if not Intrinsics.of_view(width, height, info.data["view"], tuple(distortion)).is_lens:
-                raise ValueError("no lens bends a picture like this: the distortion is too strong for its view")
+        if len(distortion) not in (0, 4, 5, 8):
+            raise ValueError("a distortion has four, five or eight coefficients")
+        size, view, pinhole = (info.data.get(name) for name in ("size", "view", "pinhole"))
+        if (distortion or pinhole) and size and view and not _intrinsics(size, view, pinhole, distortion).is_lens:
+            why = "the distortion is too strong for its view, or its middle is too far aside"
+            raise ValueError(f"no lens bends a picture like this: {why}")
         return distortion
 
     @property
@@ -94,7 +98,14 @@ class CameraSimConfig(SensorConfig):
     @property
     def intrinsics(self) -> Intrinsics:
         """Return how it maps directions to pixels."""
-        return Intrinsics.of_view(*self.size, self.view, tuple(self.distortion))
+        return _intrinsics(self.size, self.view, self.pinhole, self.distortion)
+
+
+def _intrinsics(
+    size: tuple[int, int], view: float, pinhole: tuple[float, float, float, float] | None, distortion: Sequence[float]
+) -> Intrinsics:
+    bent = tuple(distortion)
+    return Intrinsics.of_view(*size, view, bent) if pinhole is None else Intrinsics(*size, *pinhole, bent)
 
 
 @sdk.component("camera_sim")
