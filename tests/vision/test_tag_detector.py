@@ -63,6 +63,8 @@ def test_it_publishes_tags_by_name_with_poses_and_transforms_of_those_that_have_
     assert (placed.header.frame_id, placed.child_frame_id) == (OPTICAL.frame_id, "tag_box")
     assert transform_of(placed.transform) == found["box"]
     assert seeing.near[-1].data == "12"
+    names = [[one.hypothesis.class_id for one in seen.results] for seen in seeing.seen[-1].detections]
+    assert names == [["box", "7"], ["12"]]
     assert seeing.sees({}) == {}
     assert seeing.near[-1].data == ""
 

@@ -160,7 +160,7 @@ def test_a_robot_that_looks_away_finds_its_dock_and_faces_it(tmp_path: Path, sim
     if simulator == "physics":
         pytest.importorskip("mujoco", reason="mujoco is not installed")
     docker = Docker(tmp_path, simulator)
-    docker.ask("dock")
+    docker.ask("3")  # the number of its tag is as good as its name
     (end,) = docker.ends
     skip_without_pictures(docker.bench, simulator, end.outcome is Outcome.SUCCEEDED)
     assert end.outcome is Outcome.SUCCEEDED, end.message

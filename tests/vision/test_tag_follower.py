@@ -120,10 +120,12 @@ def test_it_keeps_its_distance_to_somebody_who_walks(tmp_path: Path, simulator: 
     assert not contacts
 
 
-def tag(name: str, x: float, y: float = 0.0, score: float = 1.0) -> Detection3D:
+def tag(name: str, x: float, y: float = 0.0, score: float = 1.0, number: str = "") -> Detection3D:
     pose = Pose(Point(x, y, 0.0))
-    result = ObjectHypothesisWithPose(ObjectHypothesis(name, score), PoseWithCovariance(pose, np.zeros(36)))
-    return Detection3D(Header(), (result,), BoundingBox3D(center=pose), name)
+    names = filter(None, (name, number))
+    hypotheses = (ObjectHypothesis(each, score) for each in names)
+    results = tuple(ObjectHypothesisWithPose(each, PoseWithCovariance(pose, np.zeros(36))) for each in hypotheses)
+    return Detection3D(Header(), results, BoundingBox3D(center=pose), name)
 
 
 class Follower:
@@ -153,12 +155,13 @@ class Follower:
         client(FollowTag.Goal(**goal), self.ends.append)
 
 
-def test_a_goal_is_followed_until_its_time_is_over(tmp_path: Path) -> None:
-    follower = Follower(tmp_path)
-    assert follower.see(tag("box", 3.0)) == 0.0
-    follower.ask(tag="box", duration=2.0)
-    assert follower.see(tag("box", 3.0), tag("other", 1.0, 1.0)) > 0.3
-    follower.see(tag("box", 3.0), seconds=1.5)
+@pytest.mark.parametrize("asked", ["box", "7"])
+def test_a_goal_is_followed_by_name_or_number_until_its_time_is_over(tmp_path: Path, asked: str) -> None:
+    follower, box = Follower(tmp_path), tag("box", 3.0, number="7")
+    assert follower.see(box) == 0.0
+    follower.ask(tag=asked, duration=2.0)
+    assert follower.see(box, tag("other", 1.0, 1.0)) > 0.3
+    follower.see(box, seconds=1.5)
     assert [end.outcome for end in follower.ends] == [Outcome.SUCCEEDED]
     assert follower.sent[-1] == Twist()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,8 @@ def test_the_middle_of_tags_is_that_of_those_that_are_seen_and_count() -> None:
     ]
     assert targets.after("/tags", Detection3DArray(OPTICAL, (tag("c", 1.0),))) == []
     assert len(Targets("tags_cog").after("/tags", seen)) == 1
+    numbered = replace(tag("c", 9.0), results=tag("c", 9.0).results + tag("7", 9.0).results)
+    assert Targets("tags_cog", tags=["7"]).after("/tags", Detection3DArray(OPTICAL, (numbered,))) == [(9.0, 18.0, 1.0)]
 
 
 def cloud(depths: Any) -> PointCloud2:

@@ -14,7 +14,7 @@ from rbxcompose.base.geometry import Pose2, Transform3
 from rbxcompose.domains.worlds.poses import NewestMessage
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.poses import pose_of
-from rbxcompose.msgs.vision_msgs import Detection3DArray
+from rbxcompose.msgs.vision_msgs import Detection3D, Detection3DArray
 
 BASE, ODOM = "base_footprint", "odom"
 SQUARE = 0.5  # score from which on it is known how a tag is turned
@@ -43,6 +43,13 @@ class WatchedTag:
     """Its pose in that frame when it saw the tag."""
     covariance: NDArray[np.float64]
     """Of the pose, about the axes of the camera (6, 6): position [m^2], then rotation [rad^2]."""
+    names: frozenset[str]
+    """Its name and its number."""
+
+
+def names_of(seen: Detection3D) -> frozenset[str]:
+    """Return the name and the number of what was seen."""
+    return frozenset((seen.id, *(result.hypothesis.class_id for result in seen.results)))
 
 
 C = TypeVar("C", bound=TagWatcherConfig)
@@ -92,7 +99,7 @@ class TagWatcher(sdk.Component[C]):
             if score > 0.0 and all(map(math.isfinite, (*pose.translation, *pose.rotation))):
                 spread = np.asarray(one.results[0].pose.covariance, float).reshape(6, 6)
                 away = math.hypot(*pose.translation)
-                found.append(WatchedTag(one.id, at.compose(pose), away, score, at, spread))
+                found.append(WatchedTag(one.id, at.compose(pose), away, score, at, spread, names_of(one)))
         self.see(found)
 
     def see(self, tags: list[WatchedTag]) -> None:

@@ -58,19 +58,25 @@ class TagDetectorConfig(KnownTags):
 class Sight:
     """A tag or a board that was seen, with its pose in the optical frame if that is known."""
 
-    name: str
+    names: tuple[str, ...]
+    """First that by which it is known; a tag with a name has its number, too."""
     size: float
     pose: Transform3 | None
     covariance: Numbers | None
     doubt: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """Return the name by which it is known."""
+        return self.names[0]
 
 
 @sdk.component("tag_detector")
 class TagDetector(sdk.Component[TagDetectorConfig]):
     """Publishes which tags and boards a camera sees, and where: as detections, and as transforms of those with a name.
 
-    A detection has the name of the tag, or its number; its score falls when the tag might as well be mirrored, as small
-    ones are from afar.
+    A detection has the name of the tag, or its number; one with a name has both as its results. Its score falls when
+    the tag might as well be mirrored, as small ones are from afar.
 
     Example:
         finder: {type: tag_detector, frame: camera_optical_frame, size: 12 cm, names: {box: 7}}
@@ -178,8 +184,9 @@ class TagDetector(sdk.Component[TagDetectorConfig]):
 
     def sight(self, tag: SeenTag) -> Sight:
         """Return a tag with its name and its size."""
-        name, size = self.names.get(tag.number, str(tag.number)), self.size_of(tag.number) or THICK
-        return Sight(name, size, tag.pose, tag.covariance, tag.doubt)
+        number, size = str(tag.number), self.size_of(tag.number) or THICK
+        names = (self.names[tag.number], number) if tag.number in self.names else (number,)
+        return Sight(names, size, tag.pose, tag.covariance, tag.doubt)
 
     def size_of(self, number: int) -> float | None:
         """Return the side of a tag [m], None if that is not known."""
@@ -192,7 +199,7 @@ class TagDetector(sdk.Component[TagDetectorConfig]):
         for name, places in self.boards.items():
             placed = board_pose([tag for tag in found if tag.number in sizes], places, sizes, camera)
             if placed is not None:
-                seen.append(Sight(name, THICK, *placed))
+                seen.append(Sight((name,), THICK, *placed))
         return seen
 
     def detection(self, header: Header, one: Sight) -> Detection3D:
@@ -203,8 +210,8 @@ class TagDetector(sdk.Component[TagDetectorConfig]):
             pose = geometry.PoseWithCovariance(pose_message(one.pose), one.covariance.ravel())
             box = BoundingBox3D(pose.pose, geometry.Vector3(one.size, one.size, THICK))
         score = 0.0 if one.pose is None else 1.0 - one.doubt
-        result = ObjectHypothesisWithPose(ObjectHypothesis(class_id=one.name, score=score), pose)
-        return Detection3D(header, (result,), box, one.name)
+        results = [ObjectHypothesisWithPose(ObjectHypothesis(class_id=name, score=score), pose) for name in one.names]
+        return Detection3D(header, tuple(results), box, one.name)
 
     def step(self, dt: float) -> None:
         """Report whether pictures come, and whether they can be used."""

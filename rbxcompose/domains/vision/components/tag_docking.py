@@ -82,7 +82,7 @@ class TagDocking(TagWatcher[TagDockingConfig]):
         """Note where the tag is."""
         if self.goal is None or self.docking is None:
             return
-        mine = [tag for tag in tags if tag.name == self.goal.request.tag]
+        mine = [tag for tag in tags if self.goal.request.tag in tag.names]
         last = self.chosen
         if mine:
             tag = min(mine, key=lambda one: math.dist(one.pose.translation, last.translation) if last else one.away)

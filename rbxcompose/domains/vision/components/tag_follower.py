@@ -97,7 +97,7 @@ class TagFollower(TagWatcher[TagFollowerConfig]):
         found = [
             (tag.away if last is None else math.dist(tag.pose.translation, last), tag.name, tag.pose.translation)
             for tag in tags
-            if tag.name == meant or not meant
+            if meant in tag.names or not meant
         ]
         if found:
             _, self.target, self.place = min(found)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from rbxcompose import sdk
+from rbxcompose.domains.vision.tag_watcher import names_of
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped
 from rbxcompose.msgs.vision_msgs import Detection3DArray
@@ -38,7 +39,8 @@ class TagsCog(sdk.Component[TagsCogConfig]):
 
     def on_seen(self, message: Detection3DArray) -> None:
         """Publish the middle of those that count; one without a pose does not."""
-        chosen = [one for one in message.detections if one.id in self.config.tags or not self.config.tags]
+        wanted = {*self.config.tags}
+        chosen = [one for one in message.detections if not wanted or wanted & names_of(one)]
         placed = [one.bbox.center.position for one in chosen if one.results and one.results[0].hypothesis.score > 0.0]
         places = [(at.x, at.y, at.z) for at in placed]
         finite = [place for place in places if np.isfinite(place).all()]
