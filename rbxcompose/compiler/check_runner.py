@@ -4,11 +4,11 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from rbxcompose.base.findings import Finding, Report, Severity
+from rbxcompose.base.findings import Finding, FindingKind, Report, Severity
 from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
 from rbxcompose.base.printable import plain
 from rbxcompose.base.rooms import domain_of, package_of
-from rbxcompose.base.rules import OUR_CODES, Rule, declared
+from rbxcompose.base.rules import OUR_CODES, Rule, belonging, declared
 from rbxcompose.compiler.doubts import Doubts, doubts_of, half_read
 from rbxcompose.compiler.model.robot import NOTHING, Robot
 from rbxcompose.manifest.registry import PLUGINS as SECTIONS
@@ -29,9 +29,13 @@ CHECKS: dict[str, Check] = {}  # every check that has been imported, by code
 
 
 def check(
-    code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = False, closed: tuple[str, ...] | None = None
+    code: str | FindingKind,
+    severity: Severity = Severity.ERROR,
+    *,
+    is_fixable: bool = False,
+    closed: tuple[str, ...] | None = None,
 ) -> Callable[[Find], Check]:
-    """Declare a rule under its code.
+    """Declare a rule under its code, or under a kind of finding that reading a manifest also reports.
 
     Codes that begin with `RBX` are those of this project; others start with their own word (`LAMP01`). `closed` is what
     the rule takes for known, see `Rule`.
@@ -41,6 +45,10 @@ def check(
     """
 
     def declare(find: Find) -> Check:
+        if isinstance(code, FindingKind):
+            if CHECKS.setdefault(code.code, made := belonging(find, code, closed)) is not made:
+                raise ValueError(f"two checks have the code {code.code}")
+            return made
         if not _CODE.fullmatch(code):
             raise ValueError(f"'{code}' is not a code: a code is capital letters followed by digits")
         if is_foreign(find) and code.startswith(OUR_CODES):

@@ -77,6 +77,8 @@ def test_without_a_world_it_is_the_real_one_with_the_same_topics(tmp_path: Path)
         ("size: 16 cm, names", "camera: back, size: 16 cm, names", "RBX1004", "back"),
         ("  front: {frame", "  back: {frame: base_footprint}\n  front: {frame", "RBX3722", "one of back, front"),
         ("names: {box: 7}", "names: {box: 7}, sizes: {box: 0 cm}", "RBX1005", "'box' must be greater than 0 m"),
+        ("names: {box: 7}", "names: {box: 587}", "RBX1003", "tag36h11 has the tags 0 to 586, and no 587"),
+        ("names: {box: 7}", "boards: {box: {tags: [{number: 587}]}}", "RBX1003", "tag36h11 has the tags 0 to 586"),
         ("names: {box: 7}", "names: {box: 7, dock: 7}", "RBX1003", "the same number"),
     ],
 )
@@ -87,3 +89,11 @@ def test_mistakes_are_findings_at_their_place(tmp_path: Path, old: str, new: str
     assert said in checked.text
     assert found[0].span is not None
     assert found[0].span.file.endswith("robot.yaml")
+
+
+def test_who_needs_to_know_where_tags_are_without_a_size_is_told(tmp_path: Path) -> None:
+    follower = "  follow_tag: {type: tag_follower, frame: base_footprint_optical_frame}\ncameras:\n"
+    text = ROBOT.replace("size: 16 cm, ", "")
+    assert "RBX3741" not in project(tmp_path).check(text).text
+    checked = Project(tmp_path).check(text.replace("cameras:\n", follower))
+    assert "the tags of 'tags' have no size, so 'follow_tag' does not learn where they are" in checked.text

@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rbxcompose.base.findings import Finding, Severity
+from rbxcompose.base.findings import Finding, Severity, Span
+from rbxcompose.base.rules import WIRING
 from rbxcompose.base.units import LENGTH, TIME, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
+from rbxcompose.manifest.tree import ScalarNode
+from rbxcompose.manifest.validate import NOT_A_CHOICE
 from rbxcompose.sdk import CommandsMotion
 from rbxcompose.sdk.ports import In, Out
 
 DETECTOR, SIMULATED, REAL = "tag_detector", "camera_sim", "usb_camera"
+FOR_BASES = ("tag_follower", "tag_docking")
+USERS = {
+    "tag_follower": ("tags", "tag"),
+    "tag_docking": ("tags", ""),
+    "tagged_people": ("tags", "tags"),
+    "tag_localisation": ("tags", "tags"),
+    "tags_cog": ("seen", "tags"),
+}
+"""Types that use tags: the port where they learn of them, and the field that names some."""
 LARGEST, SMALLEST = 1.0, 0.005  # [m] of a tag that is probably meant
 SEEN = 20.0  # [px] of a black square that is found in 19 of 20 pictures, measured with 36h11
 BLURRED = 2.0  # [px] by which a picture may be blurred
@@ -37,18 +50,38 @@ def tag_of_strange_size(robot: Robot) -> Iterator[Finding]:
                 yield tag_of_strange_size.at(robot.value(*made.place(key)), message, help=help_text)
 
 
+@check(NOT_A_CHOICE, closed=(WIRING,))
+def unknown_tag(robot: Robot) -> Iterator[Finding]:
+    """A component or a mission names a tag that the camera's detector does not know."""
+    for made in robot.components.values():
+        if (detector := _detector(robot, made)) is None:
+            continue
+        from rbxcompose.domains.worlds.tag_pictures import FAMILIES  # imports numpy
+
+        known: Any = detector.config
+        names = [*known.names, *known.boards]
+        numbers = set(map(str, range(FAMILIES[known.family].total)))
+        for word, span in (*_tags_of(robot, made), *_tags_in_missions(robot, made)):
+            if word not in names and word not in numbers:
+                yield NOT_A_CHOICE.misspelt(span, f"'{detector.name}' knows no tag '{word}'", word, names, "its tags")
+
+
 @check("RBX3741", Severity.WARNING, closed=())
 def tag_too_small(robot: Robot) -> Iterator[Finding]:
-    """A tag is too small to be found at the distance at which something follows it, or docks at it."""
+    """A tag is too small to be found at the distance at which something follows it or docks at it, or has no size."""
     for made in robot.components.values():
-        if made.type_name not in ("tag_follower", "tag_docking"):
-            continue
-        detector = _source(robot, made, "tags")
-        camera = _source(robot, detector, "image") if detector is not None and detector.type_name == DETECTOR else None
-        if detector is None or camera is None or (focal := _focal_length(camera)) is None:
+        if (detector := _detector(robot, made)) is None:
             continue
         config: Any = made.config
         known: Any = detector.config
+        if known.size is None and not known.sizes:
+            message = f"the tags of '{detector.name}' have no size, so '{made.name}' does not learn where they are"
+            help_text = "add 'size: ...', the side of the black square of a tag"
+            yield tag_too_small.at(robot.key(*detector.path), message, help=help_text)
+            continue
+        camera = _source(robot, detector, "image")
+        if made.type_name not in FOR_BASES or camera is None or (focal := _focal_length(camera)) is None:
+            continue
         far = config.distance + (config.room if made.type_name == "tag_docking" else 0.0)
         size = known.sizes.get(getattr(config, "tag", ""), known.size)
         if size is not None and size * focal < SEEN * far:
@@ -81,6 +114,37 @@ def exposure_too_long(robot: Robot) -> Iterator[Finding]:
             message = f"at {turning}, pictures are blurred by {blur:.0f} pixels in {config.exposure * 1e3:g} ms"
             help_text = f"expose them for {longest} at most, with more light, or turn more slowly"
             yield exposure_too_long.at(robot.value(*made.place("exposure")), message, help=help_text)
+
+
+def _detector(robot: Robot, made: RobotComponent) -> RobotComponent | None:
+    """Return the detector whose tags a component uses; None if it uses none, or those of something else."""
+    found = _source(robot, made, USERS[made.type_name][0]) if made.type_name in USERS and made.is_sound else None
+    return found if found is not None and found.type_name == DETECTOR else None
+
+
+def _tags_of(robot: Robot, made: RobotComponent) -> Iterator[tuple[str, Span]]:
+    """Yield the tags that the configuration of a component names, with their places."""
+    field = USERS[made.type_name][1]
+    named: str | list[str] | dict[str, Any] = getattr(made.config, field, "")
+    place = made.place(field)
+    if isinstance(named, dict):
+        yield from ((name, robot.key(*place, name)) for name in named)
+    elif isinstance(named, list):
+        yield from ((name, robot.value(*place, index)) for index, name in enumerate(named))
+    elif named:
+        yield named, robot.value(*place)
+
+
+def _tags_in_missions(robot: Robot, made: RobotComponent) -> Iterator[tuple[str, Span]]:
+    """Yield the tags that missions name in goals of a component, with their places."""
+    topics = {end.topic for end in made.ends}
+    for node in (node for mission in robot.missions.values() for node in mission.program.nodes):
+        if (source := robot.skills.get(node.skill)) is None or source.topic not in topics:
+            continue
+        for argument in node.step.arguments:
+            written, name = argument.value, argument.name or source.skill.main
+            if name == "tag" and isinstance(written, ScalarNode) and re.fullmatch(r"\w+", written.text):
+                yield written.text, written.span
 
 
 def _source(robot: Robot, made: RobotComponent, port: str) -> RobotComponent | None:

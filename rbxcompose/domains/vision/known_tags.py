@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from rbxcompose.base.config import Angle, Config, Length, Name
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
-from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, TAG_FAMILIES
+from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, TAG_FAMILIES, no_tag
 
 
 class BoardTag(Config):
@@ -64,6 +64,15 @@ class KnownTags(Config):
     """Sizes of tags with another `size`, by name."""
     boards: dict[Name, TagBoard] = {}
     """Boards by name."""
+
+    @field_validator("names", "boards")
+    @classmethod
+    def _are_of_family(cls, known: dict[str, int] | dict[str, TagBoard], info: ValidationInfo) -> Any:
+        for one in known.values():
+            for number in (one,) if isinstance(one, int) else one.places:
+                if why := no_tag(number, info.data.get("family", DEFAULT_FAMILY)):
+                    raise ValueError(why)
+        return known
 
     @model_validator(mode="after")
     def _are_told_apart(self) -> KnownTags:

@@ -306,11 +306,12 @@ def _people(found: NavigationOfRobot, model: PeopleModel, wiring: Wiring) -> Ite
         "zones": found.zones,
         **{name: getattr(driving, name) for name in ("speed", "turn_rate", "acceleration")},
     }
-    tracker, sees = "people_tracker", laser
+    tracker, sees, names = "people_tracker", laser, ("navigation", "people", "tags", "names")
     if (tags := model.tags) is not None:
         tracker, sees = "tagged_people", _camera(tags.from_, tags.frame, wiring)
         sees |= {"tags": tags.names, "behind": tags.behind}
-    yield WantedComponent(PEOPLE, tracker, {**sees, "farthest": model.farthest}, ("navigation", "people"))
+    config_of_tracker = {**sees, "farthest": model.farthest}
+    yield WantedComponent(PEOPLE, tracker, config_of_tracker, ("navigation", "people"), places={"tags": names})
     yield WantedComponent(FOLLOW, FOLLOWER, config, ("navigation", "people"))
 
 
