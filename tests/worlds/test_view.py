@@ -136,6 +136,9 @@ def test_a_lens_that_cannot_be_is_refused() -> None:
             instance("camera", "camera_sim", {"distortion": distortion, "view": "120 deg"})
     with pytest.raises(ValueError, match="no lens bends"):
         instance("camera", "camera_sim", {"pinhole": [200.0, 200.0, 5000.0, 120.0]})
+    for pinhole in ([200.0], [0.0, 200.0, 160.0, 120.0]):
+        with pytest.raises(ValueError, match="it is fx, fy, cx and cy"):
+            instance("camera", "camera_sim", {"pinhole": pinhole})
 
 
 class Seeing:

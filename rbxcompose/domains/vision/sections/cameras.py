@@ -67,7 +67,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
                 from rbxcompose.domains.vision.camera_file import CameraFile  # imports numpy
 
                 known = CameraFile.read(file)
-                config["pinhole"] = (known.fx, known.fy, known.cx, known.cy)
+                config["pinhole"] = [known.fx, known.fy, known.cx, known.cy]
                 config["distortion"] = list(known.distortion)
                 places = dict.fromkeys(("pinhole", "distortion"), ("cameras", name, "calibration"))
             yield WantedComponent(name, "camera_sim", config, ("cameras", name), places=places)

@@ -42,7 +42,6 @@ SIGHT = 50.0  # how far pictures show something, at least [m]
 Colours = NDArray[np.uint8]
 Depths = NDArray[np.float32]
 Side = Annotated[int, Field(ge=16, le=2048)]
-FocalLength = Annotated[float, Field(gt=0)]
 
 
 class CameraSimConfig(SensorConfig):
@@ -54,7 +53,7 @@ class CameraSimConfig(SensorConfig):
     """Width and height of its pictures in pixels."""
     view: sdk.Angle = Field(math.radians(60), gt=0.01, lt=3)
     """From its left to its right edge."""
-    pinhole: tuple[FocalLength, FocalLength, float, float] | None = None
+    pinhole: list[float] = Field([], max_length=4)
     """In place of the `view`, as a calibration has it: focal lengths fx and fy, and the middle cx and cy [px]."""
     distortion: list[float] = Field([], max_length=8, validate_default=True)
     """Of its lens: k1, k2, p1, p2 and k3 of the model `plumb_bob`; with k4, k5 and k6, `rational_polynomial`."""
@@ -79,13 +78,21 @@ class CameraSimConfig(SensorConfig):
     by_physics: bool = False
     """Whether a physics engine draws its pictures; with `simulator: physics`, that is the default."""
 
+    @field_validator("pinhole")
+    @classmethod
+    def _has_focal_lengths(cls, pinhole: list[float]) -> list[float]:
+        if pinhole and (len(pinhole) < 4 or min(pinhole[:2]) <= 0):
+            raise ValueError("it is fx, fy, cx and cy, and the focal lengths are above 0")
+        return pinhole
+
     @field_validator("distortion")
     @classmethod
     def _is_lens(cls, distortion: list[float], info: ValidationInfo) -> list[float]:
         if len(distortion) not in (0, 4, 5, 8):
             raise ValueError("a distortion has four, five or eight coefficients")
-        size, view, pinhole = (info.data.get(name) for name in ("size", "view", "pinhole"))
-        if (distortion or pinhole) and size and view and not _intrinsics(size, view, pinhole, distortion).is_lens:
+        known = {name: info.data[name] for name in ("size", "view", "pinhole") if name in info.data}
+        is_known = len(known) == 3 and (distortion or known["pinhole"])
+        if is_known and not _intrinsics(**known, distortion=distortion).is_lens:
             why = "the distortion is too strong for its view, or its middle is too far aside"
             raise ValueError(f"no lens bends a picture like this: {why}")
         return distortion
@@ -102,10 +109,13 @@ class CameraSimConfig(SensorConfig):
 
 
 def _intrinsics(
-    size: tuple[int, int], view: float, pinhole: tuple[float, float, float, float] | None, distortion: Sequence[float]
+    size: tuple[int, int], view: float, pinhole: Sequence[float], distortion: Sequence[float]
 ) -> Intrinsics:
     bent = tuple(distortion)
-    return Intrinsics.of_view(*size, view, bent) if pinhole is None else Intrinsics(*size, *pinhole, bent)
+    if not pinhole:
+        return Intrinsics.of_view(*size, view, bent)
+    fx, fy, cx, cy = pinhole
+    return Intrinsics(*size, fx, fy, cx, cy, bent)
 
 
 @sdk.component("camera_sim")
