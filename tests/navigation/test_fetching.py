@@ -90,7 +90,7 @@ def test_a_block_is_fetched_from_the_living_room_to_the_kitchen() -> None:
     assert z == pytest.approx(COUNTER + HALF, abs=2e-3)
     qx, qy, _, _ = errand.block.rotation
     assert 2 * math.hypot(qx, qy) < math.radians(2)
-    touched = {(link, what) for link, what in errand.touched if what != "ground"}
+    touched = {(link, what) for link, what in errand.touched if what != "the ground"}
     assert touched == {(f"right_gripper_{side}_finger_link", "target") for side in ("left", "right")}
     assert errand.swayed < 0.05
     finger = errand.states[-1].name.index(FINGER)
@@ -104,6 +104,6 @@ def test_a_block_that_is_elsewhere_fails_with_a_reason_and_nothing_is_hit() -> N
     errand = Errand(shift=-0.2)
     assert errand.outcome == "failure"
     assert any("nothing_grasped" in text for text in errand.bench.texts())
-    assert {what for _, what in errand.touched} == {"ground"}
+    assert {what for _, what in errand.touched} == {"the ground"}
     errand.bench.advance(1.0)
     assert abs(errand.engine.base_velocity.linear) < 1e-3

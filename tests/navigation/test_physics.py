@@ -13,6 +13,7 @@ from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.rbxcompose_msgs import Switches
 from rbxcompose.msgs.sensor_msgs import LaserScan
+from rbxcompose.msgs.stamps import to_seconds
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
@@ -28,23 +29,33 @@ simulator: physics
 components:
   base: {type: diff_drive_sim}
   laser: {type: laser_sim, frame: base_link}
+cameras: {front: {frame: base_link, size: [32, 24]}}
 """
 CRATE = """rbx: 1
 kind: World
 name: room
 objects:
-  crate: {box: [30 cm, 60 cm, 40 cm], at: {x: 1 m}, mass: MASS}
+  NAME: {box: [30 cm, 60 cm, 40 cm], at: {x: 1 m}, mass: MASS}
 """
 
 
-def pushed(folder: Path, mass: str) -> tuple[float, float, list[str]]:
-    """Return how far a robot that pushes a crate gets [m], how far ahead its laser sees that, and what it touched."""
-    bench = Room(folder, ROBOT, CRATE.replace("MASS", mass)).bench
+def pushed(folder: Path, mass: str, name: str = "crate") -> tuple[float, float, list[str]]:
+    """Return how far a robot that pushes a crate gets [m], how far ahead its laser sees that, and what it touched.
+
+    Its odometry and its summary agree with that.
+    """
+    bench = Room(folder, ROBOT, CRATE.replace("MASS", mass).replace("NAME", name)).bench
     truth, scans = bench.collect("/ground_truth", Odometry), bench.collect("/scan", LaserScan)
+    told = bench.collect("/odom", Odometry)
     touched = bench.collect("/contact", String, Qos.EVENT)
     for _ in range(60):
         bench.publish("/cmd_vel", Twist(linear=Vector3(x=0.3)), Qos.COMMAND)
         bench.advance(0.1)
+    driven = float(bench.host.summary()["base"]["distance driven"].removesuffix(" m"))
+    assert driven == pytest.approx(truth[-1].pose.pose.position.x, abs=0.05)
+    passed = to_seconds(told[-1].header.stamp) - to_seconds(told[-101].header.stamp)
+    rolled = (told[-1].pose.pose.position.x - told[-101].pose.pose.position.x) / passed
+    assert np.mean([one.twist.twist.linear.x for one in told[-100:]]) == pytest.approx(rolled, rel=0.01)
     ahead = float(np.asarray(scans[-1].ranges)[len(scans[-1].ranges) // 2])
     return truth[-1].pose.pose.position.x, ahead, [message.data for message in touched]
 
@@ -56,6 +67,13 @@ def test_a_robot_pushes_what_is_light_and_stalls_before_what_stands_fast(tmp_pat
     assert seen < 0.4  # its laser sees the crate where it is now
     assert fast < 0.85
     assert touched[0] == "crate"
+
+
+@pytest.mark.parametrize("name", ["ground", "base_link"])
+def test_a_thing_is_felt_whatever_its_name(tmp_path: Path, name: str) -> None:
+    far, _, touched = pushed(tmp_path, "0 kg", name)
+    assert far < 0.85
+    assert set(touched) == {name}
 
 
 @pytest.mark.soak

@@ -458,7 +458,18 @@ def test_a_base_stops_where_it_touches_and_may_leave_again(tmp_path: Path) -> No
         if speed > 0:
             assert room.base.core.pose.x == pytest.approx(-0.1 - 0.175, abs=0.002)
             assert [contact.data for contact in room.contacts] == ["map"]
+            assert room.base.core.distance == pytest.approx(2.0 - 0.275, abs=0.002)
     assert room.base.core.pose.x == pytest.approx(-0.275 - 0.55, abs=0.1)
+
+
+@pytest.mark.parametrize("name", ["visitor", "base_footprint"])
+def test_who_walks_into_a_base_that_stands_touches_it_once_each_time(tmp_path: Path, name: str) -> None:
+    path = "[[0 s, -2 m, 2 m], [4 s, -2 m, 0.3 m], [6 s, -2 m, 0.3 m], [8 s, -2 m, 2 m]]"
+    walker = f"objects:\n  {name}: {{shape: person, path: {path}, repeats: true}}\n"
+    room = Room(tmp_path, world=WORLD + walker)
+    room.bench.advance(16.0)
+    assert [contact.data for contact in room.contacts] == [name, name]
+    assert room.bench.host.summary()["base"] == {"distance driven": "0.00 m", "contacts": "2"}
 
 
 def test_a_laser_sees_what_stands_at_its_height(tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ def test_it_stays_where_it_is_if_nothing_moves_it() -> None:
 def test_a_wall_stops_it_while_its_wheels_slip() -> None:
     physics = PhysicsWorld(TURTLEBOT, shipped_world("one_wall", Pose2(-1.0, 0.0, 0.0)))
     speed_up(physics, 0.3, 0.0)
-    assert all(touch.what == "ground" for touch in physics.contacts())
+    assert all(touch.what == "the ground" for touch in physics.contacts())
     run(physics, 4.0)
     before, turned = physics.base_pose, physics.wheel_angles
     pressing: list[list[Touch]] = []

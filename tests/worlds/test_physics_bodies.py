@@ -217,7 +217,7 @@ def test_a_link_that_nothing_holds_falls_until_its_mesh_touches_the_ground(tmp_p
     physics = PhysicsWorld(robot, empty(robot))
     physics.step(2.0)
     assert physics.position("rail") == pytest.approx(-0.4, abs=3e-3)
-    assert {(touch.link, touch.what) for touch in physics.contacts()} == {("tip", "ground")}
+    assert {(touch.link, touch.what) for touch in physics.contacts()} == {("tip", "the ground")}
     assert sum(touch.force for touch in physics.contacts()) == pytest.approx(9.81, rel=0.05)
 
 

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from rbxcompose.base.geometry import Pose2
+from rbxcompose.domains.worlds.optics import TO_OPTICAL
 from rbxcompose.domains.worlds.physics.engine import PhysicsWorld
 from rbxcompose.domains.worlds.physics.looks import PhysicsCamera, colour_of
+from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, outline_body
 from rbxcompose.domains.worlds.shapes import WorldBox, WorldLight, WorldShape
 from tests.worlds.physical import empty, from_urdf
 
@@ -59,6 +61,15 @@ def test_depths_are_those_of_rays(physics: PhysicsWorld) -> None:
     assert near.sum() > 30
     assert (np.abs(found[near] / expected[near] - 1) > 1e-3).sum() <= 1  # an edge may be in a pixel
     assert (found[~np.isfinite(expected)] == np.inf).all()
+
+
+def test_the_outline_of_a_robot_does_not_hide_the_world_from_its_camera(physics: PhysicsWorld) -> None:
+    robot = PhysicsRobot(outline_body(0.2, 0.5), drives=True)
+    wall = WorldShape("wall", WorldBox((0.2, 3, 3)), Pose2(2, 0))
+    camera = PhysicsCamera("base_footprint", 160, 120, 1.2, TO_OPTICAL)
+    made = PhysicsWorld(robot, empty(robot, wall), cameras={"camera": camera})
+    assert made.picture("camera").depths[20, 80] == pytest.approx(1.9, abs=0.01)
+    made.close()
 
 
 def test_a_lamp_lights_what_faces_it(physics: PhysicsWorld) -> None:

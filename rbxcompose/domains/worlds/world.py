@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, quaternion_from_rpy, yaw_of
-from rbxcompose.domains.worlds.contact import FirstContact, first_contact, touching
+from rbxcompose.domains.worlds.contact import TOUCHING, FirstContact, first_contact, overlap, touching
 from rbxcompose.domains.worlds.grid_map import GridMap
 from rbxcompose.domains.worlds.ground import WorldHole, in_polygon
 from rbxcompose.domains.worlds.ray_casting import Numbers, Rays
@@ -109,6 +109,18 @@ class SimulatedWorld:
         middle, reach = ((before.x + after.x) / 2, (before.y + after.y) / 2), self.radius + before.distance(after) / 2
         near = self.shapes_near(middle, reach, time, 0.0, self.height)
         return first_contact(self.grid, near, CircleFootprint(self.radius), before, after)
+
+    def touched_by(self, pose: Pose2, time: float) -> frozenset[str]:
+        """Return what moves and is up to 1 mm from a robot at a pose in `map`, or in it, at a time [s]."""
+        footprint = CircleFootprint(self.radius + TOUCHING)
+        near = [shape.at(time) for shape in self._moving if shape.is_between(0.0, self.height)]
+        near += self._robots_near((pose.x, pose.y), footprint.radius, time, 0.0) if self.robots else []
+        return frozenset(shape.name for shape in near if overlap(NO_WALLS, [shape], footprint, pose)[1])
+
+    @property
+    def moving(self) -> frozenset[str]:
+        """Return the names of what moves: shapes with a path, and other robots."""
+        return frozenset(shape.name for shape in (*self._moving, *self.robots))
 
     def touching(self, pose: Pose2, within: float, time: float) -> Numbers:
         """Return the directions in which something is within `within` [m] of the robot, in its frame (n,) [rad]."""

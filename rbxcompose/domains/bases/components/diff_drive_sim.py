@@ -116,7 +116,8 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
         self.world: SimulatedWorld | None = None
         self.hangs = False  # whether a wheel has no ground
         self.grounded = self.core.pose  # where all its wheels had ground the last time
-        self.touched, self.contacts = "", 0  # what it touches now, and how often it began to touch something
+        self.touched: frozenset[str] = frozenset()  # what it touches now
+        self.contacts = 0  # how often it began to touch something
 
     def reconfigure(self, old: DiffDriveSimConfig) -> None:
         """Apply the new limits to later commands; the last command stays as it was clamped."""
@@ -147,8 +148,9 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
 
     def step(self, dt: float) -> None:
         """Move for `dt` [s] and publish where the base is."""
-        before = self.core.pose
+        before, driven = self.core.pose, self.core.distance
         self.core.step(self.now, dt)
+        wanted = self.core.pose
         if self.config.by_physics:
             self.drive_wheels(before)
         elif self.world is not None:
@@ -156,6 +158,8 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
             if self.config.wheel_distance:
                 self.stay_on_ground(self.world, before, self.config.wheel_distance)
             self.report_truth()
+        if self.core.pose is not wanted:
+            self.core.distance = driven + before.distance(self.core.pose)
         if self.core.pose is not before and not self.config.by_physics:
             self.estimate = self.drifted(before.inverse().compose(self.core.pose))
         header = Header(stamp=to_time(self.stamp), frame_id=ODOM)
@@ -177,10 +181,13 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
             self.stay_on_ground(self.world, self.core.pose, self.config.wheel_distance)
         if measured is not None:
             self.estimate = pose_in(measured.pose.pose)
+        self.bound["drive"](self.wanted)
+
+    @property
+    def wanted(self) -> geometry.Twist:
+        """Return how fast it drives by its commands and limits; where nothing is in its way, so fast it is."""
         velocity = self.core.velocity
-        self.bound["drive"](
-            geometry.Twist(linear=geometry.Vector3(x=velocity.linear), angular=geometry.Vector3(z=velocity.angular))
-        )
+        return geometry.Twist(linear=geometry.Vector3(x=velocity.linear), angular=geometry.Vector3(z=velocity.angular))
 
     def drifted(self, moved: Pose2) -> Pose2:
         """Return where the wheels believe the base to be after a motion in its own frame."""
@@ -197,16 +204,18 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
             self.bound["truth"](self.odometry(Header(stamp=to_time(self.stamp), frame_id="map"), pose))
 
     def stay_outside(self, world: SimulatedWorld, before: Pose2) -> None:
-        """Stop where the base touches something, and report what it is when the contact begins."""
+        """Stop where the base touches something, and report what touches it when the contact begins."""
         found = world.first_contact(before, self.core.pose, self.now)
+        touched = world.touched_by(self.core.pose, self.now)
         if found is not None:
             self.core.pose, self.core.velocity = found.pose, AT_REST
-            if found.what != self.touched:
-                self.contacts += 1
-                self.bound["contact"](String(data=found.what))
+            touched |= {found.what}
         elif self.core.pose == before:
-            return  # it still leans there
-        self.touched = found.what if found is not None else ""
+            touched |= self.touched - world.moving  # it still leans there
+        for what in sorted(touched - self.touched):
+            self.contacts += 1
+            self.bound["contact"](String(data=what))
+        self.touched = touched
 
     def stay_on_ground(self, world: SimulatedWorld, before: Pose2, wheel_distance: float) -> None:
         """Do not move while a wheel has no ground, and tell which one."""
@@ -231,13 +240,12 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
 
     def odometry(self, header: Header, pose: geometry.Pose) -> Odometry:
         """Return pose and velocity of the base as a message."""
-        velocity = self.core.velocity
-        twist = geometry.Twist(linear=geometry.Vector3(x=velocity.linear), angular=geometry.Vector3(z=velocity.angular))
+        measured = self.bound["measured"].value if self.config.by_physics else None
         return Odometry(
             header=header,
             child_frame_id=BASE,
             pose=geometry.PoseWithCovariance(pose=pose),
-            twist=geometry.TwistWithCovariance(twist=twist),
+            twist=measured.twist if measured is not None else geometry.TwistWithCovariance(twist=self.wanted),
         )
 
     def tell_commands(self) -> None:

@@ -48,7 +48,7 @@ from rbxcompose.domains.worlds.world import SimulatedWorld
 
 TIMESTEP = 2e-3  # [s]
 WALL = 3.0  # height of what is occupied in a map [m]
-GROUND = "ground"
+GROUND = "the ground"  # no thing of a world has a name with a space
 OF_WORLD, OF_ROBOT = 0, 3  # groups of shapes: rays see the first one only
 # Coefficients of friction; of two that touch, the larger one counts.
 RUBBER, GRIP, SMOOTH = 1.0, 0.8, 0.3  # wheels; arms and hands; the base and the world
@@ -90,7 +90,7 @@ class PhysicsModel:
     """The body that each link belongs to, and its frame in that of the body."""
     joints: Mapping[str, JointPlace]
     touching: Mapping[int, str]
-    """What each shape (geom) belongs to: a link, `ground`, `map`, or a shape of the world."""
+    """What each shape (geom) belongs to: a link, `the ground`, `map`, or a shape of the world."""
     things: Mapping[str, int]
     """The body of each shape of the world that moves."""
     height: float
@@ -146,6 +146,7 @@ class _Conversion:
         option.gravity = (0.0, 0.0, -GRAVITY)
         self.names: dict[str, str] = {}  # of geoms, to what they belong
         self.gripping: list[str] = []  # names of the geoms of arms and hands
+        self.pushed: list[str] = []  # and of those of loose things
         parts = rigid_parts(robot.body, robot.meshes, self.repairs)
         self.placed: PlacedParts = placed_parts(robot, parts)
         self.wheels = None if robot.drives is False else find_wheels(robot, self.placed)
@@ -191,8 +192,7 @@ class _Conversion:
         It is damping in MuJoCo: with that of other contacts, what is held creeps while the arm accelerates.
         """
         stiff, friction = (2 * self.spec.option.timestep, 1.0), (GRIP, GRIP, 5e-3, 1e-4, 1e-4)
-        things = [name for name, belongs in self.names.items() if belongs in self.loose]
-        for hand, thing in product(self.gripping, things):
+        for hand, thing in product(self.gripping, self.pushed):
             self.spec.add_pair(geomname1=thing, geomname2=hand, condim=3, friction=friction, solreffriction=stiff)
 
     def _add_world(self) -> None:
@@ -262,6 +262,8 @@ class _Conversion:
         geom.friction[0] = friction
         if friction == GRIP:
             self.gripping.append(geom.name)
+        if geom.group == OF_WORLD and belongs in self.loose:
+            self.pushed.append(geom.name)
         self.names[geom.name] = belongs
 
     def _add_part(self, index: int, part: RigidPart, start: Transform3) -> None:

@@ -34,13 +34,15 @@ class Touch:
 
     link: str
     what: str
-    """`ground`, `map`, a shape of the world, or another link."""
+    """`the ground`, `map`, a shape of the world, or another link."""
     point: Vector3
     """In `map` [m]."""
     normal: Vector3
     """From what is touched to the link, a unit vector in `map`."""
     force: float
     """Along the normal [N]."""
+    is_own: bool
+    """Whether what is touched is a link, too: things of the world may have the names of links."""
 
 
 def _no_file(message: str) -> None:
@@ -324,7 +326,8 @@ class PhysicsWorld:
             towards = 1.0 if own[1] else -1.0  # the normal of MuJoCo points from the first to the second
             (px, py, pz), (nx, ny, nz) = contact.pos.tolist(), (contact.frame[:3] * towards).tolist()
             names = self.converted.touching
-            found.append(Touch(names[link], names[other], (px, py, pz), (nx, ny, nz), float(force[0])))
+            point, normal = (px, py, pz), (nx, ny, nz)
+            found.append(Touch(names[link], names[other], point, normal, float(force[0]), all(own)))
         return found
 
     def ray(self, link: str, directions: ArrayLike, most: float, origin: Vector3 = NO_TRANSLATION) -> Numbers:

@@ -88,11 +88,14 @@ class PhysicsRobot:
 
 
 def outline_body(radius: float, height: float) -> Body:
-    """Return the body of a robot of which only the outline is known: a cylinder 1 cm above the ground."""
+    """Return the body of a robot of which only the outline is known: a cylinder 1 cm above the ground.
+
+    It is not seen: the robot's own camera is within it.
+    """
     span = Span("", 1, 1, 1, 1)
     length = max(height - 0.01, 0.01)
     shape = Shape(Geometry("cylinder", (radius, length)), Transform3((0.0, 0.0, 0.01 + length / 2)), span)
-    return Body("robot", {FOOTPRINT: BodyLink(FOOTPRINT, span, None, (shape,), (shape,))})
+    return Body("robot", {FOOTPRINT: BodyLink(FOOTPRINT, span, collisions=(shape,))})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
