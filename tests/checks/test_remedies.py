@@ -87,6 +87,68 @@ def test_a_place_that_nobody_removed_is_misspelt_as_ever(tmp_path: Path) -> None
     assert finding.help == "did you mean 'corner_3'?"
 
 
+SENSORS = """world: rbx:worlds/one_wall.yaml
+components:
+  base: {type: diff_drive_sim}
+  laser: {type: laser_sim, frame: FRAME}
+"""
+PLACING = """  placing:
+    type: program
+    command: [./placing]
+    publishes: {/tf: tf2_msgs/TFMessage}
+"""
+
+
+@pytest.mark.parametrize(
+    ("frame", "more", "help_text"),
+    [
+        ("base_footprint", "", None),
+        ("base_link", "", "write 'frame: base_footprint', or add a 'body' that has it"),
+        ("base_link", PLACING, None),
+    ],
+)
+def test_without_a_body_a_simulated_sensor_is_at_the_base_or_where_somebody_places_it(
+    frame: str, more: str, help_text: str | None, tmp_path: Path
+) -> None:
+    robot = "rbx: 1\nkind: Robot\nname: one\n" + SENSORS.replace("FRAME", frame) + more
+    found = [each for each in check_text(robot, tmp_path).compilation.report if each.code == "RBX2019"]
+    assert [each.help for each in found] == [help_text] * (help_text is not None)
+
+
+GAZER = """rbx: 1
+kind: Robot
+name: gazer
+world: rbx:worlds/one_wall.yaml
+buses: {servos: {type: dynamixel}}
+include:
+  neck: {part: rbx:parts/pan_tilt.yaml, with: {bus: servos}}
+cameras: {front: {frame: neck_top}}
+tags: {size: 12 cm, names: {visitor: 7}}
+heads:
+  neck_head: HEAD
+"""
+
+
+@pytest.mark.parametrize(
+    ("head", "code", "wrong", "help_text"),
+    [
+        ("{tracks: {frame: tag_visitr}}", "RBX2019", "tag_visitr", "did you mean 'tag_visitor'?"),
+        ("{frames: [odom, mapp]}", "RBX2019", "mapp", "did you mean 'map'?"),
+        ("{tracks: {topic: target_posee}}", "RBX3010", "target_posee", None),
+    ],
+)
+def test_what_a_robot_writes_about_a_head_of_a_part_is_wrong_where_it_is_written(
+    head: str, code: str, wrong: str, help_text: str | None, tmp_path: Path
+) -> None:
+    text = GAZER.replace("HEAD", head)
+    [finding] = [each for each in check_text(text, tmp_path).compilation.report if wrong in each.message]
+    assert finding.code == code
+    assert finding.span
+    assert Path(finding.span.file).name == "robot.yaml"
+    assert text.splitlines()[finding.span.line - 1][finding.span.column - 1 : finding.span.end_column - 1] == wrong
+    assert help_text in (None, finding.help)
+
+
 ELSEWHERE = "rbx: 1\nkind: {}\nname: delivery\ndo: recharge\n"
 
 

@@ -71,8 +71,9 @@ def _finding(robot: Robot, component: RobotComponent, ends: list[PortEnd]) -> Fi
     names = " and ".join(f"'{end.topic}'" for end in ends)
     near = [(end, other) for end in ends for other in robot.ends if _fits(end, other)]
     fix = robot.connection((end, other.topic.strip("/")) for end, other in near)
+    topics = [text for end in ends for text in (end.topic, end.topic.strip("/"), end.topic.rpartition("/")[-1])]
     return needed_port.at(
-        robot.end_span(ends[0]),
+        robot.value_span_of(component.name, *topics) or robot.end_span(ends[0]),
         f"'{component.name}' needs {names}, which nothing in the robot provides",
         help=f"connect it: {fix}" if fix else f"add the component that provides it{_such_as(ends)}",
         related=[Related(robot.end_span(other), f"'{other.topic}' is of this type") for _, other in near],

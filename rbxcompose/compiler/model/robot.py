@@ -17,7 +17,7 @@ from rbxcompose.compiler.sections.places import unknown_place
 from rbxcompose.compiler.sections.values import values
 from rbxcompose.manifest.fill import OpenNames
 from rbxcompose.manifest.registry import naming_in_use, sections_in_use
-from rbxcompose.manifest.tree import KeyPath, at, key_span, value_span
+from rbxcompose.manifest.tree import KeyPath, ScalarNode, all_nodes, at, key_span, value_span
 from rbxcompose.missions.analysis.effects import settings_of
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of
@@ -246,6 +246,14 @@ class Robot:
             return self.key(*component.places[end.name])
         path = (*component.path, "connect", end.name)
         return self.key(*path) if at(self.manifest.root, path) is not None else self.component_span(end.instance)
+
+    def value_span_of(self, name: str, *texts: str) -> Span | None:
+        """Return where the entry of a component has one of these values; None if that is in the part that brings it."""
+        own, entry = self.components[name].path, self.entry_span(name)
+        nodes = all_nodes(there) if own and (there := at(self.manifest.root, own)) is not None else ()
+        spans = (node.span for node in nodes if isinstance(node, ScalarNode) and node.text in texts)
+        is_own = entry == self.component_span(name)
+        return next((span for span in spans if is_own or span.file != self.component_span(name).file), None)
 
     def connection(self, wanted: Iterable[tuple[PortEnd, str]]) -> str:
         """Return what to write so that ports of one component have other topics; nothing if that cannot be."""

@@ -16,32 +16,43 @@ from rbxcompose.sdk.capabilities import Drives, Setting, WritesFrame
 from rbxcompose.sdk.ports import Looks
 
 STATIC = "_static"  # suffix of the topic of static transforms; both topics describe one tree
+_TF = ("/tf", f"/tf{STATIC}")
 
 
 @check("RBX2019", Severity.WARNING, closed=(WIRING,))
 def frame_of_body(robot: Robot) -> Iterator[Finding]:
     """A component uses a frame that the body does not have."""
     description = robot.manifest.contents.of(body)
-    if description is None or not description.body.links:
+    shape = description.body if description else Body("")
+    if description and not shape.links:
         return
-    shape = description.body
     written = [item for _, item in robot.declared(WritesFrame)]
     placed = {item.child.value for item in written} | {item.parent.value for item in written if not item.needs_parent}
-    placed |= {description.virtual.frame} if description.virtual else set()  # RBX2352
+    placed |= {description.virtual.frame} if description and description.virtual else set()  # RBX2352
+    is_known = description is not None or all(
+        robot.components[end.instance].declared(WritesFrame) for topic in _TF for end in robot.writers.get(topic, ())
+    )
     for component in robot.components.values():
-        for frame in component.declared(WritesFrame) if component.declared(Drives) else ():
+        for frame in component.declared(WritesFrame) if description and component.declared(Drives) else ():
             if frame.child.value not in shape.links:
                 message = f"this moves the frame '{frame.child.value}', which the body does not have"
                 mover = robot.entry_span(component.name, frame.transforms)
                 is_own = is_written(robot, component, frame.child.field)
                 place = setting_span(robot, (component, frame.child.field)) if is_own else mover
                 yield _finding(shape, place, message, _other_root(shape, frame.child))
-        for port in (end.port for end in component.ends):
-            for name in (port.source, port.target) if isinstance(port, Looks) else ():
+        for port in (end.port for end in component.ends if isinstance(end.port, Looks)):
+            for name in (port.source, port.target) if description else _mounting(component, port) if is_known else ():
                 if name not in placed and name not in shape.links:
                     message = f"'{component.name}' looks up the frame '{name}', which no component publishes"
-                    help_text = suggest(name, shape.links, "its links")
-                    yield _finding(shape, robot.entry_span(component.name), message, help_text, (component.name, name))
+                    known = suggest(name, [*shape.links, *sorted(placed)], "known frames")
+                    help_text = known if description else "write 'frame: base_footprint', or add a 'body' that has it"
+                    place = robot.value_span_of(component.name, name) or robot.entry_span(component.name)
+                    yield _finding(shape, place, message, help_text, (component.name, name))
+
+
+def _mounting(component: RobotComponent, port: Looks) -> tuple[str, ...]:
+    """Return the frame that a simulated sensor is at, unless that is the base itself: without a body, there is none."""
+    return (port.source,) if component.cls.simulated and port.source != port.target else ()
 
 
 def _other_root(body: Body, moved: Setting[str]) -> str:
@@ -51,8 +62,8 @@ def _other_root(body: Body, moved: Setting[str]) -> str:
 
 
 def _finding(body: Body, place: Span, message: str, help_text: str, about: tuple[str, ...] = ()) -> Finding:
-    root = body.links[body.root]
-    root_is = [Related(root.span, f"the root of the body is '{root.name}'")]
+    root = body.links[body.root] if body.links else None
+    root_is = [Related(root.span, f"the root of the body is '{root.name}'")] if root else []
     return frame_of_body.at(place, message, help=help_text, related=root_is, about=about)
 
 
