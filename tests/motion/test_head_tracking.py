@@ -21,8 +21,8 @@ ANGLES = st.floats(-3, 3)
 class Follower:
     """Joints that are where they were told to be one cycle before."""
 
-    def __init__(self, **settings: Any) -> None:
-        self.settings, self.tracker = HeadTrackingSettings(**settings), HeadTracker(LIMITS)
+    def __init__(self, pan: MotionLimits = LIMITS["pan"], **settings: Any) -> None:
+        self.settings, self.tracker = HeadTrackingSettings(**settings), HeadTracker({**LIMITS, "pan": pan})
         self.at, self.time = {"pan": 0.0, "tilt": 0.0}, 0.0
 
     def cycle(self, pan: float | None = None, tilt: float = 0.0) -> dict[str, float] | None:
@@ -84,15 +84,19 @@ def test_without_its_target_it_slows_down_and_then_looks_ahead() -> None:
     assert abs(places[-1]) < 0.03
 
 
-def test_it_looks_around_to_both_sides_before_that() -> None:
-    follower = Follower(lost=0.2, recentre=0.2, search=20.0)
+@pytest.mark.parametrize(
+    ("least", "greatest", "right", "left"), [(-2.0, 2.0, -1.2, 1.2), (0.2, 1.4, 0.25, 1.35), (-1.4, -0.2, -1.35, -0.25)]
+)
+def test_it_looks_around_to_both_sides_before_that(least: float, greatest: float, right: float, left: float) -> None:
+    follower = Follower(MotionLimits(least, greatest), lost=0.2, recentre=0.2, search=20.0)
     follower.cycle(0.3)
     pans = []
     for _ in range(420):
         follower.cycle()
         pans.append(follower.at["pan"])
-    assert max(pans) > 1.2
-    assert min(pans) < -1.2
+    seen = pans[80:380]  # it has been at a limit or a quarter turn, and looks around still
+    assert max(seen) > left
+    assert min(seen) < right
 
 
 def test_what_leaps_is_another_target_and_does_not_throw_the_head() -> None:

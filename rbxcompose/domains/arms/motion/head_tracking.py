@@ -157,14 +157,16 @@ class HeadTracker:
         return {name: self._within(name, at + self._rates[name] * dt) for name, at in self._told.items()}
 
     def _around(self, settings: HeadTrackingSettings, dt: float, present: Mapping[str, float]) -> dict[str, float]:
-        """Turn to one side and to the other."""
+        """Turn to one side and to the other, by a quarter turn from ahead if the limits allow it."""
         self.state = HeadTrackingState.SEARCHES
         told = {name: self._told.get(name, present[name]) for name in self._limits}
         first = next(iter(self._limits))
-        wanted = told[first] + self._side * settings.calm * dt
+        wanted, ahead = told[first] + self._side * settings.calm * dt, self._within(first, 0.0)
         told[first] = self._within(first, wanted)
-        if told[first] != wanted or abs(wanted) > math.pi / 2:
-            self._side = -math.copysign(1.0, wanted)
+        if wanted >= self._within(first, ahead + math.pi / 2):
+            self._side = -1.0
+        elif wanted <= self._within(first, ahead - math.pi / 2):
+            self._side = 1.0
         return told
 
     def _back(self, settings: HeadTrackingSettings, dt: float, present: Mapping[str, float]) -> dict[str, float] | None:
