@@ -217,9 +217,9 @@ def _is_reversed(ends: list[TreeNode] | tuple[TreeNode, ...], known: Constants) 
     return low is not None and high is not None and low > high
 
 
-@check("RBX2377", closed=("heads", "scene"))
+@check("RBX2377", closed=("arms", "heads", "scene"))
 def look_frame(robot: Robot) -> Iterator[Finding]:
-    """A head is to look at a point in a frame that it does not know."""
+    """A head is to look at an object, or at a point in a frame, that it does not know."""
     contents, description = robot.manifest.contents, robot.manifest.contents.of(body)
     found = contents.of(heads)
     if description is None:
@@ -227,6 +227,13 @@ def look_frame(robot: Robot) -> Iterator[Finding]:
     skills = {"look_at" if len(found) == 1 else f"look_at_{name}": name for name in found}
     for node in (node for mission in robot.missions.values() for node in mission.program.nodes if node.skill in skills):
         head, written = (skills[node.skill], next((item for item in node.step.arguments if item.name == "frame"), None))
+        if (thing := _word(node)) and not contents.of(arms):
+            yield look_frame.at(
+                next(item.value.span for item in node.step.arguments if item.name in ("", "object")),
+                f"'{head}' knows no object '{thing}': only a robot with 'arms' has a scene",
+                help="look at a point, or at a frame that it 'tracks'",
+                related=[Related(robot.key("heads", head), "the head")],
+            )
         frames = (*found[head].model.frames, *contents.of(scene).frames)
         if written is None or not isinstance(written.value, ScalarNode) or "$" in written.value.text:
             continue
