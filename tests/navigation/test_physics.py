@@ -13,7 +13,7 @@ from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.rbxcompose_msgs import Switches
 from rbxcompose.msgs.sensor_msgs import LaserScan
-from rbxcompose.msgs.stamps import to_seconds
+from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
@@ -53,7 +53,7 @@ def pushed(folder: Path, mass: str, name: str = "crate") -> tuple[float, float, 
         bench.advance(0.1)
     driven = float(bench.host.summary()["base"]["distance driven"].removesuffix(" m"))
     assert driven == pytest.approx(truth[-1].pose.pose.position.x, abs=0.05)
-    passed = to_seconds(told[-1].header.stamp) - to_seconds(told[-101].header.stamp)
+    passed = (to_nanoseconds(told[-1].header.stamp) - to_nanoseconds(told[-101].header.stamp)) * 1e-9
     rolled = (told[-1].pose.pose.position.x - told[-101].pose.pose.position.x) / passed
     assert np.mean([one.twist.twist.linear.x for one in told[-100:]]) == pytest.approx(rolled, rel=0.01)
     ahead = float(np.asarray(scans[-1].ranges)[len(scans[-1].ranges) // 2])
