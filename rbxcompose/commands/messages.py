@@ -18,6 +18,7 @@ from rbxcompose.bus.graph import GraphName, WireType, find
 from rbxcompose.bus.names import name_problem
 from rbxcompose.commands.console import NotDoneError, emit, refuse, write_report
 from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, SAID_NO, Guest, ReceivedMessage, wanted
+from rbxcompose.commands.interrupts import INTERRUPTED
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, key_span, value_span
@@ -34,7 +35,6 @@ _SHOWN = "MESSAGE"  # name of the message text in findings
 M = TypeVar("M", bound=Message)
 T = TypeVar("T", bound=Interface)
 _PERIOD = 1.0  # [s] between two notices about messages left out
-_INTERRUPTED = 130
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,7 +301,7 @@ def _end(ended: Ended[Any], name: str, is_interrupted: bool, as_json: bool) -> i
     if ended.result is not None:
         _tell("result", ended.result, as_json)
     if is_interrupted:
-        return _INTERRUPTED
+        return INTERRUPTED
     if ended.outcome is Outcome.SUCCEEDED:
         return 0
     message = getattr(ended.result, "error_msg", "") or ended.message

@@ -34,7 +34,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "__main__": Cost(code=4, files=1, small=1, imports=2),
     "base": Cost(code=3812, files=33, small=4, imports=240),
     "bus": Cost(code=2461, files=21, small=0, imports=177),
-    "commands": Cost(code=2583, files=26, small=2, imports=307),
+    "commands": Cost(code=2584, files=26, small=2, imports=309),
     "compiler": Cost(code=7847, files=75, small=9, imports=937),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
     "domains/arms": Cost(code=13093, files=77, small=2, imports=1201),
@@ -57,15 +57,15 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "runtime": Cost(code=7706, files=46, small=1, imports=714),
     "sdk": Cost(code=1476, files=12, small=2, imports=157),
     "testing": Cost(code=642, files=7, small=2, imports=79),
-    "tools": Cost(code=18420, files=143, small=10, imports=2003),
+    "tools": Cost(code=18420, files=143, small=10, imports=2004),
 }
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 115825,
+    "lines of code": 115826,
     "files": 949,
     "files of 1 to 30 lines of code": 75,
-    "lines of imports": 11370,
+    "lines of imports": 11373,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 369,

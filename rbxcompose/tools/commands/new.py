@@ -15,6 +15,7 @@ from rbxcompose.base.files import read_regular, replace_file
 from rbxcompose.base.printable import plain
 from rbxcompose.commands import new_files
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
+from rbxcompose.commands.interrupts import INTERRUPTED
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.model.mission_facts import navigator_of, top_speed
 from rbxcompose.compiler.model.robot import Robot
@@ -25,7 +26,6 @@ from rbxcompose.tools.scaffold import MissionAnswers, with_entry
 
 GROUP = "write"
 IS_COMMON = True
-INTERRUPTED = 130
 _WIDEST = 4096  # characters per line, enough for any path
 ABOUT = "What is it for?"
 
