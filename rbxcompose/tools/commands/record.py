@@ -159,7 +159,7 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: b
     except OSError as error:
         recorder.abandon()
         words = f"'{plain(str(recorder.paths[-1]))}' cannot be written: {_reason(error)}"
-        return refuse(UNWRITABLE.at(None, words, help=_left_by(recorder)))
+        return refuse(UNWRITABLE.at(None, words, help=_recovery_help(recorder)))
     if tap.lost:
         warn(LOST.at(None, f"{tap.lost:,} messages came too fast to be recorded", help="choose fewer with '--topics'"))
     warn_of_unmatched(tap.unmatched, tap.others)
@@ -180,7 +180,7 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: b
     return 0
 
 
-def _left_by(recorder: Recorder) -> str:
+def _recovery_help(recorder: Recorder) -> str:
     """Return what there is of a recording that cannot be written any further."""
     path = plain(str(recorder.paths[-1]))
     finished = [plain(str(one)) for one in recorder.paths if one.exists()]

@@ -135,7 +135,7 @@ def _history(arguments: argparse.Namespace) -> int:
     above, folder = f"/{arguments.path.strip('/')}".rstrip("/"), find_robot(arguments.robot)
     changes = [change for change in _changes(folder) if f"{change.path}/".startswith(f"{above}/")]
     if above and not changes:
-        _know(above, folder)
+        _check_path(above, folder)
     if arguments.json:
         emit(json.dumps([change_data(change) for change in changes]))
     elif not changes:
@@ -145,7 +145,7 @@ def _history(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _know(path: str, folder: RobotFolder) -> None:
+def _check_path(path: str, folder: RobotFolder) -> None:
     """Check that the tree has a group or a part with this path.
 
     Raises:
