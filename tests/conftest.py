@@ -18,6 +18,7 @@ from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
+from hypothesis.internal.conjecture import providers
 from xdist.scheduler import LoadScopeScheduling
 
 from rbxcompose.testing.golden import Golden
@@ -58,6 +59,10 @@ def pytest_configure(config: pytest.Config) -> None:
         suppress_health_check=[HealthCheck.too_slow],  # it is the machine that is slow, as with deadlines
     )
     settings.load_profile("rbxcompose")
+    if not many:
+        # Constants of the package are examples as well, of those modules that a worker happens to have imported; and
+        # each worker of a new checkout would read them all, for 8 s.
+        vars(providers)["_get_local_constants"] = lambda: providers._local_constants
     os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache"))  # compiling takes longer than most tests may
     if CACHES not in os.environ:
         os.environ[CACHES] = os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp()
