@@ -225,6 +225,7 @@ def test_breakpoints_are_set_before_the_first_run(open_page: Callable[..., Page]
     done(page, "SetBreakpoint")
 
 
+@pytest.mark.soak  # as the editor does
 def test_debugging_fits_the_window_and_the_finger(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
     patrol.windows[BREAKPOINTS] = [breakpoint_("2", 2), breakpoint_("1->home", 1, "success")]
     page = open_page(page_name="mission", has_touch=True)

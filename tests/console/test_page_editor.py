@@ -196,6 +196,7 @@ def test_what_was_typed_stays_while_another_page_is_shown(open_page: Callable[..
     page.get_by_role("button", name="Undo").click()
 
 
+@pytest.mark.soak  # who may only look is tested with the mux
 def test_who_may_not_configure_reads_and_does_not_change(
     open_page: Callable[..., Page], project: Project, gateway: FakeGateway
 ) -> None:

@@ -434,6 +434,7 @@ def test_places_are_not_drawn_without_a_way_to_map(open_page: Callable[..., Page
     expect(page.get_by_text("they are not drawn")).to_be_visible()
 
 
+@pytest.mark.soak  # the editor of missions and the page that drives are looked at
 def test_it_fits_the_window_and_the_finger(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
     page = open_page(page_name="map")
     page.get_by_text("Another pose").click()

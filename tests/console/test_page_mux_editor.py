@@ -76,6 +76,7 @@ def test_what_is_wrong_is_told_before_it_is_saved(open_page: Callable[..., Page]
 
 
 @pytest.mark.parametrize("size", [PHONE, *rare(WIDE)], ids=["phone", "wide"])
+@pytest.mark.soak  # as the editor of missions does
 def test_the_editor_fits_and_everyone_can_read_it(
     open_page: Callable[..., Page], project: EditedProject, size: dict[str, int]
 ) -> None:

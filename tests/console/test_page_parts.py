@@ -170,6 +170,7 @@ def test_what_a_part_needs_is_asked_for(open_page: Callable[..., Page], project:
 
 
 @pytest.mark.parametrize("size", [PHONE, *rare(WIDE)], ids=["phone", "wide"])
+@pytest.mark.soak  # as the editor of missions does
 def test_the_editor_fits_and_everyone_can_read_it(
     open_page: Callable[..., Page], project: EditedProject, size: dict[str, int]
 ) -> None:

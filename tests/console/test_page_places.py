@@ -166,6 +166,7 @@ def test_a_place_is_added_by_a_drag_and_gets_a_name(open_page: Callable[..., Pag
     assert "  shelf: {x: 0.5 m, y: 0.5 m, heading: 90 deg}\n" in project.text()
 
 
+@pytest.mark.soak  # as in the outline of a mission
 def test_keys_alone_suffice(open_page: Callable[..., Page], project: EditedProject) -> None:
     page = open_page(page_name="map")
     panel = edits(page)
@@ -278,6 +279,7 @@ def test_after_a_connection_was_lost_in_a_save_it_is_told_what_became_of_it(
     assert "dock: {x: 0.5 m" in project.text()
 
 
+@pytest.mark.soak  # who may only look is tested with the mux
 def test_who_does_not_configure_sees_no_editor(
     open_page: Callable[..., Page], project: EditedProject, gateway: FakeGateway
 ) -> None:
@@ -288,6 +290,7 @@ def test_who_does_not_configure_sees_no_editor(
 
 
 @pytest.mark.parametrize("size", [PHONE, *rare(WIDE)], ids=["phone", "wide"])
+@pytest.mark.soak  # as the editor of missions does
 def test_the_editor_fits_and_everyone_can_read_it(
     open_page: Callable[..., Page], project: EditedProject, size: dict[str, int]
 ) -> None:

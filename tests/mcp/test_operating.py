@@ -11,7 +11,7 @@ import pytest
 
 from tests.cli.live_robot import Robot
 from tests.mcp.test_server import OPERATES, VIEWS, tree
-from tests.mcp.tool_client import ToolClient, served
+from tests.mcp.tool_client import ToolClient, connected
 from tests.patrol_project import ROBOT, write_project
 
 
@@ -32,7 +32,7 @@ def robot() -> Iterator[Robot]:
 def client(robot: Robot) -> Iterator[ToolClient]:
     project = robot.file.parent / "project"
     before = tree(project)
-    with served(project, robot.environment, "--operate") as made:
+    with connected(project, robot.environment, operates=True) as made:
         yield made
     assert tree(project) == before
 

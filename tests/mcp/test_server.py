@@ -14,10 +14,12 @@ from typing import Any
 import pytest
 
 from rbxcompose.commands.main import main as command
+from rbxcompose.domains.console.access import Role
 from rbxcompose.tools.commands import mcp
 from rbxcompose.tools.mcp.answer_size import MOST_CHARACTERS
 from tests.conftest import ROOT
-from tests.mcp.tool_client import ToolClient, served
+from tests.forked import Forked
+from tests.mcp.tool_client import ToolClient, connected, served
 from tests.patrol_project import MISSION, ROBOT, TEST, changed, write_project
 
 WRONG = "robots/wrong/robot.yaml"
@@ -65,15 +67,15 @@ def environment(base: Path) -> dict[str, str]:
 def client(project: Path, base: Path, environment: dict[str, str]) -> Iterator[ToolClient]:
     """A client; after all tests, nothing has changed in the project, and each call is in the log."""
     before = tree(project)
-    with served(project, environment) as made:
+    with connected(project, environment) as made:
         yield made
     assert tree(project) == before
     assert [path.name for path in (base / "state/rbxcompose").iterdir()] == ["mcp.jsonl"]
     assert sorted(call["tool"] for call in logged(base)) == sorted(made.called)
 
 
-def logged(base: Path) -> list[dict[str, Any]]:
-    lines = (base / "state/rbxcompose/mcp.jsonl").read_text(encoding="utf-8").splitlines()
+def logged(base: Path, state: str = "state") -> list[dict[str, Any]]:
+    lines = (base / state / "rbxcompose/mcp.jsonl").read_text(encoding="utf-8").splitlines()
     return [json.loads(line) for line in lines]
 
 
@@ -198,10 +200,37 @@ def test_many_calls_at_once_are_all_answered(client: ToolClient) -> None:
     assert client.at_once(3, "explain", code="RBX1001") == [False] * 3
 
 
-def test_a_call_that_its_client_cancels_is_ended_and_logged(client: ToolClient, base: Path) -> None:
-    assert "timed out" in client.gives_up("plan", robot=ROBOT)
-    assert "process mission" in client.told("plan", robot=ROBOT)["plan"]
-    assert ("plan", "was cancelled") in [(call["tool"], call["result"]) for call in logged(base)]
+def test_a_server_of_its_own_runs_verbs_in_processes_and_ends_and_logs_what_its_client_cancels(
+    project: Path, environment: dict[str, str], tmp_path: Path
+) -> None:
+    before = tree(project)
+    with served(project, {**environment, "XDG_STATE_HOME": str(tmp_path)}) as client:
+        assert set(client.tools()) == VIEWS
+        assert "timed out" in client.gives_up("plan", robot=ROBOT)
+        [finding] = client.told("check", paths=[WRONG], unsaved={})["findings"]
+        assert finding["help"] == "did you mean 'reach'?"
+        assert "is outside the project" in client.refusal("check", paths=["/etc/passwd"])
+    assert tree(project) == before
+    told = [(call["tool"], call["result"].partition(":")[0]) for call in logged(tmp_path, "")]
+    assert told == [("plan", "was cancelled"), ("check", "ok"), ("check", "refused")]
+
+
+@pytest.mark.parametrize(("words", "role"), [([], Role.VIEW), (["--operate"], Role.OPERATE)])
+def test_who_starts_it_says_whether_a_client_may_operate(
+    words: list[str], role: Role, project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rbxcompose.tools.mcp import server
+
+    given: list[Role] = []
+
+    async def serve(role: Role, deadline: float, log: object) -> None:
+        given.append(role)
+
+    monkeypatch.setattr(server, "serve", serve)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    assert command(["mcp", str(project), *words]) == 0
+    assert given == [role]
 
 
 def test_a_call_is_logged_without_the_texts(client: ToolClient, project: Path, base: Path) -> None:
@@ -232,7 +261,7 @@ def test_whatever_comes_in_and_however_long_it_takes_the_server_goes_on_and_only
         lines.append(json.dumps({"jsonrpc": "2.0", "id": number, "method": method, "params": given}))
     words = [sys.executable, "-m", "rbxcompose", "mcp", str(project), "--deadline", "10 ms"]
     whole = {**os.environ, "PYTHONPATH": str(ROOT), **environment, "XDG_STATE_HOME": str(tmp_path)}
-    with subprocess.Popen(
+    with Forked(
         words, env=whole, cwd="/", stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     ) as process:
         assert process.stdin

@@ -1,18 +1,22 @@
-"""The official client of the Model Context Protocol, with our server as its child process."""
+"""The official client of the Model Context Protocol, with our server as its child process, or in this process."""
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator, Mapping
+from contextlib import asynccontextmanager, chdir, contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from unittest import mock
 
+from anyio import create_task_group
 from anyio.from_thread import BlockingPortal, start_blocking_portal
 
+from tests.commands import command
 from tests.conftest import ROOT
 
 if TYPE_CHECKING:  # importing it takes a second, and each worker collects these tests
@@ -93,3 +97,40 @@ def served(folder: Path, environment: Mapping[str, str], *options: str) -> Itera
     server = StdioServerParameters(command=sys.executable, args=words, cwd=folder, env=whole)
     with start_blocking_portal() as portal, portal.wrap_async_context_manager(Client(server)) as client:
         yield ToolClient(portal, client)
+
+
+@contextmanager
+def connected(folder: Path, environment: Mapping[str, str], *, operates: bool = False) -> Iterator[ToolClient]:
+    """Connect a client to a server in this process, in which verbs run as well: a start of Python for each is saved."""
+    variables, verbs = mock.patch.dict(os.environ, environment), mock.patch("rbxcompose.tools.mcp.tools.run_verb", _run)
+    with chdir(folder), variables, verbs, start_blocking_portal() as portal:
+        served_here = portal.wrap_async_context_manager(_in_memory(operates))
+        with served_here as client:
+            yield ToolClient(portal, client)
+
+
+@asynccontextmanager
+async def _in_memory(operates: bool) -> AsyncIterator[Client]:
+    from mcp.client import Client
+    from mcp.shared.memory import create_client_server_memory_streams
+
+    from rbxcompose.domains.console.access import Role
+    from rbxcompose.tools.mcp import server
+    from rbxcompose.tools.mcp.audit_log import AuditLog
+
+    role = Role.OPERATE if operates else Role.VIEW
+    async with create_client_server_memory_streams() as (ours, theirs):
+        with mock.patch.object(server, "stdio_server", return_value=nullcontext(theirs)):
+            async with create_task_group() as tasks:
+                tasks.start_soon(server.serve, role, 60.0, AuditLog())
+                async with Client(nullcontext(ours)) as client:
+                    yield client
+                await ours[1].aclose()  # as a client that closes the connection
+
+
+async def _run(*words: str, folder: Path = Path("/"), unsaved: Mapping[str, str] | None = None) -> Any:
+    from rbxcompose.tools.mcp.verb_process import VerbOutput
+
+    with mock.patch("sys.stdin", io.TextIOWrapper(io.BytesIO(json.dumps(unsaved or {}).encode()))):
+        done = command(*words, *(("--unsaved", "-") if unsaved else ()), environment={}, folder=folder)
+    return VerbOutput(done.returncode, done.stdout, done.stderr)

@@ -70,14 +70,14 @@ def test_what_is_measured_changes_as_the_rates_say(seed: int) -> None:
 
 def test_the_tip_stays_in_a_box_and_joints_in_their_ranges() -> None:
     z = float(frame_of(READY)[2, 3])
-    keep = Keep(inside=(None, None, (z - 0.03, z + 0.03)), joints={"j1": (-0.5, 0.5), "j4": (0.0, 1.0)})
+    keep = Keep(inside=(None, None, (z - 0.06, z + 0.06)), joints={"j1": (-0.5, 0.5), "j4": (0.0, 1.0)})
     kept, space = KeptTip(ARM, keep, READY), keep.narrowed(SPACE)
     goal = next(array for each in space.samples(60, 3) if (array := kept.projected(each, space)) is not None)
     found = ended(SIX.plan(request(goal, keep)))
     assert isinstance(found, MotionPlan), found
     assert found.trajectory is not None
-    points = np.array(sampled(found.trajectory, 0.02))
-    assert max(abs(frame_of(point)[2, 3] - z) for point in points) <= 0.03 + 1e-6
+    points = np.array(sampled(found.trajectory, 0.05))
+    assert max(abs(frame_of(point)[2, 3] - z) for point in points) <= 0.06 + 1e-6
     assert np.abs(points[:, 0]).max() <= 0.5 + 1e-6
     assert points[:, 3].min() >= -1e-6
 

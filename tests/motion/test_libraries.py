@@ -50,16 +50,25 @@ def asked(function: Any, table: Array, weight: float = 0.1) -> tuple[int, list[f
     return function(Pair(np.array([1.0, 2.0, 3.0]), weight), table, found, 3), found.tolist()
 
 
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the library of the function above."""
+    made = tmp_path_factory.mktemp("libraries")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(numba_cache, "cache_folder", lambda: str(made))
+        patch.setattr(numba_cache, "_made", [])
+        maker = CompiledFunction(cast(CompiledFunction, weighted).function, is_kept=True)
+        assert is_empty()
+        asked(maker, np.ones((3, 2)))
+        numba_cache.keep_libraries()
+        assert not is_empty()
+    return made
+
+
 @pytest.fixture
-def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CompiledFunction:
+def kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> CompiledFunction:
     """Return the function above, in a library."""
-    monkeypatch.setattr(numba_cache, "cache_folder", lambda: str(tmp_path))
-    monkeypatch.setattr(numba_cache, "_made", [])
-    maker = CompiledFunction(cast(CompiledFunction, weighted).function, is_kept=True)
-    assert is_empty()
-    asked(maker, np.ones((3, 2)))
-    numba_cache.keep_libraries()
-    assert not is_empty()
+    monkeypatch.setattr(numba_cache, "cache_folder", lambda: str(folder))
     return CompiledFunction(cast(CompiledFunction, weighted).function, is_kept=True)
 
 

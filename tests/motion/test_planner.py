@@ -47,7 +47,7 @@ def test_a_plan_is_free_and_within_all_limits_by_other_code(seed: int) -> None:
     found = plan(start, goal)
     assert isinstance(found, MotionPlan), found
     assert found.trajectory is not None
-    points = sampled(found.trajectory, 0.005)
+    points = sampled(found.trajectory, 0.01)
     assert np.allclose(points[0], start)
     assert np.allclose(points[-1], goal)
     assert min(gap(BODY, point) for point in points) >= -TOUCH
@@ -120,7 +120,7 @@ def test_a_start_that_servos_measure_just_outside_of_its_limits_is_none() -> Non
     assert far.reason is MotionReason.START_OUTSIDE_LIMITS
 
 
-@pytest.mark.parametrize("name", ["rrt_star", "informed_rrt_star", "aorrtc"])
+@pytest.mark.parametrize("name", ["aorrtc", *rare("rrt_star", "informed_rrt_star")])
 def test_a_planner_that_improves_its_path_finds_one(name: str) -> None:
     found = plan(LEFT, RIGHT, planner=name, time=2.0)
     assert isinstance(found, MotionPlan), found

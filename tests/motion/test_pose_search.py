@@ -93,9 +93,11 @@ def test_what_will_do_approximately_is_met_exactly_where_it_can_be(
 
 @settings(max_examples=4)
 @given(SEEDS, st.booleans())
-def test_no_small_step_gets_nearer_than_what_is_approximate_and_the_start_is_not(seed: int, any_way: bool) -> None:
+def test_no_small_step_gets_nearer_than_what_is_approximate_and_the_start_is_not(
+    arm: ArmKinematics, seed: int, any_way: bool
+) -> None:
     target = PoseTarget(elsewhere(seed), any_way, is_approximate=True)
-    found = search(ARM, target)
+    found = search(arm, target)
     assume(found.is_approximate)
     best = target.excess(ARM.tip_pose(found.free[0]))
     assert best <= target.excess(ARM.tip_pose(np.zeros(6)))
@@ -155,6 +157,7 @@ def test_a_preferred_posture_is_never_farther_than_without_and_keeps_the_pose(
         assert target.is_met(ARM.tip_pose(values))
 
 
+@pytest.mark.soak
 @settings(max_examples=10)
 @given(SEEDS, KINDS)
 def test_plain_and_compiled_code_prefer_the_same(seed: int, kind: dict[str, bool]) -> None:

@@ -140,7 +140,7 @@ def test_what_was_fitted_is_kept_and_a_bad_file_is_fitted_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    triangles = np.random.default_rng(1).normal(size=(16, 3, 3))
+    triangles = np.random.default_rng(1).normal(size=(8, 3, 3))
     first = kept_mesh_tree(triangles)
     [path] = (tmp_path / "rbxcompose/spheres").iterdir()
     again = kept_mesh_tree(triangles)

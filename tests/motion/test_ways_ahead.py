@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion import fast_search, search
 from rbxcompose.domains.arms.motion import hand_task as ways_ahead
-from rbxcompose.domains.arms.motion.hand_task import ATTEMPTS, ContactSearch, HandTask, PlanJob, Planned, PlanningHelper
+from rbxcompose.domains.arms.motion.hand_task import ContactSearch, HandTask, PlanJob, Planned, PlanningHelper
 from rbxcompose.domains.arms.motion.planner import MotionPlanner, MotionRequest, Planning
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
@@ -26,6 +26,7 @@ from rbxcompose.msgs.rbxcompose_msgs import PickObject
 from tests.motion.pi_hand import HandBench
 
 PICK = PickObject.Goal(object="target")
+ATTEMPTS = 3  # ways that are planned to
 SHORT = 0.02  # [s] of planning: on a clock that stands still it is a number of positions, which is often too small
 CONFINED = 664  # the seed of a scene that the arm gets nowhere in
 Outcome = tuple[object, ...]
@@ -103,6 +104,7 @@ class Recalling:
 def known(monkeypatch: pytest.MonkeyPatch) -> dict[bytes, Planned]:
     """Note all motions that are planned, by their ends; slices are small, so that there are many in a short time."""
     monkeypatch.setattr(ways_ahead, "ALONE", 0)
+    monkeypatch.setattr(ways_ahead, "ATTEMPTS", ATTEMPTS)
     for one in (fast_search, search):
         monkeypatch.setattr(one, "SLICE", 100)
     noted: dict[bytes, Planned] = {}

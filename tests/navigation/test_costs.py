@@ -100,7 +100,7 @@ CHEST = WorldShape("chest", WorldBox((0.5, 0.4, 0.5)), Pose2(0.2, 0.3, 0.4))
 
 
 @given(st.floats(-1.8, 1.8), st.floats(-1.8, 1.8), st.floats(-math.pi, math.pi), st.floats(-0.8, 0.8))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=settings().max_examples // 2)
 def test_what_stands_does_not_move_because_the_robot_does(x: float, y: float, heading: float, turns: float) -> None:
     poses = [Pose2(x, y, heading).moved(Velocity2(0.4, turns), step / 10) for step in range(20)]
     assume(all(at.distance(CHEST.pose) > 0.6 and max(abs(at.x), abs(at.y)) < 2.6 for at in poses))
@@ -112,7 +112,7 @@ def test_what_stands_does_not_move_because_the_robot_does(x: float, y: float, he
 
 
 @given(st.floats(0.4, 1.5), st.floats(-math.pi, math.pi))
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=settings().max_examples // 2)
 def test_who_walks_is_seen_to_move_and_nothing_else_is(speed: float, heading: float) -> None:
     costs, rays = LayeredCosts(room(), SETTINGS), Rays(room())
     for step in range(5, 25):

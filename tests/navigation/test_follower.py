@@ -102,7 +102,7 @@ def test_without_a_way_there_is_nothing_to_follow() -> None:
 
 
 @given(st.floats(0.3, 0.9), st.floats(-math.pi / 2, math.pi / 2), st.floats(0.0, 2.0))
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=settings().max_examples // 2)
 def test_a_robot_stands_when_somebody_who_walks_in_front_of_it_is_there(speed: float, side: float, late: float) -> None:
     grid = room()
     costs, rays = LayeredCosts(grid, CostSettings(radius=RADIUS)), Rays(grid)

@@ -45,6 +45,7 @@ def agreement(made: GridMap, true: GridMap) -> tuple[float, int]:
     return float(right.mean()), len(right)
 
 
+@pytest.mark.soak  # what a robot maps on its way agrees, too
 @given(st.floats(-math.pi, math.pi), st.floats(0.0, 0.01), st.floats(-SIDE / 2, SIDE / 2))
 @settings(max_examples=2, deadline=None)
 def test_a_map_from_known_poses_agrees_with_the_world(heading: float, noise: float, shift: float) -> None:

@@ -19,6 +19,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from rbxcompose.testing.bench import run_robot
 from tests.navigation.test_robot import Room
+from tests.soak import rare
 
 pytestmark = pytest.mark.timeout(120)
 mujoco = pytest.importorskip("mujoco", reason="mujoco is not installed")
@@ -35,7 +36,7 @@ CRATE = """rbx: 1
 kind: World
 name: room
 objects:
-  NAME: {box: [30 cm, 60 cm, 40 cm], at: {x: 1 m}, mass: MASS}
+  NAME: {box: [30 cm, 60 cm, 40 cm], at: {x: 60 cm}, mass: MASS}
 """
 
 
@@ -48,7 +49,7 @@ def pushed(folder: Path, mass: str, name: str = "crate") -> tuple[float, float, 
     truth, scans = bench.collect("/ground_truth", Odometry), bench.collect("/scan", LaserScan)
     told = bench.collect("/odom", Odometry)
     touched = bench.collect("/contact", String, Qos.EVENT)
-    for _ in range(60):
+    for _ in range(45):
         bench.publish("/cmd_vel", Twist(linear=Vector3(x=0.3)), Qos.COMMAND)
         bench.advance(0.1)
     driven = float(bench.host.summary()["base"]["distance driven"].removesuffix(" m"))
@@ -63,16 +64,16 @@ def pushed(folder: Path, mass: str, name: str = "crate") -> tuple[float, float, 
 def test_a_robot_pushes_what_is_light_and_stalls_before_what_stands_fast(tmp_path: Path) -> None:
     light, seen, touched = pushed(tmp_path, "1 kg")
     fast, _, _ = pushed(tmp_path, "0 kg")
-    assert light > 1.2
+    assert light > 0.9
     assert seen < 0.4  # its laser sees the crate where it is now
-    assert fast < 0.85
+    assert fast < 0.45
     assert touched[0] == "crate"
 
 
-@pytest.mark.parametrize("name", ["ground", "base_link"])
+@pytest.mark.parametrize("name", ["base_link", *rare("ground")])
 def test_a_thing_is_felt_whatever_its_name(tmp_path: Path, name: str) -> None:
     far, _, touched = pushed(tmp_path, "0 kg", name)
-    assert far < 0.85
+    assert far < 0.45
     assert set(touched) == {name}
 
 

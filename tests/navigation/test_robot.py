@@ -43,6 +43,7 @@ from rbxcompose.testing import Bench
 from rbxcompose.testing.bench import run_robot
 from tests.navigation.houses import ONE_WALL
 from tests.parts.project import Project
+from tests.soak import rare
 
 LASER = "  laser: {type: laser_sim, frame: base_link, noise: 5 mm, rays: 180, rate: 5 Hz}\n"
 ROBOT = f"""body: {{urdf: rbx:robots/turtlebot/turtlebot.urdf}}
@@ -62,7 +63,7 @@ spawn:
 CHAIR = """objects:
   chair:
     box: [40 cm, 40 cm, 80 cm]
-    path: [[0 s, 0 m, -2.5 m], [6 s, 0 m, -2.5 m], [8 s, 0 m, 2 m], [100 s, 0 m, 2 m]]
+    path: [[0 s, 50 cm, 1 m], [1 s, 50 cm, 1 m], [2 s, -1.5 m, 1 m], [100 s, -1.5 m, 1 m]]
 """
 
 
@@ -118,7 +119,7 @@ def test_it_drives_around_a_wall_and_reports_on_its_way(tmp_path: Path) -> None:
 
 def test_a_chair_that_is_pushed_into_the_way_is_driven_around(tmp_path: Path) -> None:
     room = Room(tmp_path, world=WORLD + CHAIR)
-    assert room.go(2.0, 0.3).outcome is Outcome.SUCCEEDED
+    assert room.go(-1.0, 2.0).outcome is Outcome.SUCCEEDED
     assert room.contacts == []
     assert len(room.paths) > 1
 
@@ -210,6 +211,8 @@ def test_a_robot_whose_laser_tells_nothing_does_not_drive_blindly(tmp_path: Path
     for _ in range(250):
         room.bench.publish("/scan", scan)
         room.bench.advance(0.1)
+        if room.ends:
+            break
     assert room.ends
     if said:
         assert "the laser on 'scan' is of no use" in room.reason()
@@ -264,7 +267,7 @@ def test_what_is_driven_to_and_fro_is_no_progress(tmp_path: Path) -> None:
 
 
 def test_manoeuvres_are_skills_of_their_own_and_stop_before_something(tmp_path: Path) -> None:
-    room = Room(tmp_path)
+    room = Room(tmp_path, world=WORLD.replace("-2 m", "-1.4 m"))
 
     def does(action: str, type_: Any, goal: Any) -> Outcome:
         room.ends.clear()
@@ -274,8 +277,8 @@ def test_manoeuvres_are_skills_of_their_own_and_stop_before_something(tmp_path: 
 
     assert does("/spin", Spin, Spin.Goal(target_yaw=-math.pi)) is Outcome.SUCCEEDED
     assert abs(abs(room.base.core.pose.heading) - math.pi) < 0.05
-    assert does("/back_up", BackUp, BackUp.Goal(distance=0.5)) is Outcome.SUCCEEDED
-    assert abs(room.base.core.pose.x + 1.5) < 0.05
+    assert does("/back_up", BackUp, BackUp.Goal(distance=0.3)) is Outcome.SUCCEEDED
+    assert abs(room.base.core.pose.x + 1.1) < 0.05
     assert does("/back_up", BackUp, BackUp.Goal(distance=2.0)) is Outcome.ABORTED  # the wall is there
     assert room.contacts == []
     assert does("/back_up", BackUp, BackUp.Goal(distance=-1.0)) is Outcome.REJECTED
@@ -362,16 +365,16 @@ def test_the_tools_of_nav2_drive_it_too_and_the_newest_goal_counts(tmp_path: Pat
     room.bench.advance(3.0)
     assert room.base.core.velocity.linear > 0.3
     room.bench.publish("/goal_pose", PoseStamped(Header(frame_id="map"), Pose(Point(-2.0, 1.0))), Qos.EVENT)
-    room.bench.advance(20.0)
+    assert room.bench.run_until(lambda: room.base.core.pose.distance(Pose2(-2.0, 1.0)) < 0.1, 20.0)
     assert [end.outcome for end in room.ends] == [Outcome.ABORTED]
     assert room.ends[0].result == NavigateToPose.Result(error_code=1, error_msg="replaced by a newer goal")
-    assert room.base.core.pose.distance(Pose2(-2.0, 1.0)) < 0.1
     room.bench.publish("/goal_pose", PoseStamped(Header(frame_id="map"), Pose(Point(2.0, 0.3))), Qos.EVENT)
-    room.bench.advance(3.0)
-    room.bench.host.stop()
     room.bench.advance(2.0)
+    assert room.base.core.velocity.linear > 0.1
+    room.bench.host.stop()
+    room.bench.advance(1.5)
     room.bench.host.release()
-    room.bench.advance(5.0)
+    room.bench.advance(2.0)
     assert room.base.is_at_rest  # a stop ends what nobody waits for
     room.bench.publish("/goal_pose", PoseStamped(Header(frame_id="moon")), Qos.EVENT)
     room.bench.advance(0.5)
@@ -450,24 +453,24 @@ def test_a_laser_that_falls_silent_stops_the_robot_and_fails_the_goal(tmp_path: 
 
 
 def test_a_base_stops_where_it_touches_and_may_leave_again(tmp_path: Path) -> None:
-    room = Room(tmp_path)
-    for speed, count in ((0.4, 80), (-0.3, 20)):
+    room = Room(tmp_path, world=WORLD.replace("-2 m", "-1 m"))
+    for speed, count in ((0.4, 40), (-0.3, 20)):
         for _ in range(count):
             room.bench.publish("/cmd_vel", Twist(linear=Vector3(x=speed)))
             room.bench.advance(0.1)
         if speed > 0:
             assert room.base.core.pose.x == pytest.approx(-0.1 - 0.175, abs=0.002)
             assert [contact.data for contact in room.contacts] == ["map"]
-            assert room.base.core.distance == pytest.approx(2.0 - 0.275, abs=0.002)
+            assert room.base.core.distance == pytest.approx(1.0 - 0.275, abs=0.002)
     assert room.base.core.pose.x == pytest.approx(-0.275 - 0.55, abs=0.1)
 
 
-@pytest.mark.parametrize("name", ["visitor", "base_footprint"])
+@pytest.mark.parametrize("name", ["base_footprint", *rare("visitor")])
 def test_who_walks_into_a_base_that_stands_touches_it_once_each_time(tmp_path: Path, name: str) -> None:
-    path = "[[0 s, -2 m, 2 m], [4 s, -2 m, 0.3 m], [6 s, -2 m, 0.3 m], [8 s, -2 m, 2 m]]"
+    path = "[[0 s, -2 m, 1 m], [2 s, -2 m, 0.3 m], [3 s, -2 m, 0.3 m], [4 s, -2 m, 1 m]]"
     walker = f"objects:\n  {name}: {{shape: person, path: {path}, repeats: true}}\n"
     room = Room(tmp_path, world=WORLD + walker)
-    room.bench.advance(16.0)
+    room.bench.advance(8.0)
     assert [contact.data for contact in room.contacts] == [name, name]
     assert room.bench.host.summary()["base"] == {"distance driven": "0.00 m", "contacts": "2"}
 

@@ -113,6 +113,7 @@ def test_a_base_that_is_killed_on_the_way_comes_back_and_the_mission_succeeds(fo
     assert ended - over > 0.4  # it was asked to end only when it had had the time to brake by itself
 
 
+@pytest.mark.soak  # as a process of ours does
 def test_a_program_that_dies_again_and_again_ends_the_robot(foreign: Foreign) -> None:
     dying = {"type": "program", "command": ["sh", "-c", "printf 'no device'; sleep 0.05; exit 3"]}
     foreign.write(manifest(foreign.name, components={"dying": dying}))
@@ -185,6 +186,7 @@ def test_several_programs_start_in_order_are_watched_and_are_ended(foreign: Fore
     assert foreign.time_of("writer", "prepared") <= foreign.time_of("writer", "it is ready")
 
 
+@pytest.mark.soak  # as during the start of components
 def test_an_interrupt_does_not_wait_for_a_program_that_is_not_ready(foreign: Foreign) -> None:
     slow = program("echo begun; exec sleep 100", ready={"output": "never", "within": "100 s"})
     foreign.write(manifest(foreign.name, components={"slow": slow}))

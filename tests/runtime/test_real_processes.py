@@ -178,6 +178,7 @@ def test_a_suspended_process_is_shown_as_such_and_told_to_the_others_before_it_i
     robot.do("down")
 
 
+@pytest.mark.soak  # as below, where nobody supervises it
 def test_down_ends_a_stopped_process(robot: Robot) -> None:
     robot.up_detached()
     robot.process_of("first").send_signal(signal.SIGSTOP)
@@ -256,6 +257,7 @@ def test_on_a_stepped_clock_two_runs_write_the_same_log(robot: Robot, options: l
     assert robot.texts("second")[-2:] == ["braking", "deactivated"]
 
 
+@pytest.mark.soak  # how a run ends is tried by virtual time
 def test_on_a_stepped_clock_a_mission_that_waits_in_vain_ends_the_run(robot: Robot) -> None:
     process = robot.up("--stepped", runs=20.0, outcome="waiting")
     told, _ = process.communicate(timeout=PATIENCE)

@@ -145,6 +145,7 @@ def test_a_robot_that_says_nothing_stands_where_it_was_and_is_reported(tmp_path:
     assert a.x < 1.0
 
 
+@pytest.mark.soak  # as those of one robot are
 def test_two_runs_are_alike(tmp_path: Path) -> None:
     def driven() -> tuple[list[Pose2], list[str]]:
         hall = Hall(tmp_path, SYSTEM + THIRD)
@@ -176,6 +177,7 @@ def test_starts_that_cannot_be_are_findings(tmp_path: Path, old: str, new: str, 
     assert all(finding.span and finding.span.file.endswith("system.yaml") for finding in system.report)
 
 
+@pytest.mark.soak  # as robots do that drive at each other without physics
 def test_in_physics_robots_stop_at_each_other_too(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     hall = Hall(tmp_path, robot=ROBOT + "simulator: physics\n")

@@ -117,7 +117,7 @@ ROBOT = """body: {urdf: eye.urdf}
 world: ../../room.yaml
 simulator: SIMULATOR
 cameras:
-  front: {frame: camera_link, size: [320, 240], rate: 10 Hz}
+  front: {frame: camera_link, size: [320, 240], rate: 5 Hz}
 tags: {size: 16 cm, names: {dock: 3}}
 components:
   base: {type: diff_drive_sim}

@@ -83,7 +83,7 @@ ROBOT = """body: {urdf: eye.urdf}
 world: ../../room.yaml
 simulator: SIMULATOR
 cameras:
-  front: {frame: camera_link, size: [320, 240], rate: 10 Hz}
+  front: {frame: camera_link, size: [320, 240], rate: 5 Hz}
 tags: {size: 24 cm, names: {walker: 7}}
 components:
   base: {type: diff_drive_sim}

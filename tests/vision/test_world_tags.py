@@ -108,7 +108,7 @@ def test_a_camera_sees_tags_of_what_stands_what_is_loose_and_who_walks(tmp_path:
     (tmp_path / "robots/one/eye.urdf").write_text(LEVEL)
     bench = Room(tmp_path, ROBOT.replace("SIMULATOR", simulator), WORLD).bench
     taken = bench.collect("/tags", Detection3DArray)
-    bench.advance(2.0)
+    bench.advance(1.2)
     skip_without_pictures(bench, simulator, taken)
     first, last = (
         {one.id: pose_of(one.bbox.center).translation for one in array.detections} for array in taken[:: len(taken) - 1]
