@@ -28,7 +28,7 @@ from tests.soak import Soak, rare
 
 pytestmark = pytest.mark.timeout(100)  # each takes seconds to start
 TIMELESS = float  # a clock that stands still: so many positions are the limit, on any machine
-TIME = 0.1  # [s], in which helpers are asked, and answer first
+TIME = 0.2  # [s], in which helpers are asked, and answer first
 SCENES = (CONFINED, 175, 727)  # in which motions are hard to find, or are not found
 ORPHAN = """
 import os, pickle, signal, sys

@@ -51,20 +51,29 @@ def tag_sheet() -> TagSheet:
     return TagSheet(DEFAULT_FAMILY, SIZE, {number: (x + edge, y + edge) for number, (x, y) in places.items()})
 
 
+@cache
+def rays() -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Return the directions of all pixels."""
+    return TRUTH.rays
+
+
+@cache
+def noise() -> np.ndarray[Any, np.dtype[np.float64]]:
+    return np.random.default_rng(1).normal(0, 1.5, (TRUTH.height, TRUTH.width))
+
+
 def shot(board: np.ndarray[Any, np.dtype[np.uint8]], pose: Transform3) -> np.ndarray[Any, np.dtype[np.uint8]]:
     """Return what the camera sees of a board at a pose of its middle: each ray meets the plane of the board."""
     turn = rotation_matrix(pose.rotation)
     away = turn[:, 2] @ np.array(pose.translation)
-    rays = TRUTH.rays
-    reach = away / (rays @ turn[:, 2])
-    on_board = (rays * reach[..., None] - pose.translation) @ turn
+    reach = away / (rays() @ turn[:, 2])
+    on_board = (rays() * reach[..., None] - pose.translation) @ turn
     height, width = board.shape
     x, y = ((on_board[..., axis] * FINE + side / 2).astype(np.float32) for axis, side in enumerate((width, height)))
     blurred = cv2.GaussianBlur(board, (0, 0), FINE * pose.translation[2] / TRUTH.fx / 2.5)
     edge = {"borderMode": cv2.BORDER_CONSTANT, "borderValue": 128}
     seen: np.ndarray[Any, Any] = cv2.remap(blurred, x, y, cv2.INTER_LINEAR, **edge)
-    noise = np.random.default_rng(1).normal(0, 1.5, seen.shape)
-    return np.asarray(np.clip(seen + noise, 0, 255), np.uint8)
+    return np.asarray(np.clip(seen + noise(), 0, 255), np.uint8)
 
 
 def poses(distance: float) -> list[Transform3]:
@@ -114,14 +123,14 @@ def test_pictures_that_tell_nothing_are_left_out_with_the_reason() -> None:
 def test_views_of_one_place_or_one_side_are_not_enough() -> None:
     page = tag_page()  # whose corners are found much sooner than those of a chessboard
     small = CalibrationViews(tag_sheet())
-    for number in range(6):
+    for number in range(8):
         tilt = quaternion_about((math.cos(2.4 * number), math.sin(2.4 * number), 0.0), 0.5)
         roll = quaternion_about((0.0, 0.0, 1.0), 0.25 * number)
         small.take(shot(page, Transform3((0.0, 0.0, 0.9), multiply(tilt, roll))))
     with pytest.raises(CalibrationError, match="hold it into all corners"):
         small.calibrated()
     flat = CalibrationViews(tag_sheet())
-    for number in range(6):
+    for number in range(8):
         flat.take(shot(page, Transform3((0.12 * math.cos(number), 0.08 * math.sin(number), 0.45 + 0.01 * number))))
     with pytest.raises(CalibrationError, match="tilt it to all sides"):
         flat.calibrated()

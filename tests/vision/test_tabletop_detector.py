@@ -55,7 +55,7 @@ ROBOT = f"""body: {{urdf: looker.urdf}}
 world: ../../room.yaml
 components:
   base: {{type: diff_drive_sim}}
-  eye: {{type: camera_sim, frame: eye_link, topic: eye, depth: DEPTH, noise: 1 mm, rate: 5 Hz, size: [240, 180]}}
+  eye: {{type: camera_sim, frame: eye_link, topic: eye, depth: DEPTH, noise: 1 mm, rate: 5 Hz, size: [320, 240]}}
   squares:
     {{type: tag_detector, image: eye/image_raw, info: eye/camera_info, frame: {OPTICAL}, names: {{tea: 7}}, size: 8 cm}}
   finder: {{type: tabletop_detector, points: eye/points, frame: {OPTICAL}, level: odom, tags: tags, EXTRA}}
