@@ -60,8 +60,8 @@ def pytest_configure(config: pytest.Config) -> None:
     )
     settings.load_profile("rbxcompose")
     if not many:
-        # Constants of the package are examples as well, of those modules that a worker happens to have imported; and
-        # each worker of a new checkout would read them all, for 8 s.
+        # Hypothesis also draws constants of the modules that a worker happens to have imported, and in a new checkout
+        # each worker would read all of these for 8 s.
         vars(providers)["_get_local_constants"] = lambda: providers._local_constants
     os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache"))  # compiling takes longer than most tests may
     if CACHES not in os.environ:

@@ -210,7 +210,7 @@ def test_what_check_found_stands_above_the_log(open_page: Callable[..., Page], g
 
 
 @pytest.mark.parametrize("name", ["data", *rare("mux", "log")])
-@pytest.mark.soak  # as others do
+@pytest.mark.soak  # as the Drive page does, of the same parts
 def test_they_fit_a_phone(open_page: Callable[..., Page], gateway: FakeGateway, name: str) -> None:
     has_topics(gateway)
     has_mux(gateway)

@@ -236,7 +236,7 @@ def test_a_pose_that_cannot_be_reached_says_why_and_nothing_is_executed(
     assert crane.goals() == []
 
 
-@pytest.mark.soak  # as others do
+@pytest.mark.soak  # as the Drive page does, of the same parts
 def test_it_fits_a_phone(open_page: Callable[..., Page], crane: FakeGateway) -> None:
     crane.windows[DESCRIBED] = [*crane.windows[DESCRIBED], WORLD]
     page = open_page(page_name="model", viewport=PHONE, has_touch=True)

@@ -223,7 +223,7 @@ def test_a_change_is_taken_back_and_changes_of_others_appear(open_page: Callable
     expect(runtime).to_have_value("70")
 
 
-@pytest.mark.soak  # as others do
+@pytest.mark.soak  # as the Drive page does, of the same parts
 def test_it_fits_a_phone(open_page: Callable[..., Page], battery: Battery) -> None:
     page = open_page(page_name="parameters", viewport=PHONE, has_touch=True)
     expect(page.get_by_label("Runtime", exact=True)).to_be_visible()

@@ -213,7 +213,7 @@ def test_a_long_status_leaves_the_name_on_its_line(open_page: Callable[..., Page
     assert len({round(box["height"]) for box in heights if box}) == 1
 
 
-@pytest.mark.soak  # as others do
+@pytest.mark.soak  # as the Drive page does, of the same parts
 def test_it_fits_a_phone(open_page: Callable[..., Page], robot: FakeGateway) -> None:
     page = open_page(page_name="robot", viewport=PHONE, has_touch=True)
     expect(page.get_by_label("sprayer", exact=True)).to_be_visible()

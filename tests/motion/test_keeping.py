@@ -76,7 +76,7 @@ def test_the_tip_stays_in_a_box_and_joints_in_their_ranges() -> None:
     found = ended(SIX.plan(request(goal, keep)))
     assert isinstance(found, MotionPlan), found
     assert found.trajectory is not None
-    points = np.array(sampled(found.trajectory, 0.05))
+    points = np.array(sampled(found.trajectory, 0.02))
     assert max(abs(frame_of(point)[2, 3] - z) for point in points) <= 0.06 + 1e-6
     assert np.abs(points[:, 0]).max() <= 0.5 + 1e-6
     assert points[:, 3].min() >= -1e-6

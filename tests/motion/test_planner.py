@@ -47,7 +47,7 @@ def test_a_plan_is_free_and_within_all_limits_by_other_code(seed: int) -> None:
     found = plan(start, goal)
     assert isinstance(found, MotionPlan), found
     assert found.trajectory is not None
-    points = sampled(found.trajectory, 0.01)
+    points = sampled(found.trajectory, 0.005)
     assert np.allclose(points[0], start)
     assert np.allclose(points[-1], goal)
     assert min(gap(BODY, point) for point in points) >= -TOUCH

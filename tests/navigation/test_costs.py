@@ -112,7 +112,7 @@ def test_what_stands_does_not_move_because_the_robot_does(x: float, y: float, he
 
 
 @given(st.floats(0.4, 1.5), st.floats(-math.pi, math.pi))
-@settings(max_examples=2)
+@settings(max_examples=4)
 def test_who_walks_is_seen_to_move_and_nothing_else_is(speed: float, heading: float) -> None:
     costs, rays = LayeredCosts(room(), SETTINGS), Rays(room())
     for step in range(5, 25):

@@ -110,7 +110,6 @@ def bear(patrol: PatrolOnHosts, fault: HostFault) -> tuple[float | None, float]:
 
 
 @pytest.mark.timeout(100)
-@pytest.mark.soak  # a cable is pulled in `test_two_hosts`, processes are killed in `tests/faults`
 def test_the_base_stands_in_time_and_all_goes_on(tmp_path: Path) -> None:
     with patrolling(tmp_path) as patrol:
         for fault in FAULTS:
