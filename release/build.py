@@ -47,11 +47,12 @@ def build(
     environment: Mapping[str, str] = {},
     wheel_only: bool = False,
     node_modules: Path | None = None,
+    page: Path | None = None,
 ) -> dict[str, str]:
     """Build into a folder; return the SHA-256 of each file by its name.
 
     `source` is an unpacked source distribution; else a copy of the files that git knows is built. `node_modules` are
-    those of the console, installed already: they take as long as all the rest.
+    those of the console, installed already, and `page` is what was built of it: each takes as long as all the rest.
 
     Raises:
         BuildError: if that failed.
@@ -63,6 +64,8 @@ def build(
             copy_tracked(copy)
             if node_modules is not None:
                 (copy / "console/node_modules").symlink_to(node_modules)
+            if page is not None:
+                shutil.copytree(page, copy / page.relative_to(ROOT))
         command = [sys.executable, "-m", "hatchling", "build", "-d", str(out), *(["-t", "wheel"] if wheel_only else [])]
         done = subprocess.run(
             command,

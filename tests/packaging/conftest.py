@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from release.build import build
-from tests.packaging.builds import NODE_MODULES
+from tests.packaging.builds import NODE_MODULES, ROOT
 from tests.soak import Soak
 
+STATIC = ROOT / "rbxcompose/domains/console/static"
 MODULES = NODE_MODULES if NODE_MODULES.exists() else None
 
 
@@ -27,6 +28,7 @@ def wheel(request: pytest.FixtureRequest, soak: Soak, tmp_path_factory: pytest.T
     if soak.is_on:
         built: Path = request.getfixturevalue("built")
     else:
-        build(built := tmp_path_factory.mktemp("wheel"), wheel_only=True, node_modules=MODULES)
+        page = STATIC if STATIC.exists() else None  # built again by `make soak`, or if its sources are newer
+        build(built := tmp_path_factory.mktemp("wheel"), wheel_only=True, node_modules=MODULES, page=page)
     [wheel] = built.glob("*.whl")
     return wheel

@@ -117,10 +117,14 @@ def test_the_action_writes_sarif_and_fails_with_the_findings(project: Path, is_w
     assert ("::error" in done.stdout + done.stderr) == is_wrong
 
 
-def test_the_action_runs_the_tests_of_missions_also_after_findings(project: Path) -> None:
+@pytest.mark.soak  # the template does so in the same way
+def test_the_action_runs_the_tests_of_missions(project: Path) -> None:
     done = run(project, *step("Test missions"))
     assert done.returncode == 0, done.stdout + done.stderr
     assert ElementTree.parse(project / DEFAULTS["junit"]).getroot().find(".//testcase") is not None
+
+
+def test_the_action_runs_the_tests_of_missions_also_after_findings() -> None:
     [tests] = [one for one in STEPS if one.get("name") == "Test missions"]
     assert "!cancelled()" in tests["if"]
 
@@ -135,7 +139,7 @@ def test_the_template_has_jobs_with_reports() -> None:
     assert job("test missions")["artifacts"]["reports"]["junit"] == "rbxcompose-tests.xml"
 
 
-@pytest.mark.parametrize("name", ["check robots", *rare("test missions")])
+@pytest.mark.parametrize("name", ["test missions", *rare("check robots")])
 def test_the_lines_of_a_job_run_and_leave_what_it_keeps(project: Path, name: str) -> None:
     one = job(name)
     for part in ("before_script", "script", "after_script"):
