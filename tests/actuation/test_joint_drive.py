@@ -135,6 +135,7 @@ def test_a_servo_that_is_mute_is_a_fault_and_comes_back_relaxed() -> None:
     assert driven.servo.get("torque_enable") == 0
 
 
+@pytest.mark.soak  # joints of a whole bus do so in `test_servo_bus_faults`
 def test_a_hot_joint_rests_without_torque_until_it_has_cooled_down() -> None:
     driven = Driven()
     driven.run(3)

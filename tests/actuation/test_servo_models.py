@@ -76,8 +76,8 @@ def test_zero_is_the_middle_of_the_range(model: ServoModel) -> None:
     assert model.to_raw("goal_position", model.per_tick * 100) == item.centre + 100
 
 
-@pytest.mark.parametrize(
-    ("name", "item", "raw", "value"),
+@for_all(
+    "name, item, raw, value",
     [
         ("AX-12", "present_position", 1023, math.radians(150 - 300 / 1024)),
         ("AX-12", "goal_speed", 1023, 113.553 * math.tau / 60),

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import pytest
-
 from rbxcompose.base.findings import FindingKind, Span, correction
+from tests.loops import for_all
 
 PLACE = Span("f", 1, 4, 1, 8)
 
@@ -14,8 +13,8 @@ def meant(name: str, *valid: str) -> str:
     return fix.edits[0].text if fix else ""
 
 
-@pytest.mark.parametrize(
-    ("name", "valid", "right"),
+@for_all(
+    "name, valid, right",
     [
         ("restrat", ("restart", "process"), "restart"),
         ("dok", ("dock", "corner"), "dock"),
@@ -31,8 +30,8 @@ def test_a_slip_of_the_hand_is_corrected(name: str, valid: tuple[str, ...], righ
     assert meant(name, *valid) == right
 
 
-@pytest.mark.parametrize(
-    ("name", "valid", "why"),
+@for_all(
+    "name, valid, why",
     [
         ("fort", ("from",), "too far"),
         ("corner_12", ("corner_21",), "another number, though two digits have changed places"),

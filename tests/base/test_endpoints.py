@@ -9,6 +9,7 @@ import pytest
 import zenoh
 
 from rbxcompose.bus.endpoints import accepts, endpoint, is_private, socket_of, tcp_endpoint, unix_endpoint
+from tests.loops import for_all
 
 FINE = [
     "tcp/127.0.0.1:7447",
@@ -45,7 +46,7 @@ def test_an_endpoint_is_taken_as_it_is_and_zenoh_reads_it(text: str) -> None:
     zenoh.Config().insert_json5("connect/endpoints", f'["{text}"]')
 
 
-@pytest.mark.parametrize("text", WRONG, ids=lambda text: text[:30])
+@for_all("text", WRONG)
 def test_what_is_no_endpoint_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r"endpoint of Zenoh|between 1 and 65535|is no address"):
         endpoint(text)

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.requests import Family, UnreadableError, from_data, to_data
+from tests.loops import for_all
 
 
 class Colour(StrEnum):
@@ -56,8 +57,8 @@ def test_what_is_written_comes_back_as_it_was(room: Room) -> None:
 GOOD = {"lamps": [{"name": "a"}], "floor": 1, "sizes": [1, 2.5]}
 
 
-@pytest.mark.parametrize(
-    ("changes", "problem"),
+@for_all(
+    "changes, problem",
     [
         ({"floor": "1"}, "'floor' is not a whole number"),
         ({"floor": True}, "'floor' is not a whole number"),
@@ -81,7 +82,7 @@ def test_what_does_not_fit_is_refused_with_its_place(changes: dict[str, object],
     assert str(caught.value) == problem
 
 
-@pytest.mark.parametrize("data", [None, 5, [], {}, {"type": 5}, {"type": []}, {"type": "Chair"}, {"type": "__class__"}])
+@for_all("data", [None, 5, [], {}, {"type": 5}, {"type": []}, {"type": "Chair"}, {"type": "__class__"}])
 def test_a_family_takes_its_own_types_alone(data: object) -> None:
     family: Family[Lamp | Room] = Family((Lamp, Room))
     assert family.from_line(family.to_line(Lamp("a"))) == Lamp("a")

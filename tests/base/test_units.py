@@ -19,6 +19,7 @@ from rbxcompose.base.units import (
     parse_quantity,
     to_si,
 )
+from tests.loops import for_all
 
 LISTED = (
     "m cm mm km in s ms us min h m/s cm/s km/h m/s^2 m/s^3 rad deg rad/s deg/s rpm rad/s^2 deg/s^2 rad/s^3 deg/s^3 "
@@ -30,8 +31,8 @@ def test_the_list_of_units_is_closed() -> None:
     assert set(LISTED.split()) == set(UNITS)
 
 
-@pytest.mark.parametrize(
-    ("text", "value", "dimension"),
+@for_all(
+    "text, value, dimension",
     [
         ("0.3 m/s", 0.3, units.SPEED),
         ("5s", 5.0, units.TIME),
@@ -59,7 +60,7 @@ def test_a_text_is_read_into_si(text: str, value: float, dimension: Dimension) -
     assert read.dimension == dimension
 
 
-@pytest.mark.parametrize(
+@for_all(
     "text",
     [
         *("", "m", "nan", "inf", "-inf s", "1e308 km", "1e15", "-1e15 m", "1_000 m", "0x10", "1,5 m", "5 s s", "- 5 s"),
@@ -71,8 +72,8 @@ def test_what_is_no_quantity_is_refused(text: str) -> None:
         parse_quantity(text)
 
 
-@pytest.mark.parametrize(
-    ("text", "meant"),
+@for_all(
+    "text, meant",
     [
         ("20 hz", "Hz"),
         ("5 S", "s"),
@@ -131,8 +132,8 @@ def test_a_bare_share_of_one_may_be_a_percentage_of_either_kind() -> None:
     assert caught.value.help == "write '15 %', or '0.15 %' if it is that little"
 
 
-@pytest.mark.parametrize(
-    ("text", "dimension", "fix"),
+@for_all(
+    "text, dimension, fix",
     [
         ("0.3 mps", units.SPEED, "did you mean 'm/s'?"),
         ("0.3 m/sec", units.SPEED, "did you mean 'm/s'?"),
@@ -177,7 +178,7 @@ def test_a_wrong_dimension_says_what_must_stand_there_and_what_does() -> None:
     assert caught.value.detail == "this is a time"
 
 
-@pytest.mark.parametrize("value", [True, None, [1], "fast", math.nan, math.inf, 1e15, 10**400, "1e308 km", "9" * 41])
+@for_all("value", [True, None, [1], "fast", math.nan, math.inf, 1e15, 10**400, "1e308 km", "9" * 41])
 def test_a_field_refuses_what_is_no_moderate_number(value: object) -> None:
     with pytest.raises(UnitError):
         to_si(value, units.SPEED)
@@ -188,14 +189,14 @@ def test_a_number_takes_no_unit() -> None:
         to_si("30 %", units.NUMBER)
 
 
-@pytest.mark.parametrize("dimension", DIMENSIONS.values(), ids=DIMENSIONS)
+@for_all("dimension", DIMENSIONS.values())
 def test_every_dimension_has_an_example_of_itself(dimension: Dimension) -> None:
     assert parse_quantity(example(dimension)).dimension == dimension
     assert to_si(example(dimension), dimension) > 0
 
 
-@pytest.mark.parametrize(
-    ("text", "unit", "shown"),
+@for_all(
+    "text, unit, shown",
     [
         ("0.3 m/s", None, "0.3 m/s"),
         ("90 deg", None, "90 deg"),

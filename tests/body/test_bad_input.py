@@ -25,6 +25,7 @@ from rbxcompose.domains.body.xml_reader import read_urdf
 from rbxcompose.testing.manifests import check_file, check_text
 from tests.body.bad_bodies import ALL, MESHES, PWNED, SECRET, YAML, BadBody, computed, fixed, links, mesh, stl, urdf
 from tests.body.described import described
+from tests.loops import for_all
 from tests.soak import Soak, rare
 
 SLOW = (
@@ -48,6 +49,7 @@ SLOW = (
     "an expansion of 9 MB",
     "a long text",
     "100,000 elements inside each other in xacro",
+    "10,000 links in a chain",
 )
 """What is stopped after a second, as `messages without end`, or is large and many times the same."""
 LIKE_OTHERS = (
@@ -118,7 +120,7 @@ def test_values_may_come_from_a_yaml_file_of_the_project(tmp_path: Path) -> None
     assert YAML
 
 
-@pytest.mark.parametrize("name", MESHES)
+@for_all("name", MESHES)
 def test_a_picture_with_a_bad_mesh_is_refused(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,6 +15,7 @@ from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.text import joints_of, links_of, tree_of
 from rbxcompose.domains.body.urdf import read_body
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
+from tests.loops import for_all
 
 ARM = """<robot name="arm">
   <material name="red"><color rgba="1 0 0 1"/></material>
@@ -175,7 +176,7 @@ MISTAKES = {
 }
 
 
-@pytest.mark.parametrize("name", MISTAKES)
+@for_all("name", MISTAKES)
 def test_each_mistake_is_a_finding_at_its_element(name: str) -> None:
     inside, code, words = MISTAKES[name]
     _, findings = read(f'<robot name="r">\n{inside}\n</robot>')

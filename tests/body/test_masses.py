@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import pytest
-
 from rbxcompose.domains.body.lint import lint
 from tests.body.kinematics import description_of
+from tests.loops import for_all
 
 BOX = '<visual><geometry><box size="1 1 1"/></geometry></visual>'
 HEAVY = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
@@ -52,7 +51,7 @@ RIGHT = {
 }
 
 
-@pytest.mark.parametrize("name", RIGHT)
+@for_all("name", RIGHT)
 def test_what_a_rigid_body_can_have_is_not_told(name: str) -> None:
     assert findings(**RIGHT[name]) == []
 
@@ -76,7 +75,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
+@for_all("name", WRONG)
 def test_what_no_rigid_body_has_is_told_once(name: str) -> None:
     links, expected = WRONG[name]
     assert findings(**links) == [expected]
@@ -103,7 +102,7 @@ LIMITS = {
 }
 
 
-@pytest.mark.parametrize("name", LIMITS)
+@for_all("name", LIMITS)
 def test_limits_that_keep_a_joint_from_moving_are_told(name: str) -> None:
     kind, limit, expected = LIMITS[name]
     links = "".join(f'<link name="{link}">{HEAVY}</link>' for link in ("base", "arm", "leader", "slide"))

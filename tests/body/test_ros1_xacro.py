@@ -185,7 +185,7 @@ def marked(draw: st.DrawFn, depth: int = 0) -> str:
     return "\n ".join(parts)
 
 
-@settings(max_examples=settings().max_examples // 2, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=settings().max_examples * 2 // 5, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(inside=marked())
 def test_the_fix_of_any_file_gives_back_the_prefixes_that_it_lost(inside: str, tmp_path: Path) -> None:
     whole = f"{BOUND}{inside}</robot>\n"

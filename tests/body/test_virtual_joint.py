@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,6 +18,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 from tests.body.kinematics import Three, description_of
 from tests.body.random_bodies import positions, urdfs
+from tests.loops import for_all
 from tests.parts.project import Project
 
 ARM = """
@@ -103,8 +103,8 @@ def test_its_frame_is_one_of_links_and_others_get_the_urdf_as_it_was(tmp_path: P
     assert ("world", "arm_base_link") in pairs
 
 
-@pytest.mark.parametrize(
-    ("robot", "joint", "codes", "cure"),
+@for_all(
+    "robot, joint, codes, cure",
     [
         (ARM, "{frame: arm_base_link}", ["RBX2249"], "leave the virtual joint out"),
         (ARM, "{frame: world, name: arm_mount}", [], ""),

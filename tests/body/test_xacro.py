@@ -17,6 +17,7 @@ from rbxcompose.domains.body import xacro as xacro_answers
 from rbxcompose.domains.body.xacro import Expanded, XacroFile, expand, expand_all
 from rbxcompose.domains.body.xacro_answer import BareFile, BareTag, XacroAnswer, read_answer
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
+from tests.loops import for_all
 from tests.soak import rare
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
@@ -124,7 +125,7 @@ def is_told(finding: Expanded | Finding, folder: Path, line: int, words: str) ->
     assert {path.name for path in folder.iterdir()} == {"r.xacro", "wheel.xacro"}
 
 
-@pytest.mark.parametrize("name", [name for name in MISTAKES if name not in ENDLESS])
+@for_all("name", [name for name in MISTAKES if name not in ENDLESS])
 def test_a_mistake_is_a_finding_at_its_place_and_nothing_is_executed(
     name: str, answered: dict[str, tuple[Path, Expanded | Finding]]
 ) -> None:

@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.bus.goals import ANY_GOAL, KEPT_FOR, MOST_KEPT, CancelCode, Goal, Goals, GoalState
+from tests.loops import for_all
 
 
 def id_of(number: int) -> bytes:
@@ -48,8 +49,8 @@ def test_two_goals_at_a_time_or_of_one_id_are_our_own_mistake() -> None:
         accepted(goals, 3)
 
 
-@pytest.mark.parametrize(
-    ("number", "stamp", "code", "is_cancelled"),
+@for_all(
+    "number, stamp, code, is_cancelled",
     [
         (0, 0, CancelCode.NONE, True),  # all goals
         (2, 0, CancelCode.NONE, True),

@@ -11,6 +11,7 @@ import pytest
 
 from rbxcompose.commands import main as command
 from tests.conftest import ROOT
+from tests.loops import for_all
 
 PI_ROBOT = str(ROOT / "robots/pi_robot")
 REACH = "{x: 22 cm, y: -12 cm, z: 55 cm}"
@@ -96,8 +97,8 @@ def test_a_picture_tells_the_cells_that_the_tip_gets_to(capsys: pytest.CaptureFi
     assert (tmp_path / "reach.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
+@for_all(
+    "words, told",
     [
         (["picture", "reach", "--out", "x.png", "--layer", "x: 1 cm, y: 2 cm"], "a layer has one of x, y and z"),
         (["picture", "reach", "--out", "x.png", "--cell", "1 mm"], "a cell is at least 2 mm"),

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.commands.main import main
+from rbxcompose.domains.body.commands import body
 from tests.conftest import ROOT
 
 XACRO = str(ROOT / "parts/body/torso.urdf.xacro")
@@ -34,10 +35,10 @@ def test_a_file_is_shown_as_the_robot_that_names_it(capsys: pytest.CaptureFixtur
         assert told(capsys, action, XACRO, "--with", "height=0.6") == told(capsys, action, str(tmp_path))
 
 
-def test_arguments_reach_the_xacro_in_si_units(capsys: pytest.CaptureFixture[str]) -> None:
-    for written, read in (("0.9", "0.9"), ("90 cm", "0.9"), ("1", "1"), ("1.50", "1.5")):
-        text = told(capsys, "expand", XACRO, "--with", f"height={written}")
-        assert f'size="0.0254 0.0254 {read}"' in text
+@pytest.mark.parametrize(("written", "read"), [("90 cm", "0.9"), ("1.50", "1.5")])
+def test_arguments_reach_the_xacro_in_si_units(capsys: pytest.CaptureFixture[str], written: str, read: str) -> None:
+    text = told(capsys, "expand", XACRO, "--with", f"height={written}")
+    assert f'size="0.0254 0.0254 {read}"' in text
 
 
 def test_packages_are_found_where_they_are_said_to_be(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -91,5 +92,6 @@ def test_a_picture_without_a_name_stays_in_this_folder(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(body, "draw", lambda *shown: b"what is drawn")
     (tmp_path / "m.obj").write_text(TETRAHEDRON)
     assert "wrote ___r_png.png" in told(capsys, "picture", urdf(tmp_path / "r.urdf", "m.obj", name="../r.png"))

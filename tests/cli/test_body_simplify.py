@@ -52,6 +52,7 @@ def test_one_mesh_is_chosen_by_its_name(capsys: pytest.CaptureFixture[str], home
     assert "did you mean 'meshes/ball.stl'?" in shown
 
 
+@pytest.mark.soak  # as below, where one is replaced
 def test_a_mesh_needs_no_body(capsys: pytest.CaptureFixture[str], home: Path) -> None:
     assert "1280 -> 128 " in told(capsys, "meshes/ball.stl", "--ratio", "0.1", "--out", "simple")
     assert (home / "simple/ball.stl").stat().st_size == 84 + 50 * 128

@@ -179,7 +179,9 @@ def test_fix_cures_what_is_certain_and_leaves_the_rest_of_the_text_alone(
     assert told.endswith("turtlebot is fine: 9 components in 3 processes\n")
 
 
-@settings(max_examples=min(settings().max_examples, 10), suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=max(2, settings().max_examples // 30), suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(wrong=st.sets(st.sampled_from(sorted(SLIPS))), where=st.integers(0, 10**6), comment=st.text("#x ", max_size=5))
 def test_fix_changes_only_the_lines_that_are_told(project: Path, wrong: set[str], where: int, comment: str) -> None:
     right = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8").splitlines()

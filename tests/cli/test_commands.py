@@ -22,6 +22,7 @@ from rbxcompose.runtime.folder import STATE, ComponentState, RobotFolder, RobotS
 from rbxcompose.runtime.log import Record, start_new
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.testing.golden import Golden
+from tests.loops import for_all
 
 ROOT = Path(__file__).parents[2]
 RUNNING = ["ps", "down", "stop", "release", "logs"]
@@ -66,8 +67,8 @@ def test_an_unknown_command_is_wrong_usage_with_a_hint(capsys: pytest.CaptureFix
     assert "did you mean 'down'?" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("written", "usual"),
+@for_all(
+    "written, usual",
     [
         ("action", "action ls"),
         ("arm", "arm ls"),

@@ -18,6 +18,7 @@ from rbxcompose.commands.lookup import BusPlace
 from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.tools.commands.completion import SCRIPTS, KnownValues, candidates, files, for_shell
+from tests.loops import for_all
 
 ROOT = Path(__file__).parents[2]
 ECHO_OPTIONS = ["--count", "--domain", "--help", "--json", "--once", "--profile", "--robot", "--router", "--ssh-config"]
@@ -39,8 +40,8 @@ def test_verbs_are_completed() -> None:
     assert fitting("nonsense", "") == []
 
 
-@pytest.mark.parametrize(
-    ("words", "expected"),
+@for_all(
+    "words, expected",
     [
         (("topic", ""), ["echo", "hz", "ls", "pub", "show"]),
         (("topic", "e"), ["echo"]),
@@ -63,7 +64,7 @@ def test_words_options_and_values_are_completed_where_they_may_stand(
     assert fitting(*words) == expected
 
 
-@pytest.mark.parametrize("verb", verbs.verbs())
+@for_all("verb", verbs.verbs())
 def test_every_verb_can_be_completed(verb: str) -> None:
     assert "--help" in fitting(verb, "--")
 

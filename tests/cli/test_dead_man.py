@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.bases.commands.drive import HOLD, PERIOD, DeadMan, Velocity, keys
+from tests.loops import for_all
 
 
-@pytest.mark.parametrize(
-    ("key", "velocity"),
+@for_all(
+    "key, velocity",
     [
         ("w", Velocity(0.2, 0.0)),
         ("s", Velocity(-0.2, 0.0)),

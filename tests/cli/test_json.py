@@ -14,6 +14,7 @@ from rbxcompose.commands import verbs
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.log import start_new
 from tests.conftest import ROOT
+from tests.loops import for_all
 
 # The words behind each verb that has `--json`, with a mistake in them: there is no such robot, file, code or type.
 MISTAKES = {
@@ -171,7 +172,7 @@ def test_each_verb_that_claims_it_is_looked_at_here() -> None:
     assert {words for words, parser in found if "--json" in parser._option_string_actions} == set(MISTAKES)
 
 
-@pytest.mark.parametrize("verb", MISTAKES)
+@for_all("verb", MISTAKES)
 def test_a_mistake_is_one_document(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main([*verb.split(), *MISTAKES[verb].split(), "--json"]) in (1, 2)
     captured = capsys.readouterr()

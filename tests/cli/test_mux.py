@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.live_robot import Robot
+from tests.loops import for_all
 
 TEXT = """rbx: 1
 kind: Robot
@@ -74,8 +75,8 @@ def test_inputs_are_added_selected_and_deleted(robot: Robot) -> None:
     assert changes.endswith("no input\n")
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
+@for_all(
+    "words, told",
     [
         (("watch",), "several muxes, so name one; muxes: cmd_vel, head_vel"),
         (("why", "cmd_vl"), "there is no mux 'cmd_vl'; did you mean 'cmd_vel'?"),

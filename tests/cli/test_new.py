@@ -33,10 +33,12 @@ def test_a_robot_a_part_and_a_mission_make_a_project_whose_tests_pass(project: P
     assert command.main(["new", "mission", "lap", "--yes"]) == 0
     assert command.main(["new", "part", "pack", "--yes"]) == 0
     assert command.main(["check", "--strict"]) == 0
-    words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests"]
+    (project / "run.py").write_text("import pytest\npytest.main(['-q', '-p', 'no:cacheprovider', 'tests'])\n")
+    words = [sys.executable, str(project / "run.py")]
     lean = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}  # our own plug-ins take longer than its tests
-    done = subprocess.run(words, capture_output=True, text=True, check=False, env=lean)
-    assert "6 passed" in done.stdout, done.stdout
+    with Forked(words, stdout=subprocess.PIPE, text=True, env=lean, cwd=project) as process:
+        told, _ = process.communicate()
+    assert "6 passed" in told, told
 
 
 def test_what_was_written_is_told_with_what_to_do_next(capsys: pytest.CaptureFixture[str]) -> None:

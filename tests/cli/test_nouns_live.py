@@ -20,6 +20,7 @@ from rbxcompose.msgs.geometry_msgs import Twist
 from tests.cli.live_robot import PATIENCE, Keyboard, Robot
 from tests.conftest import ROOT
 from tests.forked import Forked
+from tests.soak import rare
 
 FAR = "{pose: {header: {frame_id: map}, pose: {position: {x: 50}, orientation: {w: 1}}}}"
 NEAR = "{pose: {header: {frame_id: map}, pose: {orientation: {w: 1}}}}"
@@ -219,14 +220,14 @@ def test_the_robot_moves_only_while_a_key_is_pressed(robot: Robot) -> None:
         assert guest.run(lambda: speeds[-2:] == [-0.1, 0.0], PATIENCE)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, *rare(signal.SIGTERM, signal.SIGHUP)])
 def test_the_terminal_is_what_it_was_after_every_end(robot: Robot, number: signal.Signals) -> None:
     keyboard = driving(robot).until_ready()
     keyboard.process.send_signal(number)
     assert keyboard.end() == 0
 
 
-@pytest.mark.parametrize("keys", ["wq", "\x04", "w\n\x04"])
+@pytest.mark.parametrize("keys", ["wq", *rare("\x04", "w\n\x04")])
 def test_an_end_that_was_typed_before_it_was_ready_counts(robot: Robot, keys: str) -> None:
     assert driving(robot, early=keys).end() == 0
 

@@ -18,6 +18,7 @@ from rbxcompose.sdk.parameters import from_message
 from rbxcompose.tools.parameters.changes import value_of
 from tests.commands import command
 from tests.forked import run_command
+from tests.loops import for_all
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 20.0  # [s]
@@ -259,8 +260,8 @@ def test_a_file_that_was_edited_meanwhile_is_not_written_over(do: Do, base: Path
     file.write_text(before)
 
 
-@pytest.mark.parametrize(
-    ("words", "reason"),
+@for_all(
+    "words, reason",
     [
         (("set", "battery.runtime"), "write COMPONENT PARAMETER VALUE"),
         (("save", "baterry"), "did you mean 'battery'?"),
@@ -278,8 +279,8 @@ def test_what_cannot_be_done_is_told_with_the_reason(do: Do, words: tuple[str, .
     assert (done.returncode in (1, 2), reason in done.stderr) == (True, True), done.stderr
 
 
-@pytest.mark.parametrize(
-    ("text", "value"),
+@for_all(
+    "text, value",
     [
         ("0.5", 0.5),
         ("3", 3),

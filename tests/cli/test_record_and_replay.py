@@ -28,6 +28,7 @@ from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
 from rbxcompose.tools.commands.record import Tap
 from tests.commands import command as at_once
 from tests.forked import RBXCOMPOSE, Forked, run_command
+from tests.loops import for_all
 from tests.recording.samples import some, written
 
 ROOT = Path(__file__).parents[2]
@@ -285,7 +286,7 @@ def test_info_shows_topics_types_counts_and_duration(tmp_path: Path, capsys: pyt
     ]
 
 
-@pytest.mark.parametrize("cut", range(0, len(written(MESSAGES)), 97 * 3))
+@for_all("cut", range(0, len(written(MESSAGES)), 97 * 3))
 def test_a_file_that_was_cut_is_a_warning_and_shows_what_is_left(
     cut: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

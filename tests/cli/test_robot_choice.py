@@ -14,6 +14,7 @@ from rbxcompose.commands.targets import robot_path
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
 from tests.forked import run_command
+from tests.loops import for_all
 
 ROBOT = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  base: {type: diff_drive_sim}\n"
 
@@ -71,9 +72,7 @@ def test_several_robots_are_named(folder: Path) -> None:
         robot_path(None, may_run=False)
 
 
-@pytest.mark.parametrize(
-    "words", ["up", "plan", "expand", "graph", "apply", "why base.max_speed", "mission skills", "body show"]
-)
+@for_all("words", ["up", "plan", "expand", "graph", "apply", "why base.max_speed", "mission skills", "body show"])
 def test_a_verb_without_a_robot_is_refused_with_what_it_needs(words: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(words.split()) == 1
     assert "error[RBX9031]: no robot is named" in capsys.readouterr().err
@@ -86,6 +85,7 @@ def test_verbs_take_the_only_robot(words: str, folder: Path, capsys: pytest.Capt
     assert "--json" not in words or json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.soak  # as other verbs do
 def test_up_takes_the_only_robot_of_the_folder(folder: Path) -> None:
     add_robot(folder / "robot.yaml")
     done = run_command(("up", "--rate", "max", "--for", "1s"), os.environ, 30.0, folder)

@@ -10,6 +10,7 @@ import pytest
 from rbxcompose.commands import layout
 from rbxcompose.commands import main as command
 from rbxcompose.compiler.plan.dump import load
+from tests.soak import rare
 
 TURTLEBOT = "robots/turtlebot"
 BROKEN = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  base:\n    type: diff_drive_sim\n    max_sped: 1 m/s\n"
@@ -63,8 +64,7 @@ def test_a_robot_that_is_not_there_is_a_finding(words: list[str], capsys: pytest
     [
         ("why", TURTLEBOT, "battery.runtime"),
         ("mission show", TURTLEBOT, "patrol"),
-        ("mission explore", TURTLEBOT, "patrol", "--states", "5"),
-        ("arm fk", "robots/pi_robot", "wave"),
+        *rare(("mission explore", TURTLEBOT, "patrol", "--states", "5"), ("arm fk", "robots/pi_robot", "wave")),
     ],
 )
 def test_a_robot_and_what_is_asked_of_it_are_understood_in_either_order(

@@ -13,6 +13,7 @@ from rbxcompose.domains.body.command_pose import Slider, SliderPanel, bar, is_en
 from rbxcompose.domains.body.urdf import read_body
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.testing.golden import Golden
+from tests.loops import for_all
 
 JOINT = '<joint name="{name}" type="{kind}"><parent link="base"/><child link="{name}_link"/>{more}</joint>'
 LIMIT = '<limit lower="{0}" upper="{1}" effort="1" velocity="1"/>'
@@ -50,8 +51,8 @@ def test_joints_that_move_by_themselves_have_sliders_over_their_range() -> None:
     assert panel().positions == {"head_pan_joint": 0.0, "wheel": 0.0, "lift": 0.1}
 
 
-@pytest.mark.parametrize(
-    ("keys", "joint", "position"),
+@for_all(
+    "keys, joint, position",
     [
         ([RIGHT], "head_pan_joint", math.radians(1)),
         ([LEFT, FAR_LEFT], "head_pan_joint", math.radians(-11)),

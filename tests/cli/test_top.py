@@ -28,6 +28,7 @@ from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.top import ComponentPicture, Load, RobotPicture, Tree, lines_of
 from tests.commands import command
 from tests.forked import RBXCOMPOSE, Forked, run_command
+from tests.soak import rare
 from tests.third_party.places import put
 
 ROOT = Path(__file__).parents[2]
@@ -166,7 +167,7 @@ def test_without_a_terminal_one_picture_is_shown(robot: Robot) -> None:
     assert "topped: router tcp/127.0.0.1:" in robot.do("top", str(robot.file)).stdout
 
 
-@pytest.mark.parametrize("end", ["q", "interrupt"])
+@pytest.mark.parametrize("end", ["q", *rare("interrupt")])
 def test_on_a_terminal_it_is_live_and_leaves_the_terminal_as_it_was(robot: Robot, end: str) -> None:
     ours, theirs = pty.openpty()
     assert os.get_terminal_size(theirs) == (0, 0)  # as some terminals say, too

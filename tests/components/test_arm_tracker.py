@@ -126,10 +126,10 @@ def test_it_comes_to_rest_when_it_is_cancelled(parts: list[Instance]) -> None:
     chased = Chased(parts)
     chased.show(*[(0.24, 0.1, 0.0)] * 5)
     chased.goal.cancel()
-    chased.bench.advance(1.0)
+    chased.bench.advance(0.6)
     assert chased.ends[0].outcome is Outcome.CANCELED
     at = chased.tip
-    chased.show(*[(0.24, -0.1, -0.05)] * 10)
+    chased.show(*[(0.24, -0.1, -0.05)] * 5)
     assert math.dist(chased.tip, at) < 2e-3
 
 

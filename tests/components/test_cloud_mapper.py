@@ -26,6 +26,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 from tests.components.slow_servos import with_slow_servos
 from tests.conftest import ROOT
+from tests.loops import for_all
 from tests.motion.toy_arm import urdf
 
 Array = NDArray[np.float64]
@@ -174,8 +175,8 @@ def test_no_more_clouds_are_used_than_were_asked_for_and_the_same_cells_are_told
 WRONG = cloud(FAR)
 
 
-@pytest.mark.parametrize(
-    ("message", "age", "told"),
+@for_all(
+    "message, age, told",
     [
         (replace(WRONG, fields=WRONG.fields[:2]), 0.0, "it has no field 'z'; its fields: x, y"),
         (replace(WRONG, fields=(*WRONG.fields[:2], replace(WRONG.fields[2], offset=99))), 0.0, "beyond the 20 bytes"),

@@ -94,13 +94,13 @@ def test_its_capabilities_name_ports_and_fields_that_it_has_with_their_values(na
 def test_its_lifecycle_runs_twice_and_leaves_nothing_on_the_bus(name: str) -> None:
     robot = Bench(instance_of(name))
     text = next(iter(robot.host.hosted))
-    robot.advance(2.0)
+    robot.advance(1.0)
     robot.host.shutdown()
     left = len(robot.bus)
     robot.host.is_braking = False
     robot.host.configure()
     robot.host.activate([text])
-    robot.advance(2.0)
+    robot.advance(1.0)
     assert robot.host.states()[text] == ("active", 0), robot.texts()
     robot.host.shutdown()
     assert len(robot.bus) == left
@@ -110,7 +110,7 @@ def test_its_lifecycle_runs_twice_and_leaves_nothing_on_the_bus(name: str) -> No
 def test_it_does_the_same_for_the_same_input(name: str) -> None:
     def run() -> list[str]:
         robot = Bench(instance_of(name))
-        robot.advance(3.0)
+        robot.advance(1.5)
         return [record.to_json() for record in robot.records]
 
     assert run() == run()

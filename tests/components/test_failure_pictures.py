@@ -57,8 +57,9 @@ def test_the_oldest_pictures_go_and_other_files_stay(tmp_path: Path, monkeypatch
     others = [tmp_path / "notes.txt", tmp_path / "left_arm-0001-lift-path_in_collision.png"]
     for other in others:
         other.write_text("mine")
+    works = HandBench().works
     for _ in range(MOST + 5):
-        said = picture_of_failure(tmp_path, "right_arm", HandBench().works, {}, FAILURE)
+        said = picture_of_failure(tmp_path, "right_arm", works, {}, FAILURE)
         assert Path(said.removeprefix("picture: ")).read_bytes() == b"png"
     assert sorted(numbered(tmp_path, "right_arm")) == list(range(6, MOST + 6))
     assert len(list(tmp_path.iterdir())) == MOST + len(others)

@@ -23,6 +23,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from tests.components.slow_servos import with_slow_servos
 from tests.conftest import ROOT
+from tests.loops import for_all
 from tests.shipped import compiled, robot_and_plan
 from tests.soak import rare
 
@@ -76,8 +77,8 @@ def test_it_ends_when_the_camera_looks_at_an_object(parts: dict[str, Instance]) 
     assert angle_to(bench, (0.27, -0.12, 0.78)) < math.radians(1)
 
 
-@pytest.mark.parametrize(
-    ("goal", "changes", "reason", "said"),
+@for_all(
+    "goal, changes, reason, said",
     [
         (
             LookAtPoint.Goal(object="cup"),

@@ -44,6 +44,7 @@ from rbxcompose.sdk.bound import Outcome
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from tests.components.slow_servos import with_slow_servos
+from tests.loops import for_all
 from tests.shipped import robot_and_plan
 
 pytestmark = pytest.mark.timeout(180)  # the libraries of arms are slow to import
@@ -304,8 +305,8 @@ GOAL = joints(**{LIFT: -1.0})
 POINT = Constraints(position_constraints=(place(0.2, -0.1, 0.6),))
 
 
-@pytest.mark.parametrize(
-    ("goal", "fields", "code", "told"),
+@for_all(
+    "goal, fields, code, told",
     [
         (GOAL, {"group_name": "leg"}, MoveItErrorCodes.INVALID_GROUP_NAME, "there is no group 'leg': right_arm"),
         (GOAL, {"planner_id": "SBLkConfigDefault"}, MoveItErrorCodes.FAILURE, "there is no planner 'SBL'"),

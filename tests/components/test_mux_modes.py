@@ -27,6 +27,7 @@ from rbxcompose.msgs.topic_tools_interfaces import MuxAdd, MuxDelete, MuxList, M
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.sdk.robot_events import ComponentNoted
 from rbxcompose.testing import Bench, check_text, instance
+from tests.loops import for_all
 
 SLOW, FAST, ZERO = Twist(linear=Vector3(x=0.1)), Twist(linear=Vector3(x=0.4)), Twist()
 RANKED = {"teleop": {"priority": 100, "timeout": "0.5 s"}, "navigation": {"priority": 10, "timeout": "0.5 s"}}
@@ -201,7 +202,7 @@ def test_an_input_with_a_priority_can_be_added_while_the_robot_runs() -> None:
     assert out == [FAST, SLOW, FAST]
 
 
-@pytest.mark.parametrize("order", [
+@for_all("order", [
     SelectMuxInput("cmd_vel", "teleop"),
     AddMuxInput("cmd_vel", "teleop", priority=1, timeout=1.0),
     AddMuxInput("cmd_vel", "bumper"),

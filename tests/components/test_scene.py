@@ -40,6 +40,7 @@ from rbxcompose.sdk.bound import Reply
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 from tests.body.test_virtual_joint import WORLD
+from tests.loops import for_all
 from tests.motion.toy_arm import urdf
 
 BOX = SolidPrimitive(type=SolidPrimitive.BOX, dimensions=np.array((0.1, 0.2, 0.3)))
@@ -144,8 +145,8 @@ def test_a_link_that_never_moves_holds_nothing() -> None:
     assert scene.names == []
 
 
-@pytest.mark.parametrize(
-    ("fields", "reason"),
+@for_all(
+    "fields, reason",
     [
         ({"id": ""}, "a name has 1 to 200 letters"),
         ({"primitives": ()}, "'box' has no shapes"),

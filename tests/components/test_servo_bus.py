@@ -27,6 +27,7 @@ TICK = 0.00512  # [rad] of an AX-12
 LIMITS = {"lower": -2.0, "upper": 2.0, "velocity": 1.5, "acceleration": 8.0}
 CONFIG: dict[str, Any] = {
     "twin": "servo",
+    "rate": 50.0,
     "joints": {
         "pan": {**LIMITS, "servos": [{"id": 1, "model": "AX-12"}]},
         "tilt": {**LIMITS, "servos": [{"id": 2, "model": "AX-12", "invert": True}]},

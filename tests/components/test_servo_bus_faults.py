@@ -32,7 +32,7 @@ CONFIG: dict[str, Any] = {
 class Head:
     """Two joints on a twin, with faults by name: when, what, of which joint, how long."""
 
-    def __init__(self, *faults: tuple[float, str, str, float | None], twin: str = "servo", rate: float = 100.0) -> None:
+    def __init__(self, *faults: tuple[float, str, str, float | None], twin: str = "servo", rate: float = 50.0) -> None:
         named = {
             f"fault_{index}": {"at": at, "fault": fault, "joint": joint, "lasts": lasts}
             for index, (at, fault, joint, lasts) in enumerate(faults)

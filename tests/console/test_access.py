@@ -25,13 +25,14 @@ from rbxcompose.domains.console.access import (
 from rbxcompose.domains.console.links import network_address
 from rbxcompose.msgs.types import Service
 from rbxcompose.runtime.process_group.parameters import INTERFACES
+from tests.loops import for_all
 
 ROLES = [Role.VIEW, Role.OPERATE, Role.CONFIGURE]
 SECRET = bytes(32)
 
 
-@pytest.mark.parametrize(
-    ("target", "least"),
+@for_all(
+    "target, least",
     [
         (OperationTarget("subscribe", "/odom"), Role.VIEW),
         (OperationTarget("subscribe", "/arm/state"), Role.VIEW),
@@ -51,7 +52,6 @@ SECRET = bytes(32)
         (OperationTarget("auth"), Role.NOBODY),
         (OperationTarget("who knows"), Role.OPERATE),
     ],
-    ids=str,
 )
 def test_each_operation_and_name_has_its_least_role(target: OperationTarget, least: Role) -> None:
     assert needed(target, {"/arm/*": Role.CONFIGURE}) is least
@@ -100,8 +100,8 @@ def test_a_secret_that_could_be_guessed_is_not_used(tmp_path: Path, monkeypatch:
     assert len(own_secret()) == 32
 
 
-@pytest.mark.parametrize(
-    ("host", "origin", "on_lan", "on_machine"),
+@for_all(
+    "host, origin, on_lan, on_machine",
     [
         ("127.0.0.1:8080", "", True, True),
         ("localhost:8080", "http://localhost:8080", True, True),

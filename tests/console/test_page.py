@@ -17,6 +17,7 @@ from tests.console.browser import CHROMIUM
 from tests.console.conftest import Pages
 from tests.console.fake_gateway import CONFIG, RUNNING, FakeGateway
 from tests.console.looks import PHONE, expect_readable, overflows, too_small, violations
+from tests.soak import Soak
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
 
@@ -68,7 +69,7 @@ def test_shift_and_a_key_drive_ten_times_a_second_until_one_is_let_go(
 ) -> None:
     page = open_page()
     drive_by_keys(page, gateway)
-    page.wait_for_timeout(1500)
+    page.wait_for_timeout(800)
     commands = gateway.commands()
     assert {command[1:] for command in commands} == {(0.25, 0)}
     rate = (len(commands) - 1) / (commands[-1][0] - commands[0][0])
@@ -299,7 +300,7 @@ def test_what_is_no_robot_is_an_error_with_a_way_out(pages: Pages, gateway: Fake
     expect(page.locator(".connection")).to_have_text("Connected")
 
 
-def test_everyone_can_read_and_reach_it(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+def test_everyone_can_read_and_reach_it(open_page: Callable[..., Page], gateway: FakeGateway, soak: Soak) -> None:
     page = open_page(name="")
 
     def name() -> None:
@@ -322,7 +323,8 @@ def test_everyone_can_read_and_reach_it(open_page: Callable[..., Page], gateway:
             page.set_viewport_size({"width": width, "height": 844})
             assert not overflows(page)
             assert too_small(page) == []
-        expect_readable(page)
+        if soak.is_on or prepare in (None, lose):  # the last shows what all before have done
+            expect_readable(page)
 
 
 def test_the_tab_key_reaches_every_control_and_shows_where_it_is(open_page: Callable[..., Page]) -> None:

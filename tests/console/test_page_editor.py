@@ -131,7 +131,9 @@ def test_space_in_a_text_is_a_space_and_stops_nothing(
     expect(page.get_by_text("Nothing moves until you press Release")).to_be_visible()
 
 
-def test_save_shows_what_changes_and_writes_it(open_page: Callable[..., Page], project: Project) -> None:
+def test_save_shows_what_changes_writes_it_and_brings_it_to_the_robot_while_it_runs(
+    open_page: Callable[..., Page], project: Project
+) -> None:
     page = edits(open_page(page_name="mission"))
     expect(page.get_by_role("button", name="Save")).to_be_disabled()
     types(page, "wait: 2 s", "wait: 3 s")
@@ -150,6 +152,12 @@ def test_save_shows_what_changes_and_writes_it(open_page: Callable[..., Page], p
     expect(page.get_by_text("Saved in 'missions/fetch.yaml'")).to_be_visible()
     assert project.text() == FETCH.replace("2 s", "3 s")
     expect(page.get_by_role("button", name="Save")).to_be_disabled()
+    page.get_by_role("button", name="Change the running robot").click()
+    dialog = page.get_by_role("dialog")
+    expect(dialog.get_by_role("list", name="What happens to what runs")).to_contain_text("goes on where it is")
+    dialog.get_by_role("button", name="Change it").click()
+    expect(page.get_by_text("The robot is changed.")).to_be_visible()
+    assert project.live.runs_with == project.text()
 
 
 @pytest.mark.soak
@@ -402,18 +410,3 @@ def test_a_new_mission_is_made_from_a_template_and_opened(open_page: Callable[..
     expect(page.get_by_text("bring in missions/bring.yaml")).to_be_visible()
     expect(block(page, "Delivered")).to_be_visible()
     expect(page.get_by_text("No mistakes")).to_be_visible()
-
-
-def test_a_mission_that_was_saved_is_brought_to_the_robot_while_it_runs(
-    open_page: Callable[..., Page], project: Project
-) -> None:
-    page = edits(open_page(page_name="mission"))
-    types(page, "2 s", "3 s")
-    page.get_by_role("button", name="Save").click()
-    page.get_by_role("button", name="Write it").click()
-    page.get_by_role("button", name="Change the running robot").click()
-    dialog = page.get_by_role("dialog")
-    expect(dialog.get_by_role("list", name="What happens to what runs")).to_contain_text("goes on where it is")
-    dialog.get_by_role("button", name="Change it").click()
-    expect(page.get_by_text("The robot is changed.")).to_be_visible()
-    assert project.live.runs_with == project.text() != FETCH

@@ -12,7 +12,6 @@ from rbxcompose.base.requests import Refused
 from tests.console.browser import CHROMIUM
 from tests.console.fake_gateway import FakeGateway
 from tests.console.looks import PHONE, WIDE, expect_fit, violations
-from tests.soak import rare
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
 
@@ -225,7 +224,8 @@ def test_what_is_wrong_and_why_is_seen_at_once(open_page: Callable[..., Page], g
     assert gateway.asked("diagnostics.Acknowledge")[0]["path"] == ""
 
 
-@pytest.mark.parametrize("name", ["diagnostics", *rare("mission")])  # tests of debugging look at that of missions
+@pytest.mark.parametrize("name", ["diagnostics", "mission"])
+@pytest.mark.soak  # as the editor of missions does
 def test_it_fits_the_window_and_the_finger(open_page: Callable[..., Page], patrol: FakeGateway, name: str) -> None:
     patrol.windows[TREE] = tree(2)
     patrol.windows["mission/ListMissions"] = [*listed("running"), listed("idle")[0] | {"name": "m" * 60}]

@@ -47,6 +47,7 @@ from rbxcompose.msgs.sensor_msgs import Image, LaserScan
 from rbxcompose.msgs.std_msgs import ColorRGBA, Float32, Header, String
 from rbxcompose.msgs.std_srvs import SetBool
 from tests.console.clients import STAMP, TELEOP, Room
+from tests.loops import for_all
 
 
 def level(percent: float) -> Float32:
@@ -326,8 +327,8 @@ def test_what_is_no_window_is_refused(path: str) -> None:
     assert "a subject, a query, and its fields" in status["msg"]
 
 
-@pytest.mark.parametrize(
-    ("frame", "why"),
+@for_all(
+    "frame, why",
     [
         ("", "not JSON"),
         ("{", "not JSON"),
@@ -543,8 +544,8 @@ def test_many_wrong_fields_hold_up_nobody() -> None:
     assert "has no field 'field0'" in client.gets()[0]["msg"]
 
 
-@pytest.mark.parametrize(
-    ("type_", "data"),
+@for_all(
+    "type_, data",
     [
         ("uint8", [0, 256]),
         ("byte", [-1]),

@@ -23,6 +23,7 @@ from rbxcompose.domains.servos.trajectory import (
     plan_trajectory,
 )
 from tests.control.trajectories import FREE, NAMES, SLOW, TIGHT, WIDE, ZERO, goal, goals, planned, points, rules
+from tests.loops import for_all
 
 POLICY = TrajectoryPolicy()
 CLAMP = TrajectoryPolicy(outside="clamp")
@@ -84,7 +85,7 @@ WRONG: dict[str, tuple[TrajectoryGoal, TrajectoryCode, str]] = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
+@for_all("name", WRONG)
 def test_a_wrong_trajectory_is_refused_with_code_and_reason(name: str) -> None:
     trajectory_goal, code, message = WRONG[name]
     answer = refusal(trajectory_goal)

@@ -100,7 +100,7 @@ def test_a_controller_is_held_and_goes_on_by_the_word_of_a_person() -> None:
     bus: Any = robot.component("servos")
     assert bus.handle(ScaleMotion("servos", "head", 0.0)) == "'head' holds: the speed is 0 %"
     head(MoveJoints.Goal(joints=("pan",), positions=np.array([1.0])), ended.append)
-    robot.advance(20.0)
+    robot.advance(8.0)
     assert not ended
     assert bus.handle(ListControllers("servos"))[0].note == "held: the speed is 0 %"
     assert bus.handle(ScaleMotion("servos", "head", 1.0)) == "'head' follows goals at 100% of the speed"

@@ -153,7 +153,7 @@ def test_no_sequence_of_commands_is_too_fast_for_a_wheel(asked: list[tuple[float
     for linear, angular, seconds in asked:
         rover.command(linear, angular)
         rover.advance(seconds)
-    rover.advance(2.0)
+    rover.advance(1.0)
     assert rover.is_still
     speeds = np.array(rover.speeds)
     assert np.abs(speeds).max() <= 6.0 * RADIUS + UNIT
@@ -166,7 +166,7 @@ def test_no_sequence_of_commands_is_too_fast_for_a_wheel(asked: list[tuple[float
 def test_from_rest_to_rest_the_wheels_keep_their_ratio(linear: float, angular: float) -> None:
     rover = Rover(joint={"velocity": 6.0, "acceleration": 20.0})
     rover.drive(linear, angular, 0.6)
-    rover.advance(2.0)
+    rover.advance(0.8)
     half = angular * DISTANCE / 2
     left, right = linear - half, linear + half
     fastest = max(abs(left), abs(right), 1e-9)

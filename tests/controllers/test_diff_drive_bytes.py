@@ -78,7 +78,7 @@ def test_a_base_drives_by_bytes_and_knows_where_it_is(model: str, tmp_path: Path
         while time.monotonic() < end and still < SETTLED:
             turned |= base.odometry.pose.heading > math.pi / 4
             if not turned:
-                base.received("commands", Twist(linear=Vector3(x=0.2), angular=Vector3(z=0.4)))
+                base.received("commands", Twist(linear=Vector3(x=0.2), angular=Vector3(z=0.8)))
             else:
                 base.halt(0.0, "")
             cycle.run(time.monotonic(), PERIOD, [base])

@@ -13,6 +13,7 @@ from rbxcompose.sdk.robot_events import MissionOver
 from rbxcompose.testing import Bench
 from rbxcompose.testing.manifests import Checked, check_text
 from tests.conftest import ROOT
+from tests.loops import for_all
 
 ROVER = ROOT / "robots/rover"
 TEXT = (ROVER / "robot.yaml").read_text(encoding="utf-8")
@@ -83,7 +84,7 @@ def test_it_is_fine(tmp_path: Path) -> None:
     assert check(tmp_path, NO_MISSION).codes == []
 
 
-@pytest.mark.parametrize("name", FOUND)
+@for_all("name", FOUND)
 def test_what_is_found_is_told_at_the_line_of_the_controller(name: str, tmp_path: Path) -> None:
     code, old, new, where = FOUND[name]
     text = NO_MISSION.replace(old, new, 1)

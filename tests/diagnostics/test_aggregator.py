@@ -11,6 +11,7 @@ from rbxcompose.domains.diagnostics.core import Aggregator
 from rbxcompose.domains.diagnostics.settings import AnalyzerModel, DiagnosticsModel, matches
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus, KeyValue
 from tests.diagnostics.trees import ERROR, OK, POWER, STALE, WARN, Groups, aggregator, fed, level, news, status, tree
+from tests.loops import for_all
 
 
 def test_items_hang_below_the_header_of_their_group() -> None:
@@ -36,8 +37,8 @@ def test_values_and_hardware_of_an_item_are_kept() -> None:
     assert (item.hardware_id, item.values) == (told.hardware_id, told.values)
 
 
-@pytest.mark.parametrize(
-    ("pattern", "name", "expected"),
+@for_all(
+    "pattern, name, expected",
     [
         ("battery", "battery", True),
         ("battery", "battery: cell 3", True),

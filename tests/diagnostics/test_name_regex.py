@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rbxcompose.domains.diagnostics.settings import fits_regex, trouble_of
+from tests.loops import for_all
 
 
 @pytest.mark.parametrize(
@@ -14,8 +15,8 @@ def test_an_expression_that_is_quick_on_any_name_is_taken(text: str) -> None:
     assert trouble_of(text) == ""
 
 
-@pytest.mark.parametrize(
-    ("text", "why"),
+@for_all(
+    "text, why",
     [
         ("cam[", "unterminated character set at position 3"),
         ("(a+)+", "repeats a group that holds a repeat"),

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 
-import pytest
 import yaml
 
 from tests.conftest import ROOT
+from tests.loops import for_all
 
 PAGE = ROOT / "docs/book.md"
 HEAD = "| missions | pi_robot |"
@@ -46,7 +46,7 @@ def proved() -> set[tuple[str, str, str]]:
 PROVED = proved()
 
 
-@pytest.mark.parametrize("cell", cells(), ids=" ".join)
+@for_all("cell", cells())
 def test_a_mission_that_is_said_to_run_on_a_robot_has_a_test_there(cell: tuple[str, str, str]) -> None:
     assert cell in PROVED
 

@@ -12,6 +12,7 @@ from rbxcompose.base.findings import Severity
 from rbxcompose.commands.verbs import load, parser_of, verbs
 from rbxcompose.tools.parameters.changes import assignments
 from tests.docs.examples import ROOT, Block, checked, page_blocks
+from tests.loops import for_all
 from tests.soak import rare
 
 
@@ -40,7 +41,7 @@ def commands(block: Block) -> list[list[str]]:
     return [words[1:] for words in lines if words and Path(words[0]).name == "rbxcompose"]
 
 
-@pytest.mark.parametrize("block", page_blocks("sh"), ids=str)
+@for_all("block", page_blocks("sh"))
 def test_a_command_parses(block: Block) -> None:
     for verb, *words in commands(block):
         assert verb in verbs()
@@ -52,7 +53,7 @@ def test_the_pages_show_commands() -> None:
     assert len([words for block in page_blocks("sh") for words in commands(block)]) > 10
 
 
-@pytest.mark.parametrize("block", page_blocks("python"), ids=str)
+@for_all("block", page_blocks("python"))
 def test_code_is_python(block: Block) -> None:
     compile(block.text, str(block), "exec")
 

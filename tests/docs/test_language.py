@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-import pytest
-
 from docs.generating.robot import models_below
 from rbxcompose.base.config import Config
 from rbxcompose.base.expressions.functions import FUNCTIONS
@@ -18,6 +16,7 @@ from rbxcompose.missions.language.reader import INTERRUPT_KEYS, KEYS
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program.program import AFTERWARDS
 from tests.docs.examples import ROOT
+from tests.loops import for_all
 
 PAGE = (ROOT / "docs/language.md").read_text(encoding="utf-8")
 ROWS = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in PAGE.splitlines() if line[:1] == "|"]
@@ -40,7 +39,7 @@ def test_it_has_every_unit_type_and_function() -> None:
 MODELS = [*map(file_model, FILES), *(model for section in sections() for _, model in models_below(section.type, ""))]
 
 
-@pytest.mark.parametrize("model", MODELS)
+@for_all("model", MODELS)
 def test_it_has_every_key_of_a_robot(model: type[Config]) -> None:
     keys = {field.alias or name for name, field in model.model_fields.items()}
     assert keys - WORDS == set()

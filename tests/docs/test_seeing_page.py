@@ -10,6 +10,7 @@ import pytest
 
 from rbxcompose.commands import main as command
 from tests.docs.examples import ROOT, Block, blocks_of
+from tests.loops import for_all
 
 PAGE = ROOT / "docs/inspection.md"
 SKIPS = "..."
@@ -26,7 +27,7 @@ SHOWN = list(shown_in(blocks_of(PAGE.read_text(encoding="utf-8"), PAGE.name)))
 
 
 @pytest.mark.usefixtures("repository")
-@pytest.mark.parametrize(("asked", "shown"), SHOWN, ids=str)
+@for_all("asked, shown", SHOWN)
 def test_a_command_prints_what_stands_below_it(asked: Block, shown: Block, capsys: pytest.CaptureFixture[str]) -> None:
     compare(asked, shown, capsys)
 

@@ -15,13 +15,14 @@ import pytest
 from rbxcompose.testing import check_file
 from tests.commands import command
 from tests.docs.examples import ROOT, Block, blocks_of
-from tests.forked import run_command
+from tests.forked import Forked, run_command
 
 PAGE = ROOT / "docs/tutorial.md"
 BLOCKS = list(blocks_of(PAGE.read_text(encoding="utf-8"), PAGE.name))
 ROBOT = "robots/cart/robot.yaml"
 SKIPS = "..."
 LONGEST = 60.0  # [s] of a command
+NO_PLUGINS = {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}  # of pytest, which a reader has not installed either
 
 
 def with_section(text: str, section: str) -> str:
@@ -29,6 +30,16 @@ def with_section(text: str, section: str) -> str:
     name = section.partition(":")[0]
     there = re.compile(rf"^{name}:.*\n(?:[ \t]+\S.*\n)*", re.MULTILINE)
     return there.sub(lambda _: section, text) if there.search(text) else f"{text}\n{section}"
+
+
+def run_script(
+    script: Path, words: list[str], environment: dict[str, str], folder: Path
+) -> subprocess.CompletedProcess[str]:
+    """Run Python with a script, in a process that has imported the package."""
+    order, pipe = [sys.executable, str(script), *words], subprocess.PIPE
+    with Forked(order, cwd=folder, env=environment, stdin=-3, stdout=pipe, stderr=pipe, text=True) as process:
+        out, err = process.communicate(timeout=LONGEST)
+    return subprocess.CompletedProcess(order, process.returncode, out, err)
 
 
 @dataclass
@@ -64,6 +75,10 @@ class Reader:
             return run_command(tuple(words), environment, LONGEST, self.folder)
         if program == "rbxcompose":
             return command(*words, environment=environment, folder=self.folder)
+        if line.startswith("python -m pytest "):
+            return run_script(
+                Path(pytest.__file__).with_name("__main__.py"), words[2:], {**environment, **NO_PLUGINS}, self.folder
+            )
         return subprocess.run(["bash", "-c", line], cwd=self.folder, env=environment, capture_output=True, text=True)
 
     def see(self, block: Block) -> None:

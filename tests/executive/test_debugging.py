@@ -30,6 +30,7 @@ from rbxcompose.missions.execution.requests import (
 )
 from rbxcompose.sdk import Outcome
 from tests.executive.fake_robot import Robot
+from tests.loops import for_all
 
 PATROL = """
 data:
@@ -195,8 +196,8 @@ def test_a_replay_says_what_a_changed_mission_cannot_repeat() -> None:
         replay(records(robot), changed.programs["test"], changed.names)
 
 
-@pytest.mark.parametrize(
-    ("request_", "reason"),
+@for_all(
+    "request_, reason",
     [
         (SetBreakpoint("go_hone"), r"there is no 'go_hone'; did you mean 'go_home'\?"),
         (SetBreakpoint("mission.yaml:99"), "nothing begins in line 99 of 'mission.yaml'"),

@@ -18,6 +18,7 @@ from rbxcompose.missions.execution.requests import (
 from rbxcompose.sdk import Outcome, Refused
 from rbxcompose.sdk.robot_events import MissionOver
 from tests.executive.fake_robot import Robot
+from tests.loops import for_all
 
 GO = "do:\n  go_to: dock"
 LOOK = "do:\n  scan"
@@ -93,8 +94,8 @@ def test_one_that_needs_what_another_uses_is_refused_with_its_name() -> None:
     assert robot.mission.missions.names == ["drive"]
 
 
-@pytest.mark.parametrize(
-    ("command", "reason"),
+@for_all(
+    "command, reason",
     [
         (RunMission("tset"), "the robot has no mission 'tset'"),
         (RunMission("test"), "mission test is already running"),

@@ -15,6 +15,7 @@ from rbxcompose.msgs.std_msgs import Bool, Empty, Float32
 from rbxcompose.sdk import Component, Config, ServesAction, component
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, check_text
+from tests.loops import for_all
 
 DAY = 86400.0
 
@@ -190,7 +191,7 @@ def test_after_a_stop_nothing_starts_late(tmp_path: Path) -> None:
     )
     robot.bench.host.stop()
     robot.battery(10.0)
-    robot.bench.advance(1200.0)
+    robot.bench.advance(700.0)
     robot.bench.host.release()
     robot.battery(9.0)
     assert robot.running == []
@@ -217,8 +218,8 @@ def test_after_a_release_a_paused_mission_is_in_the_way_like_one_that_runs(tmp_p
     ]
 
 
-@pytest.mark.parametrize(
-    ("trigger", "reason"),
+@for_all(
+    "trigger, reason",
     [
         ("{mission: home}", "needs one of at, cron, when, message, at_start, ends"),
         ('{at: "22:00", at_start: true, mission: home}', "it has 'at' and 'at_start'"),

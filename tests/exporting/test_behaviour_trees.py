@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
@@ -20,6 +19,7 @@ from rbxcompose.missions.program.program import MissionNode, Program
 from rbxcompose.tools.behaviour_trees.scripts import unplaced
 from rbxcompose.tools.exporting.behaviour_tree import exported, xml_of
 from rbxcompose.tools.importers.bt import bt
+from tests.loops import for_all
 from tests.missions.simulated import tree
 
 Node = Any
@@ -255,7 +255,7 @@ CANNOT = {
 }
 
 
-@pytest.mark.parametrize("text", CANNOT)
+@for_all("text", CANNOT)
 def test_what_no_tree_can_say_is_told_at_its_place(text: str) -> None:
     report = Report()
     xml_of({"tried": tree(text)}, "tried", report)

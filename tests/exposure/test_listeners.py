@@ -26,6 +26,7 @@ from rbxcompose.runtime.folder import SOCKET, RobotFolder
 from rbxcompose.runtime.requests import RobotStatus
 from tests.exposure.attacks import ON_CONTROL, ON_ROUTER, REQUESTS, sending
 from tests.exposure.sockets import Listener, listeners
+from tests.loops import for_all
 from tests.runtime.real_robot import PATIENCE, Robot, eventually
 from tests.soak import Soak
 
@@ -136,7 +137,7 @@ def test_an_attack_on_the_control_socket_is_refused(robot: Robot, refused: list[
     refused.append(name)
 
 
-@pytest.mark.parametrize("name", ON_ROUTER)
+@for_all("name", ON_ROUTER)
 def test_an_attack_on_the_router_is_refused(robot: Robot, refused: list[str], name: str) -> None:
     before, endpoint = alive(robot), robot.ps()["router"]["endpoint"]
     port = int(endpoint.rpartition(":")[2])

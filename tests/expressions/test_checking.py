@@ -2,7 +2,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -28,6 +27,7 @@ from rbxcompose.base.expressions.types import (
     map_with,
     quantity_of,
 )
+from tests.loops import for_all
 
 RATIO, TIME, SPEED, NUMBER = (
     quantity_of(dimension) for dimension in (units.RATIO, units.TIME, units.SPEED, units.NUMBER)
@@ -80,8 +80,8 @@ def problems(text: str) -> list[ExpressionProblem]:
     return check(parse(text), Names())[1]
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
+@for_all(
+    "text, expected",
     [
         ("$battery", RATIO),
         ("2", COUNT),
@@ -133,7 +133,7 @@ def test_an_expression_has_a_type_before_it_has_a_value(text: str, expected: Typ
     assert not wrong or "$count" in text
 
 
-@pytest.mark.parametrize(
+@for_all(
     "text",
     [
         "$battery < 30 %",
@@ -164,8 +164,8 @@ def test_a_sound_condition_has_no_problems(text: str) -> None:
     assert check_condition(parse(text), Names()) == []
 
 
-@pytest.mark.parametrize(
-    ("text", "place", "message", "fix"),
+@for_all(
+    "text, place, message, fix",
     [
         ("$batery < 3 %", "$batery", "unknown name '$batery'", "did you mean '$battery'?"),
         ("$dock == kitchen", "$dock", "unknown name '$dock'", "write 'dock' without '$'"),
@@ -234,8 +234,8 @@ def test_all_mistakes_are_told_by_place() -> None:
     assert [problem.start for problem in found] == [0, 11, 30]
 
 
-@pytest.mark.parametrize(
-    ("text", "expected", "message"),
+@for_all(
+    "text, expected, message",
     [
         ("5", SPEED, None),
         ("-5", SPEED, None),

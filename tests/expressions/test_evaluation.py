@@ -12,6 +12,7 @@ from rbxcompose.base.expressions.evaluate import evaluate, holds
 from rbxcompose.base.expressions.parser import parse
 from rbxcompose.base.expressions.tree import ExpressionError
 from rbxcompose.base.expressions.values import NOT_ARRIVED, EvaluationError, NotArrived, NotArrivedError, Value
+from tests.loops import for_all
 
 
 @dataclass(frozen=True)
@@ -81,8 +82,8 @@ DATA: dict[str, Value] = {
 SCOPE = Known(DATA, {"battery": 0.5})
 
 
-@pytest.mark.parametrize(
-    ("text", "value"),
+@for_all(
+    "text, value",
     [
         ("1 + 2 * 3", 7.0),
         ("10 % * 5", 0.5),
@@ -135,8 +136,8 @@ def test_a_word_and_a_variable_give_the_thing_itself() -> None:
     assert evaluate(parse("$chores"), SCOPE) is DATA["chores"]
 
 
-@pytest.mark.parametrize(
-    ("text", "place"),
+@for_all(
+    "text, place",
     [
         ("1 / ($round - 2)", "$round - 2"),
         ("$result.undone", "$result.undone"),
@@ -201,8 +202,8 @@ def test_whatever_needs_a_value_that_has_not_arrived_fails(text: str) -> None:
     assert caught.value.name == "missing"
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
+@for_all(
+    "text, expected",
     [
         ("$missing < 1", False),
         ("not $missing < 1", False),

@@ -26,6 +26,7 @@ from rbxcompose.base.expressions.tree import (
     children,
     walk,
 )
+from tests.loops import for_all
 
 
 def shape(node: ExpressionNode) -> str:
@@ -53,8 +54,8 @@ def shape(node: ExpressionNode) -> str:
     return f"{type(node).__name__}({', '.join(below)})"
 
 
-@pytest.mark.parametrize(
-    ("text", "value", "dimension"),
+@for_all(
+    "text, value, dimension",
     [
         ("30 %", 0.3, units.RATIO),
         ("30%", 0.3, units.RATIO),
@@ -73,8 +74,8 @@ def test_a_number_takes_the_unit_behind_it(text: str, value: float, dimension: u
     assert (number.start, number.end, number.dimension) == (0, len(text), dimension)
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
+@for_all(
+    "text, expected",
     [
         ("1 + 2 * 3", "(1 + (2 * 3))"),
         ("1 - 2 - 3", "((1 - 2) - 3)"),
@@ -131,8 +132,8 @@ def test_an_expression_tells_its_names_words_and_calls_with_places() -> None:
     assert [(found.name, text[found.start : found.end]) for found in read.calls] == [("age", "age")]
 
 
-@pytest.mark.parametrize(
-    ("text", "place", "part_of_message_or_help"),
+@for_all(
+    "text, place, part_of_message_or_help",
     [
         ("", "", "a value is missing at the end"),
         ("$a <", "", "a value is missing at the end"),
@@ -191,7 +192,7 @@ def test_a_dollar_has_no_place_in_what_is_filled_in_before() -> None:
     assert shape(parse_fill("args.speed * 2").tree) == "(args.speed * 2)"
 
 
-@pytest.mark.parametrize(
+@for_all(
     "text",
     [
         "x" * (LONGEST + 1),

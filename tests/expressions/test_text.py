@@ -8,6 +8,7 @@ from rbxcompose.base.expressions.text import fill, parse_template
 from rbxcompose.base.expressions.tree import ExpressionError
 from rbxcompose.base.expressions.values import NOT_ARRIVED, EvaluationError, NotArrived, NotArrivedError, Value
 from rbxcompose.missions.engine.value_text import show
+from tests.loops import for_all
 
 
 class Place:
@@ -55,8 +56,8 @@ def written(name: str, value: Value) -> str:
     return show(None, value)
 
 
-@pytest.mark.parametrize(
-    ("text", "filled"),
+@for_all(
+    "text, filled",
     [
         ("I am at $room now", "I am at living room now"),
         ("I am at $room.", "I am at living room."),

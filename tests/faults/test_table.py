@@ -5,9 +5,8 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-import pytest
-
 from tests.conftest import ROOT
+from tests.loops import for_all
 
 REAL, ROUNDS = "runtime/test_real_processes.py", "faults/test_rounds.py"
 ROWS = {
@@ -87,7 +86,7 @@ def promises_of(file: str) -> Iterator[str]:
     return (node.name.removeprefix("test_") for node in tree.body if isinstance(node, ast.FunctionDef))
 
 
-@pytest.mark.parametrize("fault", ROWS)
+@for_all("fault", ROWS)
 def test_a_fault_has_its_test(fault: str) -> None:
     file, name = ROWS[fault]
     assert name in set(promises_of(file))

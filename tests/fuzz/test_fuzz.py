@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.fuzz.targets import TARGETS
+from tests.loops import for_all
 from tests.soak import Soak
 
 ROOT = Path(__file__).parents[2]
@@ -19,7 +20,7 @@ SEEDS = Path(__file__).parent / "seeds"
 SECONDS = 60
 
 
-@pytest.mark.parametrize("seed", sorted(SEEDS.rglob("*.*")), ids=lambda path: f"{path.parent.name}-{path.name}")
+@for_all("seed", sorted(SEEDS.rglob("*.*")))
 def test_a_seed_raises_nothing(seed: Path) -> None:
     TARGETS[seed.parent.name](seed.read_bytes())
 

@@ -18,6 +18,7 @@ from rbxcompose.compiler.composition.robot_file import load_robot
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import to_plain
+from tests.loops import for_all
 
 ROOT = Path(__file__).parents[2]
 TURTLEBOT = (ROOT / "robots/turtlebot/robot.yaml").read_text()
@@ -97,7 +98,7 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize(("text", "code"), HOSTILE.values(), ids=HOSTILE)
+@for_all("text, code", HOSTILE.values())
 def test_a_hostile_text_is_a_finding_with_a_place(text: bytes, code: str) -> None:
     _, findings = read_text(text, "robot.yaml")
     assert [finding.code for finding in findings] == [code]

@@ -64,6 +64,16 @@ LONG = {
     "many quotes",
     "many lines",
     "3,000 branches that need the base",
+    "a loop over 19,000 items",
+    "200,000 elements of a URDF",
+    "components that start after each other",
+    "180,000 keys",
+    "many comments",
+    "90,000 unknown keys",
+    "50,000 items inside each other",
+    "10,000 states",
+    "one long text",
+    "an element of 3 MB that never ends",
 }
 ALL = PROJECTS | {name: Project(code, {"robots/bad/robot.yaml": text}) for name, (text, code) in WORST.items()}
 THE_WORST = ("500,000 nodes", "doubling parts", "20 MB", "doubling aliases", "a long list filled in many times")

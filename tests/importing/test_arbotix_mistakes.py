@@ -6,12 +6,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.importing.imports import import_texts
+from tests.loops import for_all
 from tests.soak import Soak
 
 JOINT = "joints:\n  pan: {id: 1}\n"
@@ -66,14 +66,14 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("mistake", WRONG)
+@for_all("mistake", WRONG)
 def test_a_mistake_is_told_at_its_place(mistake: str, tmp_path: Path) -> None:
     text, code, line = WRONG[mistake]
     found = import_texts(tmp_path, text)
     assert (code, line) in found.told, found.words
 
 
-@pytest.mark.parametrize("mistake", [name for name, (text, _, _) in WRONG.items() if "tilt: {id: 2}" in text])
+@for_all("mistake", [name for name, (text, _, _) in WRONG.items() if "tilt: {id: 2}" in text])
 def test_the_rest_is_imported(mistake: str, tmp_path: Path) -> None:
     assert list(import_texts(tmp_path, WRONG[mistake][0]).data["joints"]) == ["tilt"]
 

@@ -22,6 +22,7 @@ from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.behaviour_trees import forest_importer, nodes
 from rbxcompose.tools.behaviour_trees.forest import TREE
 from tests.importing.imports import EXAMPLES, Imported, import_files
+from tests.loops import for_all
 from tests.missions.simulated import ROBOT, Simulated, tree
 
 ROOT = '<root BTCPP_format="4">{}</root>'
@@ -336,7 +337,7 @@ SUBTREES: Mapping[str, tuple[str, str, str]] = {
 }
 
 
-@pytest.mark.parametrize("name", RUNS)
+@for_all("name", RUNS)
 def test_it_ends_and_halts_as_there(name: str, tmp_path: Path) -> None:
     body, settings, expected = RUNS[name]
     made = of_body(tmp_path, body)
@@ -413,7 +414,7 @@ WRONG: Mapping[str, tuple[str, str, list[tuple[str, int]]]] = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
+@for_all("name", WRONG)
 def test_what_is_wrong_is_told_at_its_place_and_fails_instead(name: str, tmp_path: Path) -> None:
     body, more, told = WRONG[name]
     made = of_body(tmp_path, body, more)

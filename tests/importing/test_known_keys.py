@@ -15,6 +15,7 @@ from rbxcompose.commands.importing.foreign_files import ForeignFile, ForeignMap,
 from rbxcompose.commands.importing.importer import PLUGINS, imported
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 from tests.importing.imports import EXAMPLES
+from tests.loops import for_all
 
 Key = tuple[str, str]
 """The type of the map that has a key, as far as it has one, and the key."""
@@ -82,7 +83,7 @@ def result_of(program: str, files: list[ForeignFile]) -> Result:
     return made.text, made.beside, findings, left_out
 
 
-@pytest.mark.parametrize("program", PLUGINS.names())
+@for_all("program", PLUGINS.names())
 def test_each_known_key_is_carried_over_or_reported(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: set[Key] = set()
     ask = ForeignMap._ask

@@ -17,6 +17,7 @@ from rbxcompose.msgs.std_msgs import Bool
 from rbxcompose.testing import Bench, check_text
 from rbxcompose.testing.golden import Golden
 from tests.importing.imports import EXAMPLES, Imported, import_files, import_texts
+from tests.loops import for_all
 
 GOLDEN = {"lists": ["topics", "locks"], "maps": ["ros2"], "yocs": ["yocs"]}
 
@@ -161,7 +162,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
+@for_all("name", WRONG)
 def test_what_is_wrong_is_told_at_its_place(name: str, tmp_path: Path) -> None:
     text, code, line = WRONG[name]
     assert (code, line) in mux(tmp_path, text).told

@@ -22,6 +22,7 @@ from rbxcompose.domains.worlds.shapes import PolygonFootprint
 from rbxcompose.testing import check_text
 from rbxcompose.testing.golden import Golden
 from tests.importing.imports import EXAMPLES, Imported, import_files, import_texts
+from tests.loops import for_all
 
 GOLDEN = {
     "depot": ["depot"],
@@ -164,7 +165,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
+@for_all("name", WRONG)
 def test_what_is_wrong_is_told_at_its_place(name: str, tmp_path: Path) -> None:
     text, code, line = WRONG[name]
     assert (code, line) in nav2(tmp_path, text).told

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from rbxcompose.testing import check_text
 from rbxcompose.testing.golden import Golden
 from tests.importing.imports import EXAMPLES, Imported, import_files, import_texts
+from tests.loops import for_all
 
 DUMP = "!!python/object/new:dynamic_reconfigure.encoding.Config"
 
@@ -121,7 +122,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
+@for_all("name", WRONG)
 def test_what_cannot_be_carried_over_is_told(name: str, tmp_path: Path) -> None:
     text, code, line = WRONG[name]
     assert (code, line) in params(tmp_path, text).told

@@ -18,6 +18,7 @@ from tests import shipped
 from tests.body.described import described
 from tests.conftest import ROOT
 from tests.importing.imports import EXAMPLES, Imported, import_files
+from tests.loops import for_all
 
 LIFTER = [EXAMPLES / f"srdf/lifter.{end}" for end in ("srdf", "urdf")]
 
@@ -66,8 +67,8 @@ def test_what_is_exported_is_imported_as_the_same(robot: str, tmp_path: Path) ->
 FITS = '<virtual_joint name="world_joint" type="fixed" parent_frame="world" child_link="base"/>'
 
 
-@pytest.mark.parametrize(
-    ("written", "words", "taken"),
+@for_all(
+    "written, words, taken",
     [
         (FITS.replace("fixed", "Planar").replace("world", "odom"), [], ("odom_joint", "planar", "odom")),
         (FITS.replace("fixed", "hinge"), ["no type 'hinge'", "fixed, planar or floating"], "world"),

@@ -54,9 +54,11 @@ def without_arguments(plan: Plan) -> Plan:
     return replace(plan, instances=tuple(replace(instance, bounds={}) for instance in plan.instances))
 
 
+SELDOM = [pytest.param(*one, marks=pytest.mark.soak) for one in (((), True), (("tired",), False))]
+
+
 @pytest.mark.parametrize("file", [TURTLEBOT, TWINS])
-@pytest.mark.parametrize("profiles", [(), ("tired",)])
-@pytest.mark.parametrize("has_origins", [True, False])
+@pytest.mark.parametrize(("profiles", "has_origins"), [(("tired",), True), ((), False), *SELDOM])
 def test_what_it_writes_is_the_same_robot(
     file: str, profiles: tuple[str, ...], has_origins: bool, repository: Path, tmp_path: Path
 ) -> None:

@@ -14,6 +14,7 @@ from rbxcompose.testing import Golden, check_text
 from rbxcompose.tools.inspection.expand import leaves
 from rbxcompose.tools.inspection.paths import short
 from rbxcompose.tools.inspection.why import PathAnswer, why
+from tests.loops import for_all
 
 ASKED = {
     "turtlebot": (
@@ -98,8 +99,8 @@ def test_a_default_says_so_and_where_it_can_be_set() -> None:
     assert "--set base.acceleration=VALUE" in answer.text()
 
 
-@pytest.mark.parametrize(
-    ("path", "message", "help_text"),
+@for_all(
+    "path, message, help_text",
     [
         ("batery.runtime", "robot 'turtlebot' has no 'batery'", "did you mean 'battery'?"),
         ("battery.runtme", "'battery' has no 'runtme'", "did you mean 'runtime'?"),

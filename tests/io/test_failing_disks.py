@@ -10,6 +10,7 @@ import pytest
 
 from tests.io.faulty_disk import faulty_disks
 from tests.io.writers import WRITERS, Run
+from tests.loops import for_all
 from tests.soak import Soak
 
 
@@ -20,7 +21,7 @@ def rounds(soak: Soak) -> Iterator[list[str]]:
     soak.tell("disks that fail", len(tried), 0, f"at each call of {len(WRITERS)} writers")
 
 
-@pytest.mark.parametrize("name", WRITERS)
+@for_all("name", WRITERS)
 def test_a_disk_that_fails_costs_nothing_and_leaves_nothing_open(
     name: str, tmp_path: Path, rounds: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -32,7 +32,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.tools.commands.check import fix
 
 OLD, NEW = b"old: 1\n" * 3000, b"new: 2\n" * 4000
-MESSAGES = 40
+MESSAGES = 12
 TOPIC = RecordedTopic("/level", "std_msgs/msg/Float32", "RIHS01_0", Qos.STATE, "float32 data\n")
 
 

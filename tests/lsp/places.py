@@ -21,9 +21,9 @@ BATTERY = ROOT / "parts/battery.yaml"
 class Editor:
     """Asks the core about a file of the project, with changed text where a test says so."""
 
-    def __init__(self) -> None:
+    def __init__(self, *robots: Path) -> None:
         self.project = Project({})
-        for path in (ROBOT, TWINS, HEAD):
+        for path in robots:
             self.project.change(path, path.read_text(encoding="utf-8"))
 
     def complete(self, path: Path, old: str, new: str) -> list[CompletionItem]:

@@ -10,7 +10,8 @@ from rbxcompose.manifest.documents import KINDS
 from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.tools.lsp.completion import complete
 from rbxcompose.tools.lsp.document import Document
-from tests.lsp.places import BATTERY, LOOK, PATROL, ROBOT, TWINS, Editor
+from tests.loops import for_all
+from tests.lsp.places import BATTERY, HEAD, LOOK, PATROL, ROBOT, TWINS, Editor
 
 PLACES = ["dock", "corner_1", "corner_2", "corner_3", "corner_4"]
 COMPONENTS = ["battery", "base", "go_to", "charger", "cmd_vel"]
@@ -18,11 +19,11 @@ COMPONENTS = ["battery", "base", "go_to", "charger", "cmd_vel"]
 
 @pytest.fixture(scope="module")
 def editor() -> Editor:
-    return Editor()
+    return Editor(ROBOT, TWINS, HEAD)
 
 
-@pytest.mark.parametrize(
-    ("path", "old", "new", "labels"),
+@for_all(
+    "path, old, new, labels",
     [
         (ROBOT, "    reach: 20 cm", "    re", ["reach", "process", "starts_after", "connect"]),
         (ROBOT, "dock: dock", "dock: ", PLACES),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.tools.lsp.completion import complete
 from rbxcompose.tools.lsp.document import MARK, Cursor, Document, locate
+from tests.loops import for_all
 from tests.lsp.places import PATROL, ROBOT
 
 TEXTS = {path: path.read_text(encoding="utf-8") for path in (ROBOT, PATROL)}
@@ -19,8 +20,8 @@ def at(text: str) -> Cursor | None:
     return locate(before + after, before.count("\n"), len(before.rpartition("\n")[2]))
 
 
-@pytest.mark.parametrize(
-    ("text", "path", "before", "after", "is_key"),
+@for_all(
+    "text, path, before, after, is_key",
     [
         ("a:\n  b: c|d\n", ("a", "b"), "c", "d", False),
         ("a:\n  b|c: d\n", ("a",), "b", "c", True),
@@ -69,6 +70,7 @@ def test_a_first_key_of_an_item_may_become_a_word() -> None:
     assert not key.begins_item
 
 
+@settings(max_examples=max(3, settings().max_examples // 2))
 @given(st.sampled_from(list(TEXTS)), st.data())
 def test_no_position_in_no_beginning_of_a_text_makes_trouble(path: object, data: st.DataObject) -> None:
     text = TEXTS[path]  # type: ignore[index]

@@ -10,16 +10,17 @@ from rbxcompose.tools.lsp.answers import define
 from rbxcompose.tools.lsp.completion import complete
 from rbxcompose.tools.lsp.document import Document
 from tests.conftest import ROOT
+from tests.loops import for_all
 from tests.lsp.places import BATTERY, PATROL, ROBOT, TWINS, Editor, line_of
 
 
 @pytest.fixture(scope="module")
 def editor() -> Editor:
-    return Editor()
+    return Editor(ROBOT, TWINS)
 
 
-@pytest.mark.parametrize(
-    ("path", "words", "offset", "target", "there"),
+@for_all(
+    "path, words, offset, target, there",
     [
         (ROBOT, "dock: dock", 7, ROBOT, "  dock: {"),
         (ROBOT, "from: go_to", 8, ROBOT, "  go_to:\n"),
@@ -69,8 +70,8 @@ def test_what_names_nothing_leads_nowhere(editor: Editor) -> None:
     assert editor.define(ROBOT, "rbx: 1", 5) == "None"
 
 
-@pytest.mark.parametrize(
-    ("path", "words", "offset", "told"),
+@for_all(
+    "path, words, offset, told",
     [
         (
             ROBOT,

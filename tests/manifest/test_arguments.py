@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import pytest
-
 from rbxcompose.base.findings import Finding, Report
 from rbxcompose.base.units import SPEED, Quantity
 from rbxcompose.manifest.arguments import read_argument
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import BROKEN, MappingNode
 from rbxcompose.manifest.validate import to_plain
+from tests.loops import for_all
 
 
 def read(declaration: str) -> tuple[object, list[Finding]]:
@@ -37,7 +36,7 @@ VALUES = [
 ]
 
 
-@pytest.mark.parametrize(("declaration", "value"), VALUES)
+@for_all("declaration, value", VALUES)
 def test_a_value_has_the_type_that_is_declared(declaration: str, value: object) -> None:
     read_value, findings = read(declaration)
     assert findings == []
@@ -64,7 +63,7 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(("declaration", "code", "message"), MISTAKES)
+@for_all("declaration, code, message", MISTAKES)
 def test_a_wrong_declaration_or_value_is_one_finding(declaration: str, code: str, message: str) -> None:
     _, findings = read(declaration)
     assert [(finding.code, finding.message) for finding in findings] == [(code, message)]

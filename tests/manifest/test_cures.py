@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.testing.manifests import check_text
+from tests.loops import for_all
 from tests.misconfig.corpus import HERE
 
 ROBOT = (HERE / "robot.yaml").read_text(encoding="utf-8")
@@ -146,7 +147,7 @@ CURES = [
 ]
 
 
-@pytest.mark.parametrize(("right", "wrong", "cure"), CURES, ids=lambda cure: cure.strip().splitlines()[-1][:40])
+@for_all("right, wrong, cure", CURES)
 def test_the_first_finding_about_a_mistake_tells_the_cure(right: str, wrong: str, cure: str, tmp_path: Path) -> None:
     assert right in ROBOT
     others = {"mission.yaml": MISSION, "secrets/token": "x"}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from rbxcompose.base.expressions.types import PLACE, TEXT, TYPES, UNKNOWN
 from rbxcompose.base.findings import Finding, Report
 from rbxcompose.base.units import LENGTH, SPEED, Quantity
@@ -11,6 +9,7 @@ from rbxcompose.manifest.fill import Names, Typed, fill, names_of, with_argument
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import BROKEN, MappingNode, ScalarNode
 from rbxcompose.manifest.validate import to_plain
+from tests.loops import for_all
 
 
 def read(text: str) -> MappingNode:
@@ -70,7 +69,7 @@ VALUES = [
 ]
 
 
-@pytest.mark.parametrize(("text", "value"), VALUES, ids=[value[0] for value in VALUES])
+@for_all("text, value", VALUES)
 def test_a_value_is_filled_in(text: str, value: object) -> None:
     data, findings = filled(text)
     assert findings == []
@@ -96,9 +95,7 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("text", "code", "column", "message", "fix"), MISTAKES, ids=[mistake[0] for mistake in MISTAKES]
-)
+@for_all("text, code, column, message, fix", MISTAKES)
 def test_what_cannot_be_filled_in_is_one_finding(text: str, code: str, column: int, message: str, fix: str) -> None:
     data, findings = filled(text)
     assert data is BROKEN

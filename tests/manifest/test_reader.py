@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
 from rbxcompose.base.findings import Finding, Span
 from rbxcompose.manifest.reader import read_file, read_text
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, at, key_span, value_span
+from tests.loops import for_all
 
 
 def read(text: str) -> MappingNode:
@@ -123,7 +122,7 @@ TRAPS = [
 ]
 
 
-@pytest.mark.parametrize(("source", "code", "place", "words"), TRAPS, ids=[trap[0][:20] for trap in TRAPS])
+@for_all("source, code, place, words", TRAPS)
 def test_a_trap_of_yaml_is_one_finding_at_its_place(source: str, code: str, place: tuple[int, int], words: str) -> None:
     finding = only(source + "\n")
     assert finding.span

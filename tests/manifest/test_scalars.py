@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.findings import Span
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import ScalarNode
+from tests.loops import for_all
 
 HERE = Span("f", 1, 1, 1, 2)
 CORE = [
@@ -39,7 +39,7 @@ CORE = [
 ]
 
 
-@pytest.mark.parametrize(("text", "value"), CORE)
+@for_all("text, value", CORE)
 def test_a_plain_scalar_has_its_core_type(text: str, value: object) -> None:
     read = plain_value(ScalarNode(text, HERE))
     assert (read, type(read)) == (value, type(value))

@@ -15,6 +15,7 @@ from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import validate
 from rbxcompose.testing.manifests import check_text
+from tests.loops import for_all
 
 FILE = "robot.yaml"
 ROBOT = "kind: Robot\nname: one\ncomponents:\n  base:\n    type: diff_drive_sim\n"
@@ -141,7 +142,7 @@ def test_the_first_line_has_no_place_within_brackets(tmp_path: Path) -> None:
 MANY = 60_000
 
 
-@pytest.mark.parametrize(
+@for_all(
     "text",
     [
         f"a: b: c{' ' * MANY}d # e",
@@ -153,7 +154,6 @@ MANY = 60_000
         f"words: {'a, ' * (MANY // 3)}!",
         f"words: {'a ' * (MANY // 2)}",
     ],
-    ids=[str(number) for number in range(8)],
 )
 def test_a_long_text_that_is_nearly_a_slip_takes_no_longer_than_its_length(text: str) -> None:
     begun = time.process_time()

@@ -12,6 +12,7 @@ from rbxcompose.base.findings import Finding, Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import BROKEN, MappingNode
 from rbxcompose.manifest.validate import validate
+from tests.loops import for_all
 
 
 class Inner(Config):
@@ -97,9 +98,7 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("text", "code", "column", "message", "label", "fix"), MISTAKES, ids=[mistake[0][:24] for mistake in MISTAKES]
-)
+@for_all("text, code, column, message, label, fix", MISTAKES)
 def test_a_mistake_is_one_finding(text: str, code: str, column: int, message: str, label: str, fix: str) -> None:
     read, findings = check(text)
     assert read is None

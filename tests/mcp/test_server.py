@@ -19,6 +19,7 @@ from rbxcompose.tools.commands import mcp
 from rbxcompose.tools.mcp.answer_size import MOST_CHARACTERS
 from tests.conftest import ROOT
 from tests.forked import Forked
+from tests.loops import for_all
 from tests.mcp.tool_client import ToolClient, connected, served
 from tests.patrol_project import MISSION, ROBOT, TEST, changed, write_project
 
@@ -115,8 +116,8 @@ def test_a_mission_that_is_not_there_is_not_tried(client: ToolClient) -> None:
     assert "did you mean 'patrol'?" in client.refusal("dry_run", mission="patrl", robot=ROBOT)
 
 
-@pytest.mark.parametrize(
-    ("path", "told"),
+@for_all(
+    "path, told",
     [
         ("/etc/passwd", "'/etc/passwd' is outside the project"),
         ("../other/robots/turtlebot", "'../other/robots/turtlebot' is outside the project"),
@@ -144,8 +145,8 @@ def test_what_a_folder_or_a_text_names_outside_is_refused(client: ToolClient, pr
     assert [finding["code"] for finding in told["findings"]] == ["RBX1306"]
 
 
-@pytest.mark.parametrize(
-    ("tool", "given", "told"),
+@for_all(
+    "tool, given, told",
     [
         ("check", {"path": "x"}, "path: "),
         ("check", {"paths": 3}, "paths: "),

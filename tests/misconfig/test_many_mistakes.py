@@ -86,7 +86,7 @@ def told_alone(name: str, wrong: Value) -> Told:
 @pytest.fixture
 def every(soak: Soak) -> int:
     """Return which values are tried: one of so many."""
-    return soak.examples(12, 1)
+    return soak.examples(24, 1)
 
 
 @pytest.mark.parametrize("name", FILES)

@@ -8,13 +8,14 @@ from typing import Any
 
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.base.requests import Refused
 from rbxcompose.tools.mission_editor.outline import Block, MissionOutline
 from rbxcompose.tools.mission_editor.patch import TextPatch
 from rbxcompose.tools.mission_editor.patches import OPERATIONS, change
+from tests.loops import for_all
 
 HEAD = "# what it is for\nrbx: 1\nkind: Mission\nname: fetch\n"
 WORDS = (
@@ -157,6 +158,7 @@ def changes(draw: st.DrawFn) -> tuple[str, dict[str, Any], TextPatch]:
     return text, operation, made
 
 
+@settings(max_examples=settings().max_examples // 2)
 @given(changes())
 def test_no_byte_outside_of_the_edits_changes_and_undo_is_the_identity(
     given_: tuple[str, dict[str, Any], TextPatch],
@@ -166,6 +168,7 @@ def test_no_byte_outside_of_the_edits_changes_and_undo_is_the_identity(
     assert undone(text, made) == text
 
 
+@settings(max_examples=settings().max_examples // 2)
 @given(changes())
 def test_what_moves_takes_its_comments_along_and_loses_nothing(given_: tuple[str, dict[str, Any], TextPatch]) -> None:
     text, operation, made = given_
@@ -182,6 +185,7 @@ def test_what_moves_takes_its_comments_along_and_loses_nothing(given_: tuple[str
                 assert any(there[at : at + len(own)] == own for at in range(len(there)))
 
 
+@settings(max_examples=settings().max_examples // 2)
 @given(changes())
 def test_the_tree_afterwards_is_the_one_that_was_meant(given_: tuple[str, dict[str, Any], TextPatch]) -> None:
     text, operation, made = given_
@@ -212,6 +216,7 @@ def test_the_tree_afterwards_is_the_one_that_was_meant(given_: tuple[str, dict[s
         assert at(after, operation["path"])[operation["key"]] in ({"a": 1, "b": [2]}, "one\n\n  two\n")
 
 
+@settings(max_examples=settings().max_examples // 2)
 @given(changes())
 def test_the_chosen_block_is_one_of_the_new_outline(given_: tuple[str, dict[str, Any], TextPatch]) -> None:
     text, _, made = given_
@@ -315,7 +320,7 @@ def test_states_and_interrupts_have_names_and_move_among_themselves() -> None:
     assert "\ninterrupts:\n  low:\n    when: $battery < 20 %\n    do: recharge\n\ndo:\n" in low
 
 
-@pytest.mark.parametrize(
+@for_all(
     "operation",
     [
         {"op": "delete", "path": ["do", 9]},

@@ -10,6 +10,7 @@ from rbxcompose.base.requests import Refused
 from rbxcompose.tools.mission_editor.outline import MissionOutline
 from rbxcompose.tools.mission_editor.patches import change
 from rbxcompose.tools.mission_editor.values import shape_of, shown_value
+from tests.loops import for_all
 
 HEAD = "rbx: 1\nkind: Mission\nname: fetch\ndo:\n"
 TEXT = f"""{HEAD}  - go_to:   # there
@@ -48,8 +49,8 @@ def test_a_value_is_shown_as_it_is_written() -> None:
     assert value(["do", 2, "in"]) == ("lines", "[a,\n         b]")
 
 
-@pytest.mark.parametrize(
-    ("operation", "old", "new"),
+@for_all(
+    "operation, old, new",
     [
         (
             {"path": ["do", 0], "key": "go_to", "shape": "lines", "value": "# where\nplace: table\n"},
@@ -120,8 +121,8 @@ FLOW = (
 )
 
 
-@pytest.mark.parametrize(
-    ("operation", "old", "new"),
+@for_all(
+    "operation, old, new",
     [
         ({"op": "delete", "path": ["do", 0, 1]}, ",  recharge", ""),
         ({"op": "delete", "path": ["do", 0, 0]}, "{wait: 1 s},  ", ""),

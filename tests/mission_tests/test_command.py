@@ -19,6 +19,7 @@ from tests.soak import Soak
 SOAKED = {  # of each there is another one, or what they do is tried in `tests/navigation` and `tests/components`
     f"{name}.test.yaml"
     for name in (
+        "alternate_runtime",
         "arm_and_head",
         "around_obstacles",
         "carry_a_tool",
@@ -43,10 +44,13 @@ SOAKED = {  # of each there is another one, or what they do is tried in `tests/n
         "reach_and_shift",
         "reach_out",
         "return_to_where_it_was",
+        "seen_nothing",
+        "seen_too_wide",
         "stretch_out",
         "tuck",
         "tucked_patrol",
         "wander",
+        "words_by_turns",
     )
 }
 PATROL = "missions/tests/patrol.test.yaml"

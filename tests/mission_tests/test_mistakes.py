@@ -11,6 +11,7 @@ from rbxcompose.base.findings import FindingKind
 from rbxcompose.commands.finding_pages import body_of
 from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.mission_tests import codes
+from tests.loops import for_all
 from tests.mission_tests.trying import Trying
 
 FINE = "mocks:\n  go_to:\n  recharge:\nexpect:\n  outcome: success\n"
@@ -74,8 +75,8 @@ def test_each_mistake_is_told_at_its_place(trying: Trying, golden: Golden) -> No
     golden.check("mistakes.txt", found + more)
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
+@for_all(
+    "text, words",
     [
         ("mocks: 3\nexpect:\n  outcome: success\n", "'mocks'"),
         ("mocks: [go_to]\nexpect:\n  outcome: success\n", "'mocks'"),

@@ -9,6 +9,7 @@ import pytest
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.missions.slips.values import NUMBERS
 from rbxcompose.testing.golden import Golden
+from tests.loops import for_all
 from tests.missions.test_slips import FILE, cured, report_of
 
 DRIVE = "        do:\n          go_to: dock\n"
@@ -64,20 +65,20 @@ def test_every_slip_is_told_with_what_to_do(golden: Golden) -> None:
     golden.check("beginner_slips.txt", "".join(told))
 
 
-@pytest.mark.parametrize("name", [name for name in SLIPS if name != "a list below a hook"])
+@for_all("name", [name for name in SLIPS if name != "a list below a hook"])
 def test_a_slip_has_no_consequences_that_are_told_as_well(name: str) -> None:
     assert len(report_of(SLIPS[name]).findings) == 1
 
 
-@pytest.mark.parametrize("name", SLIPS)
+@for_all("name", SLIPS)
 def test_what_to_do_is_said_without_words_of_programmers(name: str) -> None:
     for finding in report_of(SLIPS[name]):
         assert finding.help
         assert not re.search(r"\b(map|mapping|node|datum|expression)\b", f"{finding.message} {finding.help}")
 
 
-@pytest.mark.parametrize(
-    ("name", "wrong", "right"),
+@for_all(
+    "name, wrong, right",
     [
         ("a list without brackets", "dock, corner_1, kitchen", "[dock, corner_1, kitchen]"),
         ("a list in round brackets", "(dock, kitchen)", "[dock, kitchen]"),
@@ -106,7 +107,7 @@ def test_a_state_is_renamed_wherever_its_machine_names_it() -> None:
     assert not report_of(cured(HOME.format("go home"))).has_errors
 
 
-@pytest.mark.parametrize(
+@for_all(
     "unclear",
     [
         "do:\n  sequence:\n    go_to: dock\n    go_to: kitchen\n",  # the second one is not known of

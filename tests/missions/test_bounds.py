@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.expressions.evaluate import holds
 from rbxcompose.base.expressions.parser import parse
 from rbxcompose.missions.analysis.bounds import Bounds, truth
+from tests.loops import for_all
 
 KNOWN = {"a": Bounds(0.0, 1.0), "b": Bounds(-3.0, 3.0)}
 TERMS = st.sampled_from(
@@ -55,8 +55,8 @@ def test_what_is_decided_beforehand_is_so_for_all_values(text: str, a: float, b:
     assert decided is None or decided is holds(condition, Fixed(a, b))
 
 
-@pytest.mark.parametrize(
-    ("text", "decided"),
+@for_all(
+    "text, decided",
     [
         ("$a < 0", False),
         ("$a <= 0", None),

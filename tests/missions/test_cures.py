@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from textwrap import dedent
 
-import pytest
-
 from rbxcompose.testing.manifests import check_text
+from tests.loops import for_all
 from tests.misconfig.corpus import HERE, VALUES
 
 ROBOT = (HERE / "robot.yaml").read_text(encoding="utf-8") + VALUES
@@ -97,7 +96,7 @@ CURES = [
 ]
 
 
-@pytest.mark.parametrize(("text", "cures"), CURES)
+@for_all("text, cures", CURES)
 def test_every_finding_about_a_mission_tells_the_cure(text: str, cures: list[str], tmp_path: Path) -> None:
     checked = check_text(ROBOT, tmp_path, others={"mission.yaml": HEAD + dedent(text)})
     found = [one for one in checked.compilation.report if one.span and one.span.file.endswith("mission.yaml")]

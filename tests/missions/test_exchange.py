@@ -19,6 +19,7 @@ from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.snapshot import save
 from rbxcompose.missions.program.outcomes import RUNNING
 from rbxcompose.missions.program.program import Program
+from tests.loops import for_all
 from tests.missions.random_missions import CASES, NODES, Case
 from tests.missions.simulated import Simulated, program_of, robot_with, simulate
 from tests.missions.test_composites import skills
@@ -151,8 +152,8 @@ def refused(before: str, after: str, at: float) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "at", "started"),
+@for_all(
+    "before, after, at, started",
     [
         ("[a, b, c]", "[a, b, d, c]", 1.5, ["0 a", "1 b", "2 d", "3 c"]),
         ("[a, b, c]", "[d, a, b, c]", 1.5, ["0 a", "1 b", "2 c"]),  # what is before it does not run any more

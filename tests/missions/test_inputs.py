@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import pytest
-
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import Finding
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.engine.inputs import bind_inputs
 from rbxcompose.testing import compile_mission
+from tests.loops import for_all
 from tests.missions.simulated import PLACES, program_of, robot_with, tree
 
 MISSION = """
@@ -37,8 +36,8 @@ def test_what_is_not_given_has_its_default_and_places_are_places() -> None:
     assert values == {"rounds": 2.0, "pause": 2.0, "home": PLACES["dock"], "mode": "slow", "words": "7", "stays": [5.0]}
 
 
-@pytest.mark.parametrize(
-    ("given", "message", "help_text"),
+@for_all(
+    "given, message, help_text",
     [
         ("pause: 2 s\n  rounds: many", "the input 'rounds' must be a whole number, at least 0", ""),
         ("pause: 2 s\n  rounds: 6", "the input 'rounds' is above its 'max' of 5: 6", ""),

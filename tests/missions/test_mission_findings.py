@@ -16,6 +16,7 @@ from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.testing.golden import Golden
+from tests.loops import for_all
 from tests.missions.simulated import ROBOT, tree
 
 SHAPE = """\
@@ -241,7 +242,7 @@ MISSION_KINDS = sorted(
 )  # checks have their own
 
 
-@pytest.mark.parametrize("code", MISSION_KINDS)
+@for_all("code", MISSION_KINDS)
 def test_each_docs_page_shows_what_is_found_and_how_it_is_right(code: str) -> None:
     bad, good = re.findall(r"```yaml\n(.*?)```", body_of(KINDS[code]), re.DOTALL)
     if code == codes.WRONG_INPUT.code or code == codes.TOO_DEEP.code:
@@ -263,8 +264,8 @@ ODD = (
 )
 
 
-@pytest.mark.parametrize(
-    ("text", "code", "message"),
+@for_all(
+    "text, code, message",
     [
         ("data: {stop: {stay: 5 m, to: dock}}\ndo: {wait: $stop.stay}", "RBX4106", "a time; it is a length"),
         ("do: {for: x, in: [5 m, 3 s], do: {wait: $x}}", "RBX4106", "a time; it is a length or a time"),

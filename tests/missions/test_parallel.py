@@ -7,6 +7,7 @@ import itertools
 import pytest
 
 from rbxcompose.missions.engine.events import Transition
+from tests.loops import for_all
 from tests.missions.simulated import Simulated, simulate
 from tests.missions.test_composites import fails, skills
 
@@ -25,8 +26,8 @@ def test_all_begin_at_once_and_it_succeeds_when_all_have() -> None:
     assert simulated.now == 3.0
 
 
-@pytest.mark.parametrize(
-    ("options", "failing", "outcome", "at"),
+@for_all(
+    "options, failing, outcome, at",
     [
         ("", "b", "failure", 2.0),
         ("succeed_when: any", "", "success", 1.0),

@@ -19,6 +19,7 @@ from rbxcompose.missions.program.registry import kinds
 from rbxcompose.missions.view.picture import MissionPicture, picture_of
 from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.inspection.mission_text import mission_sentences
+from tests.loops import for_all
 from tests.missions.random_missions import CASES, Case
 from tests.missions.random_missions import ROBOT as RANDOM
 from tests.missions.simulated import ROBOT, program_of, tree
@@ -49,8 +50,8 @@ def alone(path: Path) -> Program:
     return program
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
+@for_all(
+    "text, words",
     [
         ("$battery < 20 %", "the battery is below 20 %"),
         ("not $battery < 20 %", "the battery is at least 20 %"),

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import pytest
-
 from rbxcompose.base.config import Place
 from rbxcompose.base.expressions.types import TYPES
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.engine.value_text import show, show_briefly
+from tests.loops import for_all
 
 
-@pytest.mark.parametrize(
-    ("type_name", "value", "whole", "brief"),
+@for_all(
+    "type_name, value, whole, brief",
     [
         ("ratio", 0.488889, "48.8889 %", "48.9 %"),
         ("time", 12345.6, "12345.6 s", "12346 s"),

@@ -14,6 +14,7 @@ from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.slips.settings import FOREIGN, STEPS
 from rbxcompose.missions.slips.values import ENDLESS, FLAGS
 from rbxcompose.testing.golden import Golden
+from tests.loops import for_all
 from tests.missions.simulated import ROBOT
 
 FILE = "mission.yaml"
@@ -71,8 +72,8 @@ def test_every_slip_is_told_with_its_cure(golden: Golden) -> None:
     golden.check("slips.txt", render_text(report_of(SLIPS), {FILE: SLIPS}))
 
 
-@pytest.mark.parametrize(
-    ("wrong", "right"),
+@for_all(
+    "wrong, right",
     [
         ("-go_to: dock\n  -say: hello", "- go_to: dock\n  - say: hello"),
         ("-recharge\n  -go_to: dock", "- recharge\n  - go_to: dock"),
@@ -93,7 +94,7 @@ def test_a_slip_that_can_mean_one_thing_only_is_cured(wrong: str, right: str) ->
     assert cured(f"do:\n  {wrong}\n") == f"do:\n  {right}\n"
 
 
-@pytest.mark.parametrize(
+@for_all(
     "unclear",
     [
         "- go_to: dock\n    retries: 3",

@@ -19,6 +19,7 @@ from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.motion.trace_planner import TraceWish, WayPoint
 from rbxcompose.domains.arms.reasons import MotionReason
 from rbxcompose.domains.body.model import Geometry
+from tests.loops import for_all
 from tests.motion.toy_arm import kinematics, planner
 
 KINEMATICS, PLANNER = kinematics(), planner()
@@ -84,8 +85,8 @@ def test_positions_of_joints_take_precedence_over_the_pose() -> None:
     assert site.sent[0][0].positions[-1].tolist() == pytest.approx([0.8, 1.0, 0.5])
 
 
-@pytest.mark.parametrize(
-    ("goal", "named"),
+@for_all(
+    "goal, named",
     [
         (ArmGoal("asid"), "there is no pose 'asid'; the poses of this arm: aside, up"),
         (ArmGoal(), "neither a pose nor positions"),

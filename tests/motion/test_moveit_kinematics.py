@@ -25,6 +25,7 @@ from rbxcompose.msgs.moveit_msgs import (
 from rbxcompose.msgs.poses import pose_message, pose_of
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Header
+from tests.loops import for_all
 from tests.motion.toy_arm import kinematics, planner
 
 ARM, SPACE = kinematics(), planner().space
@@ -74,8 +75,8 @@ def test_links_are_told_in_the_order_in_which_they_were_asked_for() -> None:
     assert pose_of(answer.pose_stamped[1].pose).translation == pytest.approx((0.0, 0.0, 0.0))
 
 
-@pytest.mark.parametrize(
-    ("fields", "code"),
+@for_all(
+    "fields, code",
     [
         ({"group_name": "leg"}, MoveItErrorCodes.INVALID_GROUP_NAME),
         ({"ik_link_name": "fore"}, MoveItErrorCodes.INVALID_LINK_NAME),

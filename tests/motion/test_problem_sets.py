@@ -8,6 +8,7 @@ import pytest
 
 from rbxcompose.domains.arms.motion.figures import ProblemError, problem_files, read_problem
 from rbxcompose.domains.body.model import Geometry
+from tests.loops import for_all
 
 SCENE = """
 world:
@@ -60,8 +61,8 @@ def test_at_most_so_many_of_each_scenario_are_taken_and_those_without_a_request_
     assert found == ["box/scene0002.yaml", "box/scene0003.yaml", "cage/scene0001.yaml", "cage/scene0002.yaml"]
 
 
-@pytest.mark.parametrize(
-    ("scene", "request_", "told"),
+@for_all(
+    "scene, request_, told",
     [
         ("[", REQUEST, "scene0001.yaml' is neither YAML nor JSON"),
         ("!!python/object:os.system {}", REQUEST, "scene0001.yaml' is neither YAML nor JSON"),

@@ -17,6 +17,7 @@ from rbxcompose.domains.arms.motion import scene as planning_scene
 from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pairs
 from rbxcompose.domains.arms.motion.scene import MOST_SHAPES, PlacedObject, PlanningScene, SceneError, ScenePiece
 from rbxcompose.domains.body.model import Geometry
+from tests.loops import for_all
 from tests.motion.scenes import FLOOR, MESH, OCTREE, objects, poses, solids
 from tests.motion.toy_arm import kinematics, planner
 
@@ -90,8 +91,8 @@ def test_what_an_arm_holds_collides_with_the_things_around_it() -> None:
     assert MeshChecker(ARM, {}, adjacent_pairs(BODY), [table, held]).colliding(values) == [("rod", "table")]
 
 
-@pytest.mark.parametrize(
-    ("one", "named"),
+@for_all(
+    "one, named",
     [
         (PlacedObject("prism", Geometry("prism", (1.0,)), "ground", Transform3()), "'prism' is no shape"),
         (PlacedObject("box", Geometry("box", (1.0,)), "ground", Transform3()), "the size of a box is x, y, z"),

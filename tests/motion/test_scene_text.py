@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from rbxcompose.base.findings import Finding
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.motion.scene_text import SceneFile, read_scene, written_scene
+from tests.loops import for_all
 from tests.motion.scenes import FACES, MESH, names, objects
 
 OLDER = """(noname)
@@ -82,8 +83,8 @@ def test_reading_and_writing_once_more_changes_nothing(text: str) -> None:
     assert written_scene("a", read(once).objects) == once
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "line", "message"),
+@for_all(
+    "old, new, line, message",
     [
         ("box", "bax", 6, "'bax' is no shape: box"),
         ("0.2 0.7 0.01", "0.2 x 0.01", 7, "'x' is no number, but y of a box"),

@@ -16,6 +16,7 @@ from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionPlanner, Mo
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 from rbxcompose.domains.body.model import Geometry
+from tests.loops import for_all
 from tests.motion.test_planner import sampled
 from tests.motion.toy_arm import Array, ended, kinematics, planner
 
@@ -120,8 +121,8 @@ def test_a_link_of_the_arm_may_be_before_what_a_camera_of_the_body_sees() -> Non
     assert "'upper' is before what 'ground' is to see" in words
 
 
-@pytest.mark.parametrize(
-    ("sight", "named"),
+@for_all(
+    "sight, named",
     [
         (KeptSight("nowhere"), "there is no link 'nowhere'"),
         (KeptSight("tip", "nowhere"), "there is no link 'nowhere'"),

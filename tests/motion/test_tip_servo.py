@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.domains.arms.motion.collisions import TOUCH, MeshChecker, adjacent_pairs
@@ -59,6 +59,7 @@ Commands = list[tuple[tuple[float, ...] | None, int]]
 twists = st.tuples(st.floats(-0.6, 0.6), st.floats(-0.6, 0.6), st.floats(-0.6, 0.6))
 
 
+@settings(max_examples=settings().max_examples // 2)
 @given(st.lists(st.tuples(st.one_of(st.none(), twists), st.integers(1, 25)), min_size=1, max_size=6))
 def test_whatever_is_commanded_it_keeps_its_limits_and_hits_nothing(
     commands: list[tuple[tuple[float, ...] | None, int]],

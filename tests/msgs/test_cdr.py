@@ -17,6 +17,7 @@ from rbxcompose.msgs.std_msgs import Bool, Empty, Float32, Int32, String
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
 from rbxcompose.msgs.types import Message, declared
 from rbxcompose.msgs.unique_identifier_msgs import UUID
+from tests.loops import for_all
 from tests.msgs.samples import EVERYTHING, MESSAGES, ORACLE, any_message, instances, oracle_encode
 from tests.soak import Soak
 
@@ -35,13 +36,13 @@ GOLDEN = [
 ]
 
 
-@pytest.mark.parametrize(("message", "body"), GOLDEN, ids=str)
+@for_all("message, body", GOLDEN)
 def test_known_messages_have_known_bytes(message: Message, body: str) -> None:
     assert encode(message) == HEADER + bytes.fromhex(body)
 
 
 def test_a_message_of_defaults_is_written_as_rosbags_writes_it_and_read_back(soak: Soak) -> None:
-    for message in MESSAGES[:: soak.examples(5, 1)]:
+    for message in MESSAGES[:: soak.examples(10, 1)]:
         payload = encode(message())
         assert payload == oracle_encode(message()), message
         assert decode(message, payload) == message()
@@ -161,7 +162,7 @@ def test_a_text_must_be_whole_utf_8(body: bytes, why: str) -> None:
         decode(String, HEADER + body)
 
 
-@pytest.mark.parametrize(
+@for_all(
     "message",
     [
         Int32(data=2**31),
@@ -176,7 +177,6 @@ def test_a_text_must_be_whole_utf_8(body: bytes, why: str) -> None:
         EVERYTHING(few=[1, 2, 3, 4, 5]),
         EVERYTHING(pair=("one",)),
     ],
-    ids=str,
 )
 def test_what_cannot_be_written_is_a_cdr_error_that_names_the_type(message: Message) -> None:
     with pytest.raises(CdrError, match=f"^{message.TYPE} cannot be written: "):

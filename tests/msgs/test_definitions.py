@@ -66,8 +66,8 @@ def test_comments_and_quotes_do_not_disturb_each_other() -> None:
     assert [(constant.name, constant.value) for constant in structure.constants] == [("Z", "q")]
 
 
-@pytest.mark.parametrize(
-    ("line", "why"),
+@for_all(
+    "line, why",
     [
         ("flaot32 x", "no such type: 'flaot32'"),
         ("wstring x", "no such type: 'wstring'"),
@@ -81,7 +81,6 @@ def test_comments_and_quotes_do_not_disturb_each_other() -> None:
         ("Point x 3", "a/msg/Point cannot have a value here"),
         ("string x 'abc", "a quote is not closed"),
     ],
-    ids=str,
 )
 def test_a_wrong_line_is_named(line: str, why: str) -> None:
     with pytest.raises(DefinitionError) as caught:

@@ -104,7 +104,7 @@ def structures() -> dict[str, Any]:
     return {**all_structures(), **parts(FIBONACCI, fibonacci)}
 
 
-@pytest.mark.parametrize(("name", "value"), [*PUBLISHED.items(), *FROZEN.items()], ids=str)
+@for_all("name, value", [*PUBLISHED.items(), *FROZEN.items()])
 def test_a_hash_is_the_one_that_others_use(name: str, value: str, structures: dict[str, Any]) -> None:
     assert type_hash(name, structures) == f"RIHS01_{value}"
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,6 +14,7 @@ from rbxcompose.msgs.plain import from_plain, to_plain
 from rbxcompose.msgs.std_msgs import Float32, Int32, String
 from rbxcompose.msgs.types import Message
 from rbxcompose.msgs.unique_identifier_msgs import UUID
+from tests.loops import for_all
 from tests.msgs.samples import EVERYTHING, any_message
 
 
@@ -63,7 +63,7 @@ WRONG: list[tuple[type[Message], object, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("message", "data", "words"), WRONG)
+@for_all("message, data, words", WRONG)
 def test_a_mistake_is_a_finding(message: type[Message], data: object, words: str) -> None:
     made, findings = from_plain(message, data)
     assert made is None

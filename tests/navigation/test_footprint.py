@@ -48,7 +48,7 @@ def touches(grid: GridMap, poses: list[Pose2]) -> bool:
 
 
 @given(PLACES, PLACES, st.sampled_from([THROUGH_GAP, THROUGH_HOUSE]))
-@settings(max_examples=3, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
+@settings(max_examples=settings().max_examples // 2, suppress_health_check=[HealthCheck.filter_too_much])
 def test_a_long_robot_reaches_goals_and_no_corner_of_it_touches_anything(
     start: Pose2, goal: Pose2, costs: LayeredCosts
 ) -> None:

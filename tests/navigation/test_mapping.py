@@ -91,8 +91,10 @@ def test_a_map_that_would_be_too_large_is_refused_and_stays() -> None:
 
 def test_a_robot_that_drives_around_makes_a_map_by_which_another_one_drives(tmp_path: Path) -> None:
     (tmp_path / "tour.yaml").write_text(TOUR, encoding="utf-8")
-    robot = ROBOT.replace("diff_drive_sim}", "diff_drive_sim, drift: 5 %}").replace(
-        "navigation:", "  mapper: {type: mapper, frame: base_link}\nnavigation:"
+    robot = (
+        ROBOT.replace("0.4 m/s", "0.6 m/s")
+        .replace("diff_drive_sim}", "diff_drive_sim, drift: 5 %}")
+        .replace("navigation:", "  mapper: {type: mapper, frame: base_link}\nnavigation:")
     )
     room = Room(tmp_path, f"{PLACES}{robot}{MAPPED}", WORLD)
     maps = room.bench.collect("/mapped", OccupancyGrid, Qos.LATCHED)

@@ -61,17 +61,15 @@ def pushed(folder: Path, mass: str, name: str = "crate") -> tuple[float, float, 
     return truth[-1].pose.pose.position.x, ahead, [message.data for message in touched]
 
 
-def test_a_robot_pushes_what_is_light_and_stalls_before_what_stands_fast(tmp_path: Path) -> None:
+def test_a_robot_pushes_what_is_light(tmp_path: Path) -> None:
     light, seen, touched = pushed(tmp_path, "1 kg")
-    fast, _, _ = pushed(tmp_path, "0 kg")
     assert light > 0.9
     assert seen < 0.4  # its laser sees the crate where it is now
-    assert fast < 0.45
     assert touched[0] == "crate"
 
 
 @pytest.mark.parametrize("name", ["base_link", *rare("ground")])
-def test_a_thing_is_felt_whatever_its_name(tmp_path: Path, name: str) -> None:
+def test_a_robot_stalls_before_what_stands_fast_and_feels_it_whatever_its_name(tmp_path: Path, name: str) -> None:
     far, _, touched = pushed(tmp_path, "0 kg", name)
     assert far < 0.45
     assert set(touched) == {name}

@@ -41,6 +41,7 @@ from rbxcompose.sdk.bound import Ended, Outcome
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from rbxcompose.testing.bench import run_robot
+from tests.loops import for_all
 from tests.navigation.houses import ONE_WALL
 from tests.parts.project import Project
 from tests.soak import rare
@@ -493,8 +494,8 @@ def test_a_spawn_without_ground_concerns_only_robots_that_start_there(tmp_path: 
     assert "RBX3611" not in room.checked.text
 
 
-@pytest.mark.parametrize(
-    ("robot", "world", "said"),
+@for_all(
+    "robot, world, said",
     [
         (ROBOT.replace("room.yaml", "rom.yaml"), WORLD, "rom.yaml"),
         (ROBOT, WORLD.replace("one_wall.yaml", "two_walls.yaml"), "two_walls.yaml"),

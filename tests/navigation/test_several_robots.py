@@ -23,8 +23,8 @@ kind: World
 name: rooms
 map: rooms.yaml
 spawn:
-  west: {x: -1.5 m, y: 0 m}
-  east: {x: 1.5 m, y: 0.1 m, heading: 180 deg}
+  west: {x: -1.1 m, y: 0 m}
+  east: {x: 1.1 m, y: 0.1 m, heading: 180 deg}
 """
 ROBOT = """rbx: 1
 kind: Robot
@@ -61,7 +61,7 @@ def test_robots_that_meet_in_a_doorway_both_arrive_and_touch_nothing(tmp_path: P
         client(goal, lambda end: ends.update({name: end}), lambda feedback: None)
 
     bases = {name: robot.component("base") for name, robot in bench.robots.items()}
-    goals = {"a": (1.5, 0.1), "b": (-1.5, 0.0)}  # where the other one begins
+    goals = {"a": (1.1, 0.1), "b": (-1.1, 0.0)}  # where the other one begins
     for name, goal in goals.items():
         send(name, *goal)
     assert bench.run_until(lambda: len(ends) == 2, 120.0)

@@ -26,6 +26,7 @@ from rbxcompose.sdk.parameters import (
     to_message,
     values_of,
 )
+from tests.loops import for_all
 
 
 class Input(Config):
@@ -113,8 +114,8 @@ def test_a_descriptor_tells_unit_range_and_whether_it_may_change() -> None:
     assert known["inputs.door.priority"].descriptor.read_only
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "expected"),
+@for_all(
+    "name, value, expected",
     [
         ("speed", 0.5, 0.5),
         ("speed", 1, 1.0),
@@ -133,8 +134,8 @@ def test_a_change_takes_si_and_text_with_units(name: str, value: object, expecte
     assert [difference.name for difference in differences(SAMPLE, new)] == [name]
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "reason"),
+@for_all(
+    "name, value, reason",
     [
         ("sped", 0.5, "there is no parameter 'sped'; did you mean 'speed'?"),
         ("fixed", 2.0, "'fixed' cannot change while the robot runs"),

@@ -20,6 +20,7 @@ from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.urdf import read_body
 from rbxcompose.domains.body.xacro import Expanded, XacroFile, expand_all
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
+from tests.loops import for_all
 from tests.soak import rare
 
 PARTS = Path(__file__).parents[2] / "parts"
@@ -115,7 +116,7 @@ def test_all_pieces_are_known() -> None:
     assert sorted(WHOLE) == PIECES
 
 
-@pytest.mark.parametrize("name", WHOLE)
+@for_all("name", WHOLE)
 def test_a_piece_has_its_frames_joints_and_mass(name: str) -> None:
     root, frames, joints, (least, most) = WHOLE[name]
     body = piece(name)
@@ -134,7 +135,7 @@ def test_a_piece_may_have_other_sizes(name: str) -> None:
     assert other != usual
 
 
-@pytest.mark.parametrize("name", WHOLE)
+@for_all("name", WHOLE)
 def test_a_part_passes_all_arguments_of_its_piece_with_the_same_defaults(name: str) -> None:
     part = manifest(name)
     given = {key: value.removeprefix("${args.").removesuffix("}") for key, value in part["body"]["with"].items()}
@@ -170,7 +171,7 @@ def test_wheels_and_casters_touch_the_ground(name: str, sizes: str) -> None:
     assert direction(left, (0, 0, 1)) == pytest.approx((0, 1, 0), abs=1e-12)  # forwards is positive
 
 
-@pytest.mark.parametrize("name", ["arm", "gripper"])
+@pytest.mark.parametrize("name", ["arm", *rare("gripper")])
 def test_reflect_mirrors_exactly(name: str) -> None:
     right, left = piece(name, reflect="-1"), piece(name, reflect="1")
     numbers = random.Random(7)

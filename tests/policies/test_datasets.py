@@ -37,6 +37,7 @@ from rbxcompose.tools.commands import record
 from tests.commands import command
 from tests.conftest import ROOT
 from tests.policies.recordings import BEGIN, SIZE, Timed, arm_with_cameras, joints, jpeg, picture, write_recording
+from tests.soak import rare
 
 av = pytest.importorskip("av", reason="av is not installed")
 parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
@@ -255,7 +256,7 @@ def test_what_does_not_fit_is_refused_and_nothing_is_lost(data_set: Path, tmp_pa
     assert (done.returncode, "need --format lerobot" in done.stderr) == (2, True)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGTERM, *rare(signal.SIGINT)])
 def test_an_interrupt_leaves_neither_files_nor_a_doubt_about_what_stays(
     data_set: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
 ) -> None:

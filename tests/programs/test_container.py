@@ -150,6 +150,7 @@ def test_a_container_is_stopped_by_the_signal(engine: Path) -> None:
 DEAF = "trap '' TERM; echo ready; while :; do sleep 0.02; done"
 
 
+@pytest.mark.soak  # as one whose component is killed
 def test_a_container_that_ignores_the_signal_is_removed_although_its_client_was_killed(engine: Path) -> None:
     child = started(engine, DEAF, patience=0.2)
     until(child, lambda events: WrittenLine("ready") in events)

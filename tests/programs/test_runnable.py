@@ -10,6 +10,7 @@ import pytest
 
 from rbxcompose.domains.programs.runnable import ask_for_real, program_findings
 from rbxcompose.testing.manifests import check_text
+from tests.loops import for_all
 from tests.programs.foreign import robot
 
 
@@ -60,8 +61,8 @@ NO_LINE = "driver: the first line of a script names what runs it: '#!/bin/sh'"
 CR_LF = "the lines of driver end with CR LF; Linux needs LF alone"
 
 
-@pytest.mark.parametrize(
-    ("text", "why"),
+@for_all(
+    "text, why",
     [
         ("#!/opt/no/python3 -u\n", "driver is to be run by /opt/no/python3, which is not there"),
         ("#! \t/bin/sh\t-e \n", ""),

@@ -17,8 +17,8 @@ import pytest
 
 from tests.project.package import PACKAGE, files, module_of, modules, text_of
 
-N = 4_000  # characters of a near-miss
-SHORT = 0.004  # [s] in which a linear expression is through with any of them
+N = 2_000  # characters of a near-miss
+SHORT = 0.002  # [s] in which a linear expression is through with any of them
 METHODS = ("match", "fullmatch", "search", "findall", "finditer", "sub", "split")
 SAMPLES = "\n\t -_.,:/#$'\"[]{}()!|>aAeisx01°"
 

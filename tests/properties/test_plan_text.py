@@ -17,6 +17,7 @@ from rbxcompose.compiler.plan.dump import PlanTextError, dump, load
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.domains.power.components.charger import ChargerConfig
 from rbxcompose.testing import check_text, instance, run_robot
+from tests.loops import for_all
 from tests.shipped import compiled
 from tests.soak import Soak, rare
 
@@ -165,7 +166,7 @@ def test_nobody_is_shown_a_secret(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "***" in told
 
 
-@pytest.mark.parametrize(
+@for_all(
     "text",
     [
         "",

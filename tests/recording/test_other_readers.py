@@ -16,7 +16,7 @@ from rbxcompose.runtime.recording.reader import RecordingReader
 from tests.forked import run_command
 from tests.shipped import ROOT
 
-SHORT = "--set=missions.patrol.with.rounds=1", "--set=components.battery.runtime=20s"  # it recharges all the same
+SHORT = "--set=missions.patrol.with.rounds=1", "--set=components.battery.runtime=30s"  # it recharges all the same
 pytestmark = pytest.mark.timeout(100)
 
 

@@ -28,7 +28,10 @@ from tests.forked import run_command
 from tests.soak import rare
 
 ROOT = Path(__file__).parents[2]
-ROUND = "--set=missions.patrol.with.rounds=1"  # half as long as it is
+ROUND = (
+    "--set=missions.patrol.with.rounds=1",  # half as long as it is
+    *(f"--set=places.corner_{place}=40 cm" for place in ("1.x", "2.x", "2.y", "3.y")),
+)
 COMPONENTS = ["base", "go_to", "mission", *rare("battery", "charger", "cmd_vel", "transforms", "diagnostics")]
 
 
@@ -74,7 +77,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     folder = tmp_path_factory.mktemp("run")
     path = folder / "run.mcap"
     # In a process of its own: a robot forks, and this one may have had sessions of Zenoh, whose threads forbid that.
-    up = ("up", str(ROOT / "robots/turtlebot"), "--rate", "max", "--record", str(path), ROUND)
+    up = ("up", str(ROOT / "robots/turtlebot"), "--rate", "max", "--record", str(path), *ROUND)
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder)}
     run_command(up, environment, 60.0).check_returncode()
     reader = RecordingReader(io.BytesIO(path.read_bytes()))

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from rbxcompose.base.requests import Refused
+from tests.loops import for_all
 from tests.robot_editor.test_robot_editor import Refuser, ask, editor_of, save, written
 
 BUILT = """rbx: 1
@@ -128,8 +129,8 @@ def test_a_part_is_taken_off_and_what_it_carried_is_named(project: Path) -> None
     assert text_of(project) == "".join(line for line in BUILT.splitlines(True) if "camera" not in line)
 
 
-@pytest.mark.parametrize(
-    ("change", "why"),
+@for_all(
+    "change, why",
     [
         (part("base", "add", part=XTION, to="torso_top"), "it is taken"),
         (part("Big Eye", "add", part=XTION, to="torso_top"), "cannot be the name"),

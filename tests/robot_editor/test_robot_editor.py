@@ -13,6 +13,7 @@ from rbxcompose.base.files import replace_file
 from rbxcompose.base.requests import Refused
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.tools.robot_editor.editor import MOST_CHANGES, RobotEditor
+from tests.loops import for_all
 
 ROBOT = """# A robot that fetches
 rbx: 1
@@ -198,8 +199,8 @@ def test_if_one_of_two_files_cannot_be_written_neither_is(
     assert (text_of(project), text_of(project, "parts/rooms.yaml")) == (ROBOT, ROOMS)
 
 
-@pytest.mark.parametrize(
-    ("change", "why"),
+@for_all(
+    "change, why",
     [
         (place("dock", x=math.nan), "'x' must be a finite number"),
         (place("dock", x=math.inf), "'x' must be a finite number"),

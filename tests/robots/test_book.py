@@ -74,6 +74,7 @@ def test_a_house_with_a_short_battery_is_cleaned_all_the_same() -> None:
     assert done == {f"{chore}: success" for chore in ("vacuum 5 s", "mop 7 s", "scrub 9 s", "mop 5 s")}
 
 
+@pytest.mark.soak  # as a house with a short battery
 def test_a_chore_is_never_done_at_the_dock() -> None:
     did = told(ran("rooms", "clean_house_steps", "tired"))
     docked = [at for at, text in enumerate(did) if text == "recharge: success"]

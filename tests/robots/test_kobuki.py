@@ -36,6 +36,7 @@ name: wall
 objects:
   wall: {box: [20 cm, 4 m, 50 cm], at: {x: 1 m}}
 """
+NEAR = Pose2(0.6, 0.0)  # it feels the wall soon
 FAR = WALL.replace("x: 1 m", "x: 9 m")
 ISLAND = """rbx: 1
 kind: World
@@ -231,9 +232,10 @@ def test_without_its_controller_nothing_drives(folder: Path, monkeypatch: pytest
 def test_while_it_is_off_the_robot_may_push(folder: Path) -> None:
     robot = Kobuki(plan_in(WALL, folder))
     statuses = robot.bench.statuses("safety_controller")
+    robot.base.core.pose = NEAR
     robot.drive_until("safety", wander=0.3)
     robot.bench.set_live("safety_controller", enabled=False)
-    robot.drive(4.0, joystick=0.3)
+    robot.drive(2.0, joystick=0.3)
     assert robot.active[-1].data == "joystick"
     assert robot.pose.x == pytest.approx(0.9 - 0.177, abs=0.002)
     assert statuses[-1].level == Level.WARN
@@ -244,10 +246,11 @@ def test_while_it_is_off_the_robot_may_push(folder: Path) -> None:
 
 def test_after_a_stop_it_begins_anew_and_still_gets_away(folder: Path) -> None:
     robot = Kobuki(plan_in(WALL, folder))
+    robot.base.core.pose = NEAR
     robot.drive_until("safety", wander=0.3)
     robot.drive(0.22, wander=0.3)
     robot.bench.host.stop()
-    robot.drive(5.0, wander=0.3)
+    robot.drive(2.0, wander=0.3)
     assert robot.base.core.velocity == AT_REST
     robot.bench.host.release()
     robot.drive(0.5, wander=0.0)  # it must come to rest once

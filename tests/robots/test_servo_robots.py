@@ -50,13 +50,13 @@ def driver(name: str, profile: str = "") -> Any:
     [
         ("pi_robot", "", PI),
         ("head_only", "", HEAD),
-        ("pedestal_pi", "", PI),
         ("pedestal_pi", "no_gripper", {name: id_ for name, id_ in PI.items() if id_ != 9}),
-        ("box_robot", "two_arms", PI | LEFT),
         *(
             pytest.param(*values, marks=pytest.mark.soak)
             for values in (
+                ("pedestal_pi", "", PI),
                 ("pedestal_pi", "head_only", HEAD),
+                ("box_robot", "two_arms", PI | LEFT),
                 ("box_robot", "pan_tilt_head", HEAD),
                 ("box_robot", "telescoping", PI),
                 ("porter", "", PORTER),

@@ -210,7 +210,7 @@ diagnostics:
 OF_THE_TWIN = {"twin", "faults", "noise"}
 
 
-@pytest.mark.parametrize("name", ["head_only", "pi_robot"])
+@pytest.mark.parametrize("name", ["head_only", *rare("pi_robot")])
 def test_real_servos_get_the_plan_of_simulated_ones(name: str, tmp_path: Path) -> None:
     overlay = tmp_path / "table.yaml"
     overlay.write_text(ON_A_TABLE, encoding="utf-8")

@@ -42,6 +42,7 @@ def test_it_hauls_to_the_end_and_charges_each_battery_when_that_is_low() -> None
     assert charged(run) == {"drive": 2, "lift": 1}
 
 
+@pytest.mark.soak  # above, each is charged when its own battery is low
 def test_what_is_given_to_one_instance_does_not_change_the_other() -> None:
     assert charged(ran("include.lift.with.runtime=1 h")) == {"drive": 1, "lift": 0}
 

@@ -22,7 +22,7 @@ from rbxcompose.runtime.processes import Process
 from rbxcompose.sdk.ports import Qos
 from tests.cli.live_robot import Robot
 from tests.console.test_gateway_live import free_port
-from tests.soak import rare
+from tests.soak import Soak, rare
 
 HERE = Path(__file__).parent
 DOMAIN = 57
@@ -235,7 +235,7 @@ def test_nothing_comes_back_that_was_sent(robot: Robot, own_types: None) -> None
     assert len(arrived) == 1  # our own
 
 
-def test_what_ros_has_is_listed_and_pinned(robot: Robot, tmp_path: Path) -> None:
+def test_what_ros_has_is_listed_and_pinned(robot: Robot, tmp_path: Path, soak: Soak) -> None:
     listed = robot.told("ros2", "scan", str(robot.file))
     node = next(one for one in listed if one["node"] == "/somebody")
     assert node["publishes"]["/cmd_vel_ros"] == "geometry_msgs/Twist"
@@ -249,7 +249,8 @@ def test_what_ros_has_is_listed_and_pinned(robot: Robot, tmp_path: Path) -> None
     assert "plan: {type: std_msgs/String, qos: latched}" in file.read_text()
     assert file.read_text().endswith("  # the end\n")
     assert "error" not in robot.do("check", str(file)).stdout
-    assert "declares all" in robot.do("ros2", "pin", "somebody", "somebody", str(file)).stdout
+    if soak.is_on:
+        assert "declares all" in robot.do("ros2", "pin", "somebody", "somebody", str(file)).stdout
 
 
 @pytest.mark.parametrize("what", ["node.py", *rare("ros_side.py")])

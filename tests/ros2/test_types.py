@@ -147,7 +147,7 @@ NOT_THERE = (
 )
 
 
-@pytest.mark.parametrize("package", ["tf2_msgs", *rare("rbxcompose_msgs", "example_interfaces", *NOT_THERE)])
+@pytest.mark.parametrize("package", rare("tf2_msgs", "rbxcompose_msgs", "example_interfaces", *NOT_THERE))
 def test_rosidl_gives_our_texts_of_what_this_ros_2_lacks_the_same_hashes(ros2_python: Path, package: str) -> None:
     theirs = _rosidl(ros2_python, INTERFACES / package)
     assert {name: type_hash(name, SHIPPED) for name in theirs} == theirs

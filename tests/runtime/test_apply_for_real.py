@@ -111,6 +111,7 @@ def test_only_what_has_changed_restarts(robot: Changing) -> None:
     assert len([process for process in titled(f"rbxcompose {NAME}: ") if process.is_running]) == 6
 
 
+@pytest.mark.soak  # shorter changes reach it above
 def test_what_is_longer_than_a_socket_holds_reaches_a_process_that_runs(robot: Changing) -> None:
     urdf = robot.file.parent / "large.urdf"
     urdf.write_text(f"<robot>{LINK}{'<!---->' * 75_000}</robot>", encoding="utf-8")

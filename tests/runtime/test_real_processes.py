@@ -54,6 +54,7 @@ def test_a_component_stops_the_robot_and_nobody_releases_it_before_the_reason_is
     assert robot.do("down").returncode == 0
 
 
+@pytest.mark.soak  # as in `tests/faults/test_folder`
 def test_a_second_up_is_a_finding(robot: Robot) -> None:
     robot.up_detached()
     pid = robot.supervisor().pid
@@ -66,13 +67,14 @@ def test_a_second_up_is_a_finding(robot: Robot) -> None:
 
 
 def test_the_foreground_ends_with_the_mission_and_tells_the_whole_story(robot: Robot) -> None:
-    process = robot.up(runs=0.5, outcome="failure")
+    process = robot.up(runs=0.5, outcome="failure", prints="hello from a toy")
     output, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 3
     lines = output.splitlines()
     summary = lines.index(f"{robot.name} is down: mission toy: failure")
     assert sum("deactivated" in line for line in lines[:summary]) == 2
     assert any(line.split()[:2] == ["second", "steps"] for line in lines[summary:])
+    assert "hello from a toy" in robot.texts("second"), "what a component prints is in the log"
 
 
 def test_an_interrupt_while_it_runs_ends_it_in_order(robot: Robot) -> None:
@@ -238,12 +240,6 @@ def test_a_robot_beside_another_takes_the_next_port(robot: Robot) -> None:
     robot.do("down")
 
 
-def test_what_a_component_prints_is_in_the_log(robot: Robot) -> None:
-    process = robot.up(runs=0.3, prints="hello from a toy")
-    process.communicate(timeout=PATIENCE)
-    assert "hello from a toy" in robot.texts("second")
-
-
 @pytest.mark.parametrize("options", [[], *rare(["--rate", "200"])], ids=["max", "paced"])
 def test_on_a_stepped_clock_two_runs_write_the_same_log(robot: Robot, options: list[str]) -> None:
     logs = []
@@ -265,6 +261,7 @@ def test_on_a_stepped_clock_a_mission_that_waits_in_vain_ends_the_run(robot: Rob
     assert "mission toy: failure: waits" in told
 
 
+@pytest.mark.soak  # as in `test_conductor`
 def test_on_a_stepped_clock_the_duration_is_exact(robot: Robot) -> None:
     process = robot.up("--stepped", "--duration", "7")
     process.communicate(timeout=PATIENCE)

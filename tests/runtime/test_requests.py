@@ -32,6 +32,7 @@ from rbxcompose.runtime.supervision.supervisor import SettingLine
 from rbxcompose.sdk import Component, Config, component
 from rbxcompose.sdk.robot_events import RobotHeld
 from rbxcompose.testing.bench import Bench, instance
+from tests.loops import for_all
 from tests.missions.simulated import program_of
 
 PLAN = Plan("toys", "toys.yaml", (Instance("patrol", "mission", MissionConfig(), "mission"),))
@@ -195,8 +196,8 @@ def test_a_robot_that_goes_down_takes_no_more_commands_but_answers_questions() -
     assert desk.sent[-1] == ("mission", say.Ask(5, "patrol", as_data(ListMissions())))
 
 
-@pytest.mark.parametrize(
-    ("data", "reason"),
+@for_all(
+    "data, reason",
     [
         ({"verb": "stop"}, "this version of rbxcompose has no such request"),
         (["stop"], "this version of rbxcompose has no such request"),

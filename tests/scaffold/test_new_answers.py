@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from rbxcompose.commands.new_files import AnswerError, read_name, read_place, read_text, read_yes
 from rbxcompose.testing import check_file
 from rbxcompose.tools.scaffold import RobotAnswers, read_base, read_component_name, robot_files
+from tests.loops import for_all
 
 WRONG_NAMES = ["", "Cart", "my-cart", "1st", "_x", "a b", "../x", "a/b", "a" * 61, "ä", "a\n", "true", "null"]
 
@@ -22,7 +23,7 @@ def refusal(read: object, *arguments: object) -> str:
     return f"{caught.value.finding.code} {caught.value.finding.message} {caught.value.finding.help}"
 
 
-@pytest.mark.parametrize("name", WRONG_NAMES)
+@for_all("name", WRONG_NAMES)
 def test_what_is_no_name_in_a_manifest_is_none_here(name: str) -> None:
     assert refusal(read_name, name, "the robot").startswith("RBX9102")
 
@@ -31,7 +32,7 @@ def test_a_name_that_is_nearly_one_is_mended() -> None:
     assert refusal(read_name, "My-Cart 2!", "the robot").endswith("did you mean 'my_cart_2'?")
 
 
-@pytest.mark.parametrize("name", ["class", "match", "random", "numpy", "pytest", "rbxcompose", "go_to", "float32"])
+@for_all("name", ["class", "match", "random", "numpy", "pytest", "rbxcompose", "go_to", "float32"])
 def test_a_component_is_not_named_like_what_python_or_rbxcompose_has(name: str) -> None:
     assert refusal(read_component_name, name).startswith("RBX9102")
 

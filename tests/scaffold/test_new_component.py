@@ -13,6 +13,7 @@ import pytest
 from rbxcompose.commands.new_files import write_new
 from rbxcompose.testing import Golden
 from rbxcompose.tools.scaffold import component_files, read_component_name
+from tests.forked import Forked
 
 ROBOT = """
 rbx: 1
@@ -55,9 +56,13 @@ def test_it_is_written_as_people_would_write_it(golden: Golden) -> None:
 
 def test_its_own_test_passes_before_it_is_installed(tmp_path: Path) -> None:
     write_new(tmp_path, component_files("thermo_meter"))
-    words = ("pytest", "-q", "-p", "no:cacheprovider")
-    done = run(tmp_path / "thermo_meter", *words, PYTEST_DISABLE_PLUGIN_AUTOLOAD="1")
-    assert "2 passed" in done.stdout, done.stdout
+    words = [sys.executable, str(Path(pytest.__file__).with_name("__main__.py")), "-q", "-p", "no:cacheprovider"]
+    environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    with Forked(
+        words, cwd=tmp_path / "thermo_meter", env=environment, stdin=-3, stdout=-1, stderr=-2, text=True
+    ) as done:
+        said, _ = done.communicate(timeout=60.0)
+    assert "2 passed" in said, said
 
 
 def test_installed_it_is_a_type_like_any_other(tmp_path: Path) -> None:

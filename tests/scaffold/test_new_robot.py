@@ -63,7 +63,7 @@ def test_it_has_no_findings_wherever_its_places_are(tmp_path: Path, places: dict
     assert findings(tmp_path, *texts) in ("", "RBX9102", "RBX9103")
 
 
-@pytest.mark.parametrize("places", [["near=20 cm,0"], *rare(["far=12,12", "other=-12,-12"]), ["behind=-1,0,180 deg"]])
+@pytest.mark.parametrize("places", [["near=20 cm,0", "behind=-1,0,180 deg"], *rare(["far=12,12", "other=-12,-12"])])
 def test_it_does_its_mission_also_from_a_nearly_empty_battery(places: list[str], tmp_path: Path) -> None:
     written(tmp_path, *places)
     for level in ("100 %", "31 %"):

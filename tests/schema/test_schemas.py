@@ -29,6 +29,7 @@ from rbxcompose.missions.program.registry import kinds
 from rbxcompose.sdk import Component, component
 from rbxcompose.sdk.registry import PLUGINS
 from tests.conftest import ROOT
+from tests.loops import for_all
 from tests.soak import rare
 
 NAMES = [kind.lower() for kind in makers()]
@@ -213,12 +214,8 @@ def test_every_key_of_a_kind_or_modifier_is_described() -> None:
     [
         ("runtime: 45 s ", "runtme: 45 s ", "components.battery"),
         ("runtime: 45 s ", "runtime: 45 m ", "components.battery.runtime"),
-        ("runtime: 45 s ", "runtime: long ", "components.battery.runtime"),
-        ("warn: 50 %", "warn: 0.5", "components.battery.warn"),
         ("max_turn_rate: 90 deg/s", "max_turn_rate: 90 deg", "components.base.max_turn_rate"),
-        ("heading: 90 deg", "heading: 90", "places.corner_1.heading"),
         ("type: battery_sim", "type: batery_sim", "components.battery.type"),
-        ("    type: charger\n", "", "components.charger"),
         ("    dock: dock\n", "", "components.charger"),
         (
             "  teleop:\n        priority: 100",
@@ -228,10 +225,19 @@ def test_every_key_of_a_kind_or_modifier_is_described() -> None:
         ("match: [battery, charger]", "match: []", "diagnostics.analyzers.power.match"),
         ("type: speed", "type: sped", "args.speed.type"),
         ("kind: Robot", "kind: Robot\nplacs: {}", ""),
-        ("components:\n  battery", "components:\n  Battery", "components"),
-        ("start: patrol", "start: [patrol]", "start"),
         ("profiles:\n  tired:", "profiles:\n  tired:\n    component: {}", "profiles.tired"),
         ("rbx: 1", "rbx: 2", "rbx"),
+        *(
+            pytest.param(*case, marks=pytest.mark.soak)  # each is like one above
+            for case in (
+                ("runtime: 45 s ", "runtime: long ", "components.battery.runtime"),
+                ("warn: 50 %", "warn: 0.5", "components.battery.warn"),
+                ("heading: 90 deg", "heading: 90", "places.corner_1.heading"),
+                ("    type: charger\n", "", "components.charger"),
+                ("start: patrol", "start: [patrol]", "start"),
+                ("components:\n  battery", "components:\n  Battery", "components"),
+            )
+        ),
     ],
 )
 def test_a_mistake_in_a_robot_is_refused_at_its_place(right: str, wrong: str, place: str) -> None:
@@ -303,8 +309,8 @@ muxes: {cmd_vel: {inputs: {teleop: null}}}
     assert mistakes(f"rbx: 1\nkind: {kind}\nname: changed\n{include}{text}") == []
 
 
-@pytest.mark.parametrize(
-    ("written", "instead"),
+@for_all(
+    "written, instead",
     [
         ("runtime: 45 s ", "runtime: ${args.long} "),
         ("runtime: 45 s ", "runtime: 45 "),
@@ -328,7 +334,7 @@ def test_what_is_unusual_and_right_passes(written: str, instead: str) -> None:
     assert mistakes(ROBOT.replace(written, instead)) == []
 
 
-@pytest.mark.parametrize(
+@for_all(
     "text",
     [
         "do: recharge",
@@ -347,8 +353,8 @@ def test_missions_that_are_right_pass(text: str) -> None:
     assert mistakes(f"{MISSION}{text}\n") == []
 
 
-@pytest.mark.parametrize(
-    ("text", "place"),
+@for_all(
+    "text, place",
     [
         ("", ""),
         ("do: []", "do"),
@@ -370,8 +376,8 @@ def test_a_mistake_in_a_mission_is_refused_at_its_place(text: str, place: str) -
     assert place in mistakes(f"{MISSION}{text}\n")
 
 
-@pytest.mark.parametrize(
-    ("text", "place"),
+@for_all(
+    "text, place",
     [
         ("map: [house_map.yaml]", "map"),
         ("objects: {sofa: {box: [1 m, 2 m]}}", "objects.sofa.box"),

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from tests.conftest import ROOT
+from tests.loops import for_all
 from tests.lsp.client import Client
 
 SERVER = shutil.which("yaml-language-server")
@@ -39,8 +40,8 @@ def asked(client: Client, what: str, kind: str, text: str) -> Any:
     return client.ask(f"textDocument/{what}", textDocument={"uri": uri}, position=position)
 
 
-@pytest.mark.parametrize(
-    ("kind", "text", "label", "written"),
+@for_all(
+    "kind, text, label, written",
     [
         ("Robot", "components:\n  battery:\n    type: |\n", "battery_sim", "battery_sim"),
         ("Robot", f"{BATTERY}    |\n", "warn", "warn: "),

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from rbxcompose.testing.manifests import Checked, check_text
+from tests.loops import for_all
 from tests.sections.test_servo_sections import BODY, HEAD, SERVOS
 
 DEVICES = "devices:\n  usb2dynamixel: {vendor: 0403, product: 6001, serial: A700eUxA}\n"
@@ -28,8 +29,8 @@ def test_a_bus_is_given_the_device_that_its_port_names(tmp_path: Path) -> None:
     assert port_of(check(tmp_path, "/dev/ttyUSB0")) == "/dev/ttyUSB0"
 
 
-@pytest.mark.parametrize(
-    ("device", "port"),
+@for_all(
+    "device, port",
     [
         ("{vendor: 0403, product: 6014}", "dev:it=usb:0403:6014"),
         ("{vendor: '0403', product: 0x6014}", "dev:it=usb:0403:6014"),
@@ -55,7 +56,7 @@ def test_what_is_no_number_of_a_vendor_is_told(number: str, tmp_path: Path) -> N
     assert "'vendor': must be four hexadecimal digits, as 'lsusb' shows them: 0403" in checked.text
 
 
-@pytest.mark.parametrize("serial", ["", "~", "null", "''", '"  "', "#5", "[1]", '"\\t"'])
+@for_all("serial", ["", "~", "null", "''", '"  "', "#5", "[1]", '"\\t"'])
 def test_a_serial_number_that_is_lost_or_none_is_told(serial: str, tmp_path: Path) -> None:
     device = f"devices:\n  it:\n    vendor: 0403\n    product: 6014\n    serial: {serial}\n"
     checked = check(tmp_path, "dev:it", device)

@@ -24,6 +24,7 @@ from rbxcompose.testing.bench import Bench
 from rbxcompose.testing.system_bench import SystemBench
 from rbxcompose.tools.lsp.project import Project as Editor
 from tests.conftest import ROOT
+from tests.loops import for_all
 from tests.parts.project import Project
 
 ROBOT = """
@@ -82,8 +83,8 @@ def test_an_unknown_type_is_found_as_any_other(tmp_path: Path, name: str) -> Non
     assert f"there is no message type '{name}'" in project.text
 
 
-@pytest.mark.parametrize(
-    ("file", "text", "found"),
+@for_all(
+    "file, text, found",
     [
         ("my_msgs/msg/Finger.msg", "bool a\n  bool  # nothing\n", "RBX3026 Finger.msg:2:3"),
         ("my_msgs/msg/Finger.msg", "bool a\nbool a\n", "RBX3026 Finger.msg:2:1"),

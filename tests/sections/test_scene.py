@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import pytest
-
+from tests.loops import for_all
 from tests.parts.project import Project
 
 ROBOT = """
@@ -61,8 +60,8 @@ def test_each_cloud_runs_what_makes_a_thing_of_it(tmp_path: Path) -> None:
     assert (mapper.name, made.cell, made.frame) == ("scene_camera", 0.03, "map")
 
 
-@pytest.mark.parametrize(
-    ("scene", "code", "words"),
+@for_all(
+    "scene, code, words",
     [
         ("{file: ../../../table.scene}", "RBX1306", "outside the project"),
         ("{file: ../../tabel.scene}", "RBX1301", "does not exist"),

@@ -9,6 +9,7 @@ import pytest
 
 from rbxcompose.testing.golden import Golden
 from rbxcompose.testing.manifests import Checked, check_text
+from tests.loops import for_all
 
 LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="2"/>'
 BODY = f"""<robot name="head">
@@ -232,8 +233,8 @@ def test_words_of_other_programs_for_the_rate_of_a_line_are_baud(word: str, tmp_
 PUBLISHED = "what is measured is published without a controller: remove it"
 
 
-@pytest.mark.parametrize(
-    ("written", "cure"),
+@for_all(
+    "written, cure",
     [
         ("joint_trajectory_controller/JointTrajectoryController", "did you mean 'joint_trajectory'?"),
         ("position_controllers/JointTrajectoryController", "did you mean 'joint_trajectory'?"),

@@ -178,12 +178,15 @@ class Editor:
         return Document(self.path, text, self.robot), len(lines) - 1, len(lines[-1])
 
 
+SELDOM = [pytest.param("front: base", "front: ", {"base"}, marks=pytest.mark.soak)]  # as `driver`
+
+
 @pytest.mark.parametrize(
     ("before", "instead", "labels"),
     [
         ("after: [front", "after: [", {"front", "rear"}),
         ("driver: base", "driver: ", {"base", "front"}),
-        ("front: base", "front: ", {"base"}),
+        *SELDOM,
         ("driver: base, after", "driver: base, ", {"after", "place"}),
         ("lamps:\n", "", {"lamps"}),
         ("rear: {driver: base, after: [front]}\n", "rear: base\nprofiles:\n  dim:\n    lamps:\n      ", {"front"}),

@@ -11,6 +11,7 @@ from rbxcompose.commands.formats.text import render_text
 from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.testing.golden import Golden
 from tests.conftest import ROOT
+from tests.loops import for_all
 
 FINE = (ROOT / "systems/patrol_two_hosts.yaml").read_text(encoding="utf-8")
 ROBOT = "robots/turtlebot/robot.yaml"
@@ -70,7 +71,7 @@ WRONG = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("code", WRONG)
+@for_all("code", WRONG)
 def test_a_mistake_is_a_finding_at_its_place(
     code: str, golden: Golden, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

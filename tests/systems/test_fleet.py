@@ -83,9 +83,9 @@ def test_each_robot_is_a_row_with_what_is_wrong(path: str, capsys: pytest.Captur
     ("labels", "robots"),
     [
         (["indoor"], {f"scout_{number}" for number in range(1, 6)}),
-        (["scout"], {f"scout_{number}" for number in range(1, 6)}),
+        pytest.param(["scout"], {f"scout_{number}" for number in range(1, 6)}, marks=pytest.mark.soak),
         (["indoor", "scout_2"], {"scout_2"}),
-        (["other"], {"other"}),
+        pytest.param(["other"], {"other"}, marks=pytest.mark.soak),
     ],
 )
 def test_a_mission_starts_on_the_robots_that_have_all_labels(

@@ -58,10 +58,11 @@ def test_one_command_starts_shows_stops_and_ends_the_robot_on_all_hosts_over_ssh
         assert "is there" in run("logs", "system.yaml")
         run("param", "set", "battery", "runtime", "500 s", "--robot", "system.yaml")
         assert "500 s" in run("param", "get", "battery", "runtime", "--robot", "system.yaml"), "it is on the other host"
+        assert "stopped" in run("stop", "system.yaml")
+        assert "released" in run("release", "--robot", "system.yaml")
+        patrol.wait_until(lambda: all(state and state.stop is None for state in map(patrol.state, ADDRESSES)))
     assert "stopped" in run("stop", "system.yaml")
     assert all(state is not None and state.stop is not None for state in map(patrol.state, ADDRESSES))
-    assert "released" in run("release", "--robot", "system.yaml")
-    patrol.wait_until(lambda: all(state is not None and state.stop is None for state in map(patrol.state, ADDRESSES)))
     run("down", "system.yaml")
     assert (patrol.state("r"), patrol.state("d")) == (None, None)
 

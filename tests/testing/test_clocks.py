@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.testing import clock_uses
+from tests.loops import for_all
 from tests.project.package import PACKAGE, files, imported_by
 
 GIVEN_TIME = ("domains", "missions", "sdk")
@@ -27,8 +28,8 @@ OWN_TIME = {  # drivers of hardware, simulated hardware, processes and commands,
 }
 
 
-@pytest.mark.parametrize(
-    ("text", "found"),
+@for_all(
+    "text, found",
     [
         ("import time\ntime.sleep(1)", ["x.py:2: time.sleep"]),
         ("import time as t\nx = t.monotonic", ["x.py:2: time.monotonic"]),

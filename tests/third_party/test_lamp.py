@@ -106,6 +106,7 @@ def test_its_orders_and_their_ends_go_from_one_process_to_another(installed: Ins
     assert out.endswith("[0]"), out
 
 
+@pytest.mark.soak  # as those of a part do in `tests/cli/test_new`
 def test_its_own_tests_pass(installed: Installed) -> None:
     words = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "--import-mode=importlib", str(LAMP / "test_lamp.py")]
     assert "6 passed" in installed.run(*words)

@@ -22,6 +22,7 @@ from rbxcompose.domains.servos.twins.servo_faults import FAULTS, UNPLUG, FaultNa
 from rbxcompose.domains.servos.twins.servo_line import FakeLine
 from rbxcompose.domains.servos.twins.servo_port import FakePort
 from rbxcompose.domains.servos.twins.servo_twin import TwinBus, twin_of
+from tests.loops import for_all
 
 MODELS = {1: "AX-12", 2: "XL430-W250", 3: "AX-12", 4: "XL430-W250"}
 SILENT = {"power_off", "mute", "late", "corrupt", "wrong_id"}
@@ -64,7 +65,7 @@ def test_the_names_are_those_of_the_type() -> None:
     assert set(get_args(FaultName)) == {*FAULTS, UNPLUG}
 
 
-@pytest.mark.parametrize("name", FAULTS)
+@for_all("name", FAULTS)
 def test_a_servo_answers_by_bytes_just_when_it_does_as_memory(name: str, tmp_path: Path) -> None:
     servos = [FakeServo(model, id_) for id_, model in MODELS.items()]
     with by_bytes(servos, tmp_path) as bus:
@@ -99,6 +100,7 @@ def test_a_script_acts_on_servos_behind_a_pseudo_terminal(tmp_path: Path) -> Non
             assert all(bus.reopen().values())
 
 
+@pytest.mark.soak  # `test_servo_bus_faults` waits for one that has
 def test_a_hot_servo_cools_down_after_the_fault() -> None:
     broken = Broken(fault("overheat", "1", 0.0, 5.0))
     broken.at(4.0)

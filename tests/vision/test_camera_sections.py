@@ -11,6 +11,7 @@ from rbxcompose.domains.vision.components.usb_camera import UsbCameraConfig
 from rbxcompose.domains.worlds.components.camera_sim import CameraSimConfig
 from rbxcompose.msgs.vision_msgs import Detection3DArray
 from rbxcompose.testing import Bench
+from tests.loops import for_all
 from tests.parts.project import Project
 
 ROBOT = """world: ../../room.yaml
@@ -66,8 +67,8 @@ def test_without_a_world_it_is_the_real_one_with_the_same_topics(tmp_path: Path)
     assert Path(config.calibration).is_absolute()
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "code", "said"),
+@for_all(
+    "old, new, code, said",
     [
         ("rate: 10 Hz", "calibration: ../../back.yaml", "RBX1301", "back.yaml"),
         ("rate: 10 Hz", "calibration: ../../room.yaml", "RBX3721", "its 'image_width' is no number of pixels"),

@@ -120,7 +120,7 @@ cameras:
   front: {frame: camera_link, size: [320, 240], rate: 5 Hz}
 tags: {size: 16 cm, names: {dock: 3}}
 components:
-  base: {type: diff_drive_sim}
+  base: {type: diff_drive_sim, rate: 25 Hz}
   dock_at: {type: tag_docking, frame: camera_optical_frame, distance: 60 cm}
 """
 WORLD = """rbx: 1

@@ -86,7 +86,7 @@ cameras:
   front: {frame: camera_link, size: [320, 240], rate: 5 Hz}
 tags: {size: 24 cm, names: {walker: 7}}
 components:
-  base: {type: diff_drive_sim}
+  base: {type: diff_drive_sim, rate: 25 Hz}
   follower: {type: tag_follower, frame: camera_optical_frame, tag: walker, always: true, distance: 1 m}
 """
 WORLD = """rbx: 1

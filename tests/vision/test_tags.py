@@ -15,6 +15,7 @@ from tests.vision.tagged import CAMERA, facing, picture
 pytest.importorskip("cv2", reason="OpenCV is not installed")
 from rbxcompose.domains.vision.tags import TagFinder, board_pose
 from rbxcompose.domains.worlds.tag_pictures import FAMILIES, dictionary, tag_picture
+from tests.loops import for_all
 
 SIZE = 0.15
 FINDER = TagFinder(size=SIZE)
@@ -46,7 +47,7 @@ def test_a_tag_is_found_where_it_is(
         assert angle_between(found.pose, pose) < math.radians(8)
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@for_all("family", FAMILIES)
 def test_families_are_as_opencv_has_them(family: str) -> None:
     known = dictionary(family)
     assert (len(known.bytesList), known.markerSize + 2) == FAMILIES[family][1:]
@@ -64,7 +65,7 @@ def test_errors_of_the_pose_are_as_large_as_its_covariance_says() -> None:
     assert 0.3 < np.mean(errors) < 6  # of a sum of three squares, which is 3 on average
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@for_all("family", FAMILIES)
 def test_each_family_is_printed_and_found(family: str) -> None:
     (found,) = TagFinder(family, 0.3).find(picture({3: facing(0, 0, 1)}, 0.3, family=family), CAMERA)
     assert found.number == 3

@@ -16,6 +16,7 @@ from PIL import Image
 
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.worlds.grid_map import GridMap, MapError, grid_from, map_files, read_map
+from tests.loops import for_all
 from tests.worlds.scenes import ANGLES, Points, grids, inside
 
 YAML = {
@@ -135,8 +136,8 @@ def test_alpha_is_one_more_colour_unless_it_hides_what_is_known(tmp_path: Path) 
     assert read_map(path).cells.tolist() == [[0, -1, 100], [100, 91, -1]]
 
 
-@pytest.mark.parametrize(
-    ("image", "words"),
+@for_all(
+    "image, words",
     [
         (b"", "neither"),
         (b"P6\n3 2\n255\n" + bytes(18), "neither"),
@@ -160,8 +161,8 @@ def test_a_wrong_picture_is_explained(tmp_path: Path, image: bytes, words: str) 
         read_map(written(tmp_path, image))
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "words"),
+@for_all(
+    "key, value, words",
     [
         ("image", "", "'image' is missing"),
         ("image", "gone.pgm", "cannot read gone.pgm: No such file"),

@@ -39,7 +39,7 @@ def test_an_arm_holds_its_pose_and_sags_more_with_less_torque() -> None:
         robot = shipped("pi_robot", positions=STRETCHED)
         physics = PhysicsWorld(robot, empty(robot))
         physics.limit(LIFT, effort)
-        physics.step(2.0)
+        physics.step(1.2)
         sags.append(physics.position(LIFT) - STRETCHED[LIFT])
         assert abs(physics.effort(LIFT)) <= effort
     assert 0 < sags[0] < math.radians(3)
@@ -51,7 +51,7 @@ def test_a_servo_that_had_let_go_holds_its_joint_where_it_is() -> None:
     robot = shipped("pi_robot", positions=STRETCHED)
     physics = PhysicsWorld(robot, empty(robot))
     physics.limit(LIFT, 0.0)
-    physics.step(2.0)
+    physics.step(1.0)
     fallen = physics.position(LIFT)
     physics.target(LIFT, STRETCHED[LIFT])
     physics.limit(LIFT, 1.5)
@@ -81,7 +81,7 @@ def test_a_gripper_feels_what_it_closes_on() -> None:
     free, full = PhysicsWorld(robot, empty(robot)), with_box()
     for physics in (free, full):
         physics.target(FINGER, 0.0)
-        physics.step(2.0)
+        physics.step(1.2)
     assert free.position(FINGER) == pytest.approx(0.0, abs=2e-3)
     assert abs(free.effort(FINGER)) < 5.0
     assert full.position(FINGER) == pytest.approx(SIDE / 2, abs=2e-3)
@@ -96,7 +96,7 @@ def test_a_box_is_gripped_lifted_carried_and_let_go() -> None:
     physics = with_box()
     began = physics.shape_pose("box").translation
     physics.target(FINGER, 0.0)
-    physics.step(2.0)
+    physics.step(1.2)
     physics.target(TORSO, 0.3)
     physics.step(3.0)
     lifted = physics.shape_pose("box").translation
@@ -108,14 +108,14 @@ def test_a_box_is_gripped_lifted_carried_and_let_go() -> None:
     assert above_hand(physics) == pytest.approx(held, abs=2e-3)
     assert physics.base_pose.x > 0.2
     physics.target(FINGER, 0.05)
-    physics.step(2.0)
+    physics.step(1.2)
     assert physics.shape_pose("box").translation[2] < 0.2
 
 
 def test_a_box_that_is_too_heavy_is_not_lifted() -> None:
     physics = with_box(mass=20.0)
     physics.target(FINGER, 0.0)
-    physics.step(2.0)
+    physics.step(1.2)
     physics.target(TORSO, 0.3)
     physics.step(3.0)
     assert physics.position(TORSO) > 0.29

@@ -51,7 +51,7 @@ def test_it_drives_straight_as_far_as_its_wheels_say() -> None:
     assert abs(pose.heading) < 1e-3
 
 
-@pytest.mark.parametrize("name", ["turtlebot", "rover", *rare("porter", "pi_robot", "box_robot", "house")])
+@pytest.mark.parametrize("name", ["turtlebot", *rare("rover", "porter", "pi_robot", "box_robot", "house")])
 def test_it_turns_a_quarter_in_place(name: str) -> None:
     robot = shipped(name)
     physics = PhysicsWorld(robot, empty(robot))
@@ -68,7 +68,7 @@ def test_it_turns_a_quarter_in_place(name: str) -> None:
 
 def test_it_stays_where_it_is_if_nothing_moves_it() -> None:
     physics = PhysicsWorld(TURTLEBOT, empty(TURTLEBOT, start=Pose2(3.0, -1.0, 2.0)))
-    run(physics, 5.0)
+    run(physics, 2.5)
     assert physics.base_pose.distance(Pose2(3.0, -1.0)) < 1e-4
     assert physics.base_pose.heading == pytest.approx(2.0, abs=1e-4)
     felt = physics.imu("base_link")

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -22,6 +22,7 @@ from rbxcompose.domains.worlds.world import NO_WALLS
 from rbxcompose.domains.worlds.world_file import WorldFile, WorldObjectModel, read_world
 from rbxcompose.manifest.documents import Documents
 from tests.conftest import ROOT
+from tests.soak import rare
 
 NUMBERS = st.floats(-20, 20)
 POSES = st.builds(Pose2, NUMBERS, NUMBERS, st.floats(-math.pi, math.pi))
@@ -39,7 +40,7 @@ def with_grid(grid: GridMap, **things: object) -> WorldFile:
     return WorldFile("made", Path("map.yaml"), grid, objects, {}, {}, {})
 
 
-@pytest.mark.parametrize("name", ["blank", "house", "visitor"])
+@pytest.mark.parametrize("name", ["house", *rare("blank", "visitor")])
 def test_both_kinds_of_picture_have_the_same_size_and_name_everything(name: str) -> None:
     shown = world(name)
     root = ElementTree.fromstring(svg_of(shown))
@@ -61,6 +62,7 @@ def test_all_is_within_the_picture_whatever_the_turn_of_the_map(at: Pose2, spawn
     assert (pixels <= (view.width, view.height)).all()
 
 
+@settings(max_examples=settings().max_examples // 2)
 @given(POSES, st.integers(0, 3), st.integers(0, 5))
 def test_a_cell_has_its_colour_at_its_middle(at: Pose2, row: int, column: int) -> None:
     cells = np.zeros((4, 6), np.int8)

@@ -17,6 +17,8 @@ from rbxcompose.sdk import ArrayEntries, Component, Config, ServesAction, compon
 from rbxcompose.testing.golden import Golden
 
 HERE = Path(__file__).parent
+SHORT = tuple(f"missions.{name}=used/tour.yaml" for name in ("hundred", "thousands"))
+"""In place of missions with thousands of nodes, which only one of the pairs is about."""
 
 
 def codes() -> list[str]:
@@ -48,7 +50,8 @@ def test_what_is_said_of_a_mistake_is_its_golden_text(
     monkeypatch.chdir(HERE)
     for code in codes():
         with subtests.test(code):
-            out = compile_robot("robot.yaml", environment={"CODE": code})
+            is_long = "thousands" in Path(f"golden/{code}.yaml").read_text(encoding="utf-8")
+            out = compile_robot("robot.yaml", environment={"CODE": code}, sets=() if is_long else SHORT)
             assert {finding.code for finding in out.report} == {code}
             golden.check(f"{code}.txt", render_text(out.report, out.sources))
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import pytest
-
 from rbxcompose.base.findings import Report
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.analysis.facts import constants_of
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import Program
+from tests.loops import for_all
 from tests.missions.simulated import ROBOT, program_of, tree
 
 TOUR = program_of("name: tour\ninputs: {rounds: {type: count, default: 1}}\ndo: {repeat: $rounds, do: a}")
@@ -27,7 +26,7 @@ def codes(text: str) -> list[str]:
     return [finding.code for finding in check_program(program, ROBOT)]
 
 
-@pytest.mark.parametrize(
+@for_all(
     "text",
     [
         MACHINE.format("two", "{do: b, next: {success: one, failure: two}}"),  # it has no end at all
@@ -90,8 +89,8 @@ def test_what_a_hook_sets_or_a_node_keeps_is_no_constant() -> None:
 STATE = "data: {rooms: [dock, kitchen]}\nmachine: {start: one, states: {one: {do: %s, next: %s}}}"
 
 
-@pytest.mark.parametrize(
-    ("body", "fails"),
+@for_all(
+    "body, fails",
     [
         ("{for: x, in: [1, 2], do: {log: $x}}", False),
         ("{for: x, in: $rooms, do: {wait: 1 s}}", False),

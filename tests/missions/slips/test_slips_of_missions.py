@@ -14,6 +14,7 @@ from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.slips import slip
 from rbxcompose.testing.golden import Golden
+from tests.loops import for_all
 from tests.missions.simulated import ROBOT, tree
 from tests.missions.test_slips import FILE, cured, report_of
 
@@ -31,12 +32,12 @@ def test_every_slip_has_an_example() -> None:
     assert set(EXAMPLES) == set(SLIPS)
 
 
-@pytest.mark.parametrize("name", sorted(EXAMPLES))
+@for_all("name", sorted(EXAMPLES))
 def test_what_is_said_of_a_slip(name: str, golden: Golden) -> None:
     golden.check(f"{name}.txt", render_text(report_of(EXAMPLES[name]), {FILE: EXAMPLES[name]}))
 
 
-@pytest.mark.parametrize("name", sorted(EXAMPLES))
+@for_all("name", sorted(EXAMPLES))
 def test_all_that_is_said_of_an_example_is_said_by_its_slip(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     said: set[str] = set()
 
@@ -50,6 +51,6 @@ def test_all_that_is_said_of_an_example_is_said_by_its_slip(name: str, monkeypat
     assert said == {finding.message for finding in report_of(EXAMPLES[name])} != set()
 
 
-@pytest.mark.parametrize("name", sorted(EXAMPLES))
+@for_all("name", sorted(EXAMPLES))
 def test_what_is_read_of_a_slip_is_in_the_text_that_its_fix_writes(name: str) -> None:
     assert paths_of(EXAMPLES[name]) <= paths_of(cured(EXAMPLES[name]))

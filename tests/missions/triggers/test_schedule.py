@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.clock import universal_time
 from rbxcompose.missions.triggers.schedule import DAYS, MONTHS, Local, Schedule, daily, instant_of, parse_cron
+from tests.loops import for_all
 
 BERLIN, LORD_HOWE = ZoneInfo("Europe/Berlin"), ZoneInfo("Australia/Lord_Howe")
 
@@ -36,8 +37,8 @@ def coming(schedule: Schedule, after: str, count: int, zone: ZoneInfo | None = N
     return found
 
 
-@pytest.mark.parametrize(
-    ("words", "expected"),
+@for_all(
+    "words, expected",
     [
         ("0 22 * * mon,fri", ["Fri 11-27 22:00", "Mon 11-30 22:00", "Fri 12-04 22:00"]),
         ("*/20 9-10 * * *", ["Fri 11-27 09:00", "Fri 11-27 09:20", "Fri 11-27 09:40"]),
