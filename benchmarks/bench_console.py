@@ -153,7 +153,7 @@ async def _gap(robot: Robot) -> float:
 
 def _first_paint(robot: Robot) -> list[float]:
     """Return when a browser has painted the page for the first time [s]; nothing without one."""
-    chromium = shutil.which("chromium")
+    chromium = shutil.which("chromium") or shutil.which("chromium-headless-shell")
     if chromium is None:
         return []
     from playwright.sync_api import sync_playwright
