@@ -224,3 +224,23 @@ class FakeGateway:
             data["odom"] = {"twist": {"twist": {"linear": {"x": 0.96 * forward}, "angular": {"z": 0.97 * turn}}}}
             for topic, message in (data | self.repeated).items():
                 self.say(topic, message)
+
+
+class FakeLog:
+    """A log that grows."""
+
+    def __init__(self, gateway: FakeGateway) -> None:
+        self.records: list[dict[str, Any]] = []
+        self.findings: list[dict[str, Any]] = []
+        gateway.answers["/console/log"] = self.answer
+        self.add("info", "mission", "go_to corner_1")
+        self.add("warning", "battery", "Low battery", detail="at 12 V")
+
+    def add(self, level: str, source: str, text: str, **more: str) -> None:
+        self.records.append({"time": 1.0 + len(self.records), "level": level, "source": source, "text": text, **more})
+
+    def answer(self, request: dict[str, Any]) -> dict[str, Any]:
+        answer: dict[str, Any] = {"records": self.records[request["after"] :], "after": len(self.records)}
+        if request["after"] == 0:
+            answer["findings"] = self.findings
+        return {"success": True, "message": "", "answer": answer}

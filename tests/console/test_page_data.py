@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect
 
 from rbxcompose.base.requests import Refused
 from tests.console.browser import CHROMIUM
-from tests.console.fake_gateway import CONFIG, FakeGateway
+from tests.console.fake_gateway import CONFIG, FakeGateway, FakeLog
 from tests.console.looks import PHONE, expect_fit, violations
 from tests.console.test_page_robot import DESCRIBED, component
 from tests.soak import rare
@@ -155,28 +155,8 @@ def test_who_may_only_look_is_offered_nothing_that_the_robot_refuses(
     assert violations(page) == []
 
 
-class Log:
-    """A log that grows."""
-
-    def __init__(self, gateway: FakeGateway) -> None:
-        self.records: list[dict[str, Any]] = []
-        self.findings: list[dict[str, Any]] = []
-        gateway.answers["/console/log"] = self.answer
-        self.add("info", "mission", "go_to corner_1")
-        self.add("warning", "battery", "Low battery", detail="at 12 V")
-
-    def add(self, level: str, source: str, text: str, **more: str) -> None:
-        self.records.append({"time": 1.0 + len(self.records), "level": level, "source": source, "text": text, **more})
-
-    def answer(self, request: dict[str, Any]) -> dict[str, Any]:
-        answer: dict[str, Any] = {"records": self.records[request["after"] :], "after": len(self.records)}
-        if request["after"] == 0:
-            answer["findings"] = self.findings
-        return {"success": True, "message": "", "answer": answer}
-
-
 def test_the_log_grows_and_is_filtered(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
-    log = Log(gateway)
+    log = FakeLog(gateway)
     page = open_page(page_name="log")
     lines = page.get_by_role("listitem")
     expect(lines).to_have_count(2)
@@ -202,7 +182,7 @@ def test_the_log_grows_and_is_filtered(open_page: Callable[..., Page], gateway: 
 def test_what_check_found_stands_above_the_log(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
     place = {"file": "robot.yaml", "line": 7, "column": 3}
     said = {"code": "RBX3141", "severity": "warning", "message": "joystick below navigation", "help": "raise it"}
-    Log(gateway).findings = [{**place, **said}]
+    FakeLog(gateway).findings = [{**place, **said}]
     page = open_page(page_name="log")
     page.get_by_text("1 finding of check").click()
     expect(page.get_by_label("Findings of check")).to_contain_text("robot.yaml:7:3 RBX3141")
@@ -214,7 +194,7 @@ def test_what_check_found_stands_above_the_log(open_page: Callable[..., Page], g
 def test_they_fit_a_phone(open_page: Callable[..., Page], gateway: FakeGateway, name: str) -> None:
     has_topics(gateway)
     has_mux(gateway)
-    Log(gateway)
+    FakeLog(gateway)
     page = open_page(page_name=name, viewport=PHONE, has_touch=True)
     ready = {"data": "/pose", "mux": "Lock all", "log": "Pause"}[name]
     page.get_by_role("button", name=ready).first.click()

@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 
 from rbxcompose.base.requests import Refused
 from tests.console.browser import CHROMIUM
-from tests.console.fake_gateway import FakeGateway
+from tests.console.fake_gateway import FakeGateway, FakeLog
 from tests.console.looks import PHONE, WIDE, expect_fit, violations
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
@@ -50,6 +50,7 @@ def patrol(gateway: FakeGateway) -> FakeGateway:
 def test_a_mission_is_seen_live_and_every_status_has_a_word(
     open_page: Callable[..., Page], patrol: FakeGateway
 ) -> None:
+    log = FakeLog(patrol)
     page = open_page(page_name="mission")
     step = page.get_by_role("treeitem").filter(has_text="go_to $corner").last
     expect(step).to_contain_text("running")
@@ -59,8 +60,9 @@ def test_a_mission_is_seen_live_and_every_status_has_a_word(
     patrol.show(LOOK_AT, seen("running", {"0": 1, "1": 2, "2": 1}))
     expect(step).to_contain_text("done")
     expect(interrupt.locator(".node").first).to_contain_text("running")
-    patrol.say("/rosout", {"name": "mission", "msg": "recharge", "stamp": {"sec": 1, "nanosec": 0}})
-    expect(page.get_by_label("Story")).to_contain_text("recharge")
+    log.add("info", "mission", "recharge")
+    story = page.get_by_label("Story").get_by_role("listitem")  # from the beginning on, of missions alone
+    expect(story).to_have_text(["3.00 recharge", "1.00 go_to corner_1"])
     assert violations(page) == []
 
 

@@ -1,30 +1,10 @@
 /** Log: what the robot and its components report, live, with filters. */
 import { emptyCard, h, icon, setText } from "../dom";
+import { type Finding, type LogLine, type LogNews, LogTail } from "../log_tail";
 import type { Page, Robot } from "../page";
-import { isMessage } from "../rosbridge";
 import "./log.css";
 
-const LOOK = 500; // [ms]
 const MOST = 1_000; // lines that are kept
-
-/** What `check` found before the robot came up. */
-interface Finding {
-  code: string;
-  severity: string;
-  message: string;
-  file: string | null;
-  line: number | null;
-  column: number | null;
-  help: string;
-}
-
-interface Line {
-  time: number;
-  level: string;
-  source: string;
-  text: string;
-  detail?: string;
-}
 
 const PICTURES = { info: "dot", warning: "warning", error: "alarm" } as const;
 const WORDS: Record<string, string> = { info: "Info", warning: "Warning", error: "Error" };
@@ -57,50 +37,36 @@ class LogView {
   readonly #list = h("ol", { class: "lines log-lines" });
   readonly #findings = h("section", { class: "card findings", "aria-label": "Findings of check", hidden: "" });
   readonly #empty = emptyCard("wait", "Reading the log\u2026");
-  readonly #timer: ReturnType<typeof setInterval>;
-  #lines: Line[] = [];
-  #after = 0;
-  #paused = false;
-  #asking = false;
+  readonly #tail: LogTail;
+  #lines: LogLine[] = [];
 
   constructor(robot: Robot) {
     this.#robot = robot;
     const save = h("button", { type: "button" }, icon("down"), "Download");
     save.onclick = () => this.#download();
     this.#pause.onclick = () => {
-      this.#paused = !this.#paused;
-      this.#pause.replaceChildren(icon(this.#paused ? "play" : "pause"), this.#paused ? "Go on" : "Pause");
-      if (!this.#paused) void this.#read();
+      const paused = (this.#tail.isPaused = !this.#tail.isPaused);
+      this.#pause.replaceChildren(icon(paused ? "play" : "pause"), paused ? "Go on" : "Pause");
     };
     for (const control of [this.#filter, this.#level, this.#source]) control.oninput = () => this.#show();
     const bar = h("div", { class: "log-bar" }, this.#filter, this.#level, this.#source, this.#pause, save);
     this.element.append(this.#findings, bar, this.#empty, h("section", { class: "card", "aria-label": "Log, the newest first", tabindex: "0" }, this.#list));
-    this.#timer = setInterval(() => void this.#read(), LOOK);
-    void this.#read();
+    this.#tail = new LogTail(
+      robot,
+      (news) => this.#tell(news),
+      (reason) => setText(this.#empty.querySelector("p")!, reason),
+    );
   }
 
   close(): void {
-    clearInterval(this.#timer);
+    this.#tail.close();
   }
 
-  async #read(): Promise<void> {
-    if (this.#paused || this.#asking || this.#robot.link.state.value.is !== "open") return;
-    this.#asking = true;
-    try {
-      const values = await this.#robot.link.call("/console/log", { after: this.#after });
-      const answer = isMessage(values) ? (values.answer ?? null) : null;
-      if (!isMessage(answer) || !Array.isArray(answer.records)) throw new Error(isMessage(values) ? String(values.message) : "no answer");
-      if (Array.isArray(answer.findings)) this.#check(answer.findings as unknown as Finding[]);
-      const isNew = Number(answer.after) < this.#after; // the robot came up again
-      this.#after = Number(answer.after);
-      if (isNew) this.#lines = [];
-      if (isNew || answer.records.length > 0) this.#add(answer.records as unknown as Line[]);
-      if (this.#lines.length === 0) setText(this.#empty.querySelector("p")!, "Nothing has been reported yet.");
-    } catch (error) {
-      setText(this.#empty.querySelector("p")!, (error as Error).message);
-    } finally {
-      this.#asking = false;
-    }
+  #tell({ lines, isNew, findings }: LogNews): void {
+    if (findings) this.#check(findings);
+    if (isNew) this.#lines = [];
+    if (isNew || lines.length > 0) this.#add(lines);
+    if (this.#lines.length === 0) setText(this.#empty.querySelector("p")!, "Nothing has been reported yet.");
   }
 
   #check(findings: Finding[]): void {
@@ -115,7 +81,7 @@ class LogView {
     this.#findings.replaceChildren(h("details", {}, h("summary", {}, count), h("ul", {}, ...rows)));
   }
 
-  #add(lines: Line[]): void {
+  #add(lines: LogLine[]): void {
     this.#lines = [...this.#lines, ...lines].slice(-MOST);
     const sources = new Set(this.#lines.map(({ source }) => source));
     const known = new Set([...this.#source.options].map(({ value }) => value));
@@ -123,7 +89,7 @@ class LogView {
     this.#show();
   }
 
-  get #shown(): Line[] {
+  get #shown(): LogLine[] {
     const [wanted, least, source] = [this.#filter.value.trim().toLowerCase(), Number(this.#level.value), this.#source.value];
     return this.#lines.filter(
       (line) =>

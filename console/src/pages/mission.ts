@@ -1,8 +1,9 @@
 /** Mission: what the robot is doing and why, live; start, pause, resume, cancel and debug. */
 import { byHandText, stoppedText, type Breakpoint, type Datum } from "../debugging";
-import { h, emptyCard, icon, type Icon } from "../dom";
+import { h, emptyCard, icon, setText, type Icon } from "../dom";
 import { formatName } from "../format";
 import { showLeftOver, type LeftOver } from "../left_over";
+import { LogTail, type LogNews } from "../log_tail";
 import { ACTIVE, isSeen, unseen, type Listed, type Seen, type Tested } from "../mission";
 import { MissionData } from "../mission_data";
 import { MissionEditor } from "../mission_editor";
@@ -61,6 +62,7 @@ class MissionView {
   readonly #triggers = new TriggerList();
   readonly #story = h("section", { class: "card mission-story", "aria-label": "Story" }, h("h2", {}, "Story"));
   readonly #lines = h("ol", { class: "lines" });
+  readonly #noLines = h("p", { role: "status" }, "Reading the log\u2026");
   readonly #closers: (() => void)[] = [];
   #missions: Listed[] = [];
   #chosen = "";
@@ -78,7 +80,7 @@ class MissionView {
   constructor(robot: Robot) {
     this.#robot = robot;
     this.#mayOperate = robot.config.role !== "view";
-    this.#story.append(this.#lines);
+    this.#story.append(this.#noLines, this.#lines);
     this.#data = new MissionData({
       list: async () => (await robot.link.ask({ type: "mission.ListData", mission: this.#chosen })) as unknown as Datum[],
       set: async (name, text) => {
@@ -89,8 +91,13 @@ class MissionView {
     const data = h("section", { class: "card", "aria-label": "Data" }, h("h2", {}, "Data"), this.#data.element, this.#moves);
     this.#side.append(data, this.#triggers.element, this.#story);
     this.element.append(this.#list, this.#head, this.#side);
+    const tail = new LogTail(
+      robot,
+      (news) => this.#tell(news),
+      (reason) => setText(this.#noLines, reason),
+    );
     this.#closers.push(
-      robot.link.subscribe("/rosout", (log) => this.#tell(log.name, log.msg, log.stamp), { type: "rcl_interfaces/msg/Log" }),
+      () => tail.close(),
       robot.link.watch(
         "mission/ListBreakpoints",
         (answer) => {
@@ -277,12 +284,13 @@ class MissionView {
     this.#showHead();
   }
 
-  #tell(name: Json | undefined, text: Json | undefined, stamp: Json | undefined): void {
-    if (name !== "mission" || typeof text !== "string") return;
-    const seconds = isMessage(stamp) ? Number(stamp.sec) + Number(stamp.nanosec) / 1e9 : 0;
-    const time = new Date(seconds * 1000).toLocaleTimeString();
-    this.#lines.prepend(h("li", {}, h("time", {}, time), ` ${text}`));
+  #tell({ lines, isNew }: LogNews): void {
+    if (isNew) this.#lines.replaceChildren();
+    for (const { source, time, text } of lines)
+      if (source === "mission") this.#lines.prepend(h("li", {}, h("time", {}, time.toFixed(2)), ` ${text}`));
     while (this.#lines.children.length > STORY) this.#lines.lastChild?.remove();
+    this.#noLines.hidden = this.#lines.children.length > 0;
+    setText(this.#noLines, "No mission has done anything yet.");
   }
 }
 
