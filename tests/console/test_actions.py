@@ -219,6 +219,34 @@ def test_a_client_serves_and_fails_what_it_leaves_open() -> None:
     assert third["id"] == "request:3"
 
 
+@for_all(
+    "values, reason",
+    [
+        ("broken", "broken"),
+        ({"message": "why"}, "why"),
+        (None, "it was refused"),
+        ({}, "it was refused"),
+        ([], "it was refused"),
+    ],
+)
+def test_a_service_that_fails_says_why_if_it_can(values: object, reason: str) -> None:
+    room = Room()
+    client = room.client()
+    client.does("advertise_service", service="/bell", type="std_srvs/SetBool")
+    room.bridge.requested("/bell", 1, SetBool.Request())
+    client.does("service_response", service="bell", id="request:1", values=values, result=False)
+    assert room.asked()[-1] == ServiceAnswer(1, None, reason)
+
+
+def test_a_service_may_answer_with_a_list() -> None:
+    room = Room()
+    client = room.client()
+    client.does("advertise_service", service="/bell", type="std_srvs/SetBool")
+    room.bridge.requested("/bell", 1, SetBool.Request())
+    client.does("service_response", service="bell", id="request:1", values=[True, "ding"], result=True)
+    assert room.asked()[-1] == ServiceAnswer(1, SetBool.Response(success=True, message="ding"))
+
+
 def test_a_service_that_exists_is_not_served_again() -> None:
     (status,) = Room().client().does("advertise_service", service="/lamp", type="std_srvs/SetBool")
     assert status["msg"] == "'/lamp' is served already"

@@ -105,6 +105,12 @@ def test_only_who_asks_gets_pieces() -> None:
     joined = [heap.add(piece) for piece in client.gets()]
     assert len(joined) == 4
     assert json.loads(joined[-1] or "") == whole
+    assert len(client.does("call_service", service="/rosapi/topics_and_raw_types")) == 1
+    assert len(client.does("call_service", service="/rosapi/topics_and_raw_types", fragment_size=300)) > 1
+    client.does("unsubscribe", topic="/text")
+    client.does("subscribe", topic="/text")
+    room.arrives("/text", String(data="x" * 1000))
+    assert client.gets() == [whole]
 
 
 def next_bytes(room: Room, number: int) -> Any:

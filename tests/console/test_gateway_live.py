@@ -128,6 +128,29 @@ def browse(what: Callable[[Browser], Awaitable[None]], path: str = "/rosbridge",
     asyncio.run(run())
 
 
+def test_a_service_that_is_served_again_with_another_type_is_called_with_that(robot: Robot) -> None:
+    async def known(page: Browser, wanted: str) -> None:
+        while True:
+            await page.sends("call_service", service="/rosapi/service_type", args={"service": "/ring"})
+            if (await page.next("service_response"))["values"]["type"] == wanted:
+                return
+            await asyncio.sleep(0.02)  # so many frames may a client send
+
+    async def serve(page: Browser) -> None:
+        for type_, args in (("std_srvs/srv/SetBool", {"data": True}), ("std_srvs/srv/Trigger", {})):
+            await page.sends("advertise_service", service="/ring", type=type_)
+            await known(page, type_)
+            await page.sends("call_service", service="/ring", args=args)
+            asked = await page.next("call_service")
+            values = {"success": True, "message": type_}
+            await page.sends("service_response", service="/ring", id=asked["id"], values=values, result=True)
+            assert (await page.next("service_response"))["values"] == values
+            await page.sends("unadvertise_service", service="/ring")
+            await known(page, "")
+
+    browse(serve)
+
+
 class Commands:
     """What arrives at the mux, and when [s]."""
 

@@ -74,10 +74,11 @@ def from_json(message: type[M], data: object, stamp: int) -> M:
     Raises:
         WrongMessageError: if they represent none.
     """
+    reading = _Reading()
     try:
-        made, findings = from_plain(message, _Reading().of(FieldType(message.TYPE), data))
-    except ValueError as error:  # base64, or a text that no UTF-8 can hold
-        raise WrongMessageError(str(error)) from error
+        made, findings = from_plain(message, reading.of(FieldType(message.TYPE), data))
+    except ValueError as error:  # a list, base64, or a text that no UTF-8 can hold
+        raise WrongMessageError(": ".join((*filter(None, [".".join(reading.path)]), str(error)))) from error
     if made is None:
         raise WrongMessageError(findings[0].message)
     stamped: Any = made
@@ -104,6 +105,7 @@ class _Reading:
 
     def __init__(self) -> None:
         self._left = MOST_ENTRIES
+        self.path: list[str] = []  # of the field that is read
 
     def of(self, type_: FieldType, value: Any) -> Any:
         """Return a value of a type."""
@@ -121,7 +123,7 @@ class _Reading:
 
     def _list(self, type_: FieldType, value: Any) -> Any:
         if isinstance(value, str):
-            return b64decode(value, validate=True) if type_.base in OCTETS else value
+            return _bytes(value) if type_.base in OCTETS else value
         if type_.base in FLOATS or type_.base in INTEGERS or type_.base in OCTETS:
             numbers = numbers_of(type_.base, value)
             return bytes(numbers) if type_.base in OCTETS else numbers
@@ -137,10 +139,19 @@ class _Reading:
         types, read = {field: type_ for field, _, type_ in _fields(name)}, {}
         for key, value in data.items():
             if key in types:
+                self.path.append(key)
                 read[key] = self.of(types[key], value)
+                self.path.pop()
             elif not (key == "seq" and name == _HEADER):
                 raise WrongMessageError(f"{name} has no field '{key[:_SHOWN]}'")
         return read
+
+
+def _bytes(text: str) -> bytes:
+    try:
+        return b64decode(text, validate=True)
+    except ValueError as error:
+        raise WrongMessageError("expected base64, or a list of numbers from 0 to 255") from error
 
 
 def numbers_of(base: str, values: list[Any]) -> Any:
@@ -150,16 +161,34 @@ def numbers_of(base: str, values: list[Any]) -> Any:
         WrongMessageError: if some are not of that type.
     """
     wanted = np.dtype({"byte": "uint8", "char": "uint8"}.get(base, base))
-    is_float = wanted.kind == "f"
-    found = np.array([math.nan if value is None else value for value in values] if is_float else values)
-    with np.errstate(all="ignore"):
-        made = found.astype(wanted) if found.dtype.kind in "iuf" else found
-        is_right = made is not found or found.dtype == wanted
-        if is_right and found.size:
-            is_same = np.isinf(made) == np.isinf(found) if is_float else made.astype(float) == found.astype(float)
-            limits = (0, 0) if is_float else (np.iinfo(wanted).min, np.iinfo(wanted).max)
-            is_within = is_float or (limits[0] <= found.min() and found.max() <= limits[1])
-            is_right = found.ndim == 1 and bool(is_within) and bool(is_same.all())
-    if found.size and not is_right:
+    made = _floats(wanted, values) if wanted.kind == "f" else _integers(wanted, values)
+    if made is None:
         raise WrongMessageError(f"expected a list of numbers ({base})")
-    return made if found.size else np.zeros(0, wanted)
+    return made
+
+
+def _floats(wanted: np.dtype[Any], values: list[Any]) -> Any:
+    """Return them as an array, or None. Types are looked at first: among texts, numpy would make a text of each."""
+    kinds = set(map(type, values))
+    if not kinds <= {int, float, type(None)}:
+        return None
+    try:
+        found = np.array([math.nan if value is None else value for value in values], "float64")
+    except OverflowError:
+        return None
+    with np.errstate(over="ignore"):
+        made = found.astype(wanted)
+    return made if (np.isinf(made) == np.isinf(found)).all() else None
+
+
+def _integers(wanted: np.dtype[Any], values: list[Any]) -> Any:
+    """Return them as an array, or None. Those of 64 bits must not pass through floats."""
+    kinds = set(map(type, values))
+    if not kinds <= {int, float}:
+        return None
+    if float in kinds:
+        values = [int(value) if isinstance(value, float) and value.is_integer() else value for value in values]
+        if float in set(map(type, values)):
+            return None
+    limits = np.iinfo(wanted)
+    return np.array(values, wanted) if not values or limits.min <= min(values) <= max(values) <= limits.max else None

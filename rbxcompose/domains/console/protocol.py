@@ -43,6 +43,7 @@ from rbxcompose.sdk.bound import Ended, Outcome
 
 LARGEST = 8 * 1024 * 1024  # [characters] of a frame
 DEEPEST = 100  # lists and maps of a frame, each within the one before
+MOST_VALUES = 250_000  # of a frame, outside of base64: while it is read, all other clients wait
 MOST_PER_SECOND = 200  # frames of a client
 MOST_SUBSCRIPTIONS = 200  # of a client; as many topics may it advertise, and as many calls may be open
 MOST_ACTIONS = 20  # that a client serves; each is eight ends on the bus
@@ -75,9 +76,11 @@ _NODE_SERVICES: Mapping[type[Service[Any, Any]], str] = {
     SetParameters: "set_parameters",
 }
 _CANCELS = "/_action/cancel_goal"  # the end of the name of the service that cancels goals of an action
+_STATUS_OF_ACTION = "/_action/status"  # the end of the name of the topic that tells how goals of an action are
 _NESTS = (dict, list)
 _TOO_DEEP = f"lists and maps are nested more than {DEEPEST} deep"
 _SHOWN = 60  # characters of what a client sent, in a status
+_TEXT = re.compile(r'"(?:[^"\\]++|\\.)*+"', re.DOTALL)  # in JSON
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,6 +338,7 @@ class _Wish:
     throttle: float
     queue: int
     compression: str = "none"
+    piece: int = 0  # characters of a frame; 0: whole frames
 
 
 class _Stream:
@@ -354,6 +358,7 @@ class _Stream:
         self._throttle = min(wish.throttle for wish in self.wishes.values())
         self._queue = max(wish.queue for wish in self.wishes.values())
         self.compression = [*self.wishes.values()][-1].compression
+        self.piece = min((wish.piece for wish in self.wishes.values() if wish.piece), default=0)
         self._waiting = deque(self._waiting, maxlen=self._queue or DEPTH)
         self._due = min(self._due, now + self._throttle)
 
@@ -411,13 +416,13 @@ class _Client:
         self.number, self.role, self.who = number, role, who
         self.noted = ""  # last in the log
         self.level = LEVELS.index("warning")
-        self.frames: deque[str] = deque()
-        self.piece_size = 0  # [characters]; 0: whole frames
+        self.frames: deque[tuple[str, int]] = deque()  # each with the characters of a piece; 0: it is sent as a whole
         self.sent_pieces: deque[str] = deque()  # of the frame that is being sent
         self.pieces_so_far = 0
         self.pieces = Pieces(LARGEST)  # that came
         self.streams: dict[str, _Stream] = {}  # by the name that it uses; the next to be served is the first
         self.advertised: dict[str, type[Message]] = {}
+        self.advertised_as: dict[str, set[object]] = {}  # the ids with which it advertised a topic
         self.open_calls = 0  # with goals
         self.asks_for_lease = False  # before it drives
         self.lateness = Lateness()
@@ -455,6 +460,7 @@ class _Waiting:
     client: int
     id: object
     service: str
+    piece: int = 0  # characters of a piece of the answer
     then: Callable[[Any], dict[str, Any] | None] | None = None
     """What makes the answer of a response, or asks on and returns None."""
 
@@ -605,21 +611,21 @@ class Bridge:
         client = self._clients[number]
         if client.sent_pieces:
             return client.sent_pieces.popleft()
-        frame = self._whole_frame(client, now)
-        if isinstance(frame, str) and 0 < client.piece_size < len(frame):
+        frame, size = self._whole_frame(client, now)
+        if isinstance(frame, str) and 0 < size < len(frame):
             client.pieces_so_far += 1
-            client.sent_pieces.extend(pieces(frame, client.piece_size, f"fragment:{client.pieces_so_far}"))
+            client.sent_pieces.extend(pieces(frame, size, f"fragment:{client.pieces_so_far}"))
             return client.sent_pieces.popleft()
         return frame
 
-    def _whole_frame(self, client: _Client, now: float) -> str | bytes | None:
+    def _whole_frame(self, client: _Client, now: float) -> tuple[str | bytes | None, int]:
         if client.frames:
             return client.frames.popleft()
         for name, stream in client.streams.items():
             if (frame := stream.take(now)) is not None:
                 client.streams[name] = client.streams.pop(name)
-                return frame
-        return None
+                return frame, stream.piece
+        return None, 0
 
     def pause(self, number: int, now: float) -> float:
         """Return the time until something is due for a client [s], if nothing else happens; it may be infinite."""
@@ -764,9 +770,6 @@ class Bridge:
         op = data.get("op")
         if not isinstance(op, str):
             raise BadFrameError("a frame has an 'op', which is a text")
-        if (size := _count(data, "fragment_size")) > 0:
-            least = max(SMALLEST_PIECE, size)
-            client.piece_size = min(client.piece_size or least, least)
         if not isinstance(data.get("id"), str | int | float | None):
             raise BadFrameError("an 'id' is a text")
         if op not in _OPERATIONS:
@@ -854,7 +857,7 @@ class Bridge:
         if (compression := data.get("compression") or "none") not in COMPRESSIONS:
             raise BadFrameError(f"a compression is one of {', '.join(COMPRESSIONS)}, not '{_short(compression)}'")
         throttle = _count(data, "throttle_rate", math.inf) / 1000
-        wish = _Wish(throttle, min(_count(data, "queue_length"), LONGEST_QUEUE), compression)
+        wish = _Wish(throttle, min(_count(data, "queue_length"), LONGEST_QUEUE), compression, _piece(data))
         is_window = topic.startswith(WINDOWS)
         is_old = target.old is not None
         message = None if is_window or is_old else self._message_on(topic, data)
@@ -901,13 +904,19 @@ class Bridge:
         if target.old is None:  # else it is taken here
             message = self._message_on(target.name, data)
             self._declare(client, target.name, message, is_latched=data.get("latch") is True)
+            client.advertised_as.setdefault(target.name, set()).add(_key(data))
 
     def _unadvertise_op(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         topic = target.name
         if target.old is not None:
             return
-        if client.advertised.pop(topic, None) is None:
+        if topic not in client.advertised:
             raise BadFrameError(f"'{target.written}' is not advertised")
+        ids = client.advertised_as.pop(topic, set())
+        if (key := _key(data)) is not None and (others := ids - {key}):
+            client.advertised_as[topic] = others
+            return
+        del client.advertised[topic]
         if self._drive is not None and topic == self._drive.topic:
             self._halt_if(self.lease.release(client.number))  # while there is a publisher
         self._unadvertise(topic)
@@ -958,9 +967,10 @@ class Bridge:
     def _call_service(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         if client.open_calls >= MOST_SUBSCRIPTIONS:
             raise BadFrameError(f"at most {MOST_SUBSCRIPTIONS} calls of a client are open")
+        piece = _piece(data)
         self._calls_so_far += 1
         number = self._calls_so_far
-        self._calls[number] = _Waiting(client.number, data.get("id"), target.written)
+        self._calls[number] = _Waiting(client.number, data.get("id"), target.written, piece)
         client.open_calls += 1
         try:
             self._permitted(client, target, partial(self._begin_call, client, number, data, target))
@@ -987,8 +997,9 @@ class Bridge:
         type_ = self._type_of(target.name, target.type, data.get("type"), "service")
         request = from_json(type_.Request, arguments(type_.Request, given), self._stamp)
         timeout = data.get("timeout")
-        is_given = isinstance(timeout, int | float) and 0 < timeout < LONGEST_PATIENCE
-        patience = float(timeout) if is_given else PATIENCE  # type: ignore[arg-type]
+        if isinstance(timeout, bool) or not isinstance(timeout, int | float | None):
+            raise BadFrameError("'timeout' is a number of seconds")
+        patience = min(timeout, LONGEST_PATIENCE) if timeout is not None and timeout > 0 else PATIENCE
         self._requests.append(ServiceCall(number, target.name, type_, request, patience))
 
     # Services of clients
@@ -1022,9 +1033,13 @@ class Bridge:
         if served is None or served.client != client.number or number < 0:
             raise BadFrameError(f"there is no open request to '{service}' of this id")
         if data.get("result") is False:
-            self._requests.append(ServiceAnswer(number, None, _short(data.get("values")) or "it was refused"))
+            values = data.get("values")
+            reason = values.get("message") if isinstance(values, dict) else values
+            refusal = _short(reason) if isinstance(reason, str) and reason else "it was refused"
+            self._requests.append(ServiceAnswer(number, None, refusal))
         else:
-            response = from_json(served.type.Response, data.get("values") or {}, self._stamp)
+            values = arguments(served.type.Response, data.get("values") or {})
+            response = from_json(served.type.Response, values, self._stamp)
             self._requests.append(ServiceAnswer(number, response))
         served.open.discard(number)
 
@@ -1394,7 +1409,12 @@ class Bridge:
         if self._drive is not None and topic == self._drive.topic:
             return self._drive.type
         ours = self._listened.get(topic) or self._advertised.get(topic)
-        return ours.message.TYPE if ours and ours.message else self._graph.topics().get(topic, "")
+        if ours and ours.message:
+            return ours.message.TYPE
+        action, is_status, _ = topic.rpartition(_STATUS_OF_ACTION)
+        if is_status and action in self._graph.actions():  # hidden, as all topics of actions
+            return "action_msgs/msg/GoalStatusArray"
+        return self._graph.topics().get(topic, "")
 
     def _declare(self, client: _Client, topic: str, message: type[Message], *, is_latched: bool = False) -> None:
         if topic in client.advertised:
@@ -1466,10 +1486,10 @@ class Bridge:
             "values": values,
             "result": is_good,
         }
-        self._send(client, frame)
+        self._send(client, frame, waiting.piece)
 
-    def _send(self, client: _Client, frame: Mapping[str, object]) -> None:
-        client.frames.append(json.dumps(_finite(frame), separators=(",", ":")))
+    def _send(self, client: _Client, frame: Mapping[str, object], piece: int = 0) -> None:
+        client.frames.append((json.dumps(_finite(frame), separators=(",", ":")), piece))
         self.woken.add(client.number)
 
     def _done(self) -> list[BusRequest]:
@@ -1562,7 +1582,10 @@ def _parsed(frame: str | bytes) -> dict[str, Any]:
     if len(frame) > LARGEST:
         raise BadFrameError(f"a frame has at most {LARGEST // 2**20} MiB")
     try:
-        data = _loaded(frame)
+        text = frame if isinstance(frame, str) else frame.decode()
+        if _values_in(text) > MOST_VALUES:
+            raise BadFrameError(f"a frame has at most {MOST_VALUES} values; bytes are a single one in base64")
+        data = _loaded(text)
     except BadFrameError:
         raise
     except ValueError as error:
@@ -1572,7 +1595,16 @@ def _parsed(frame: str | bytes) -> dict[str, Any]:
     return data
 
 
-def _loaded(text: str | bytes) -> Any:
+def _values_in(text: str) -> int:
+    """Return about how many values and keys a text in JSON has, much faster than it is read."""
+    counted = sum(map(text.count, "[{,"))
+    if counted > MOST_VALUES and (texts := (text.count('"') - text.count('\\"')) // 2) <= MOST_VALUES:
+        outside = _TEXT.sub("", text)  # a text may have many commas
+        return max(texts, sum(map(outside.count, "[{,")))
+    return counted
+
+
+def _loaded(text: str) -> Any:
     """Return what a JSON text says, so flat that whatever reads it may do so level by level.
 
     Raises:
@@ -1583,8 +1615,7 @@ def _loaded(text: str | bytes) -> Any:
         found = json.loads(text)
     except RecursionError as error:
         raise BadFrameError(_TOO_DEEP) from error
-    begun = text.count("[") + text.count("{") if isinstance(text, str) else text.count(b"[") + text.count(b"{")
-    if begun <= DEEPEST:
+    if text.count("[") + text.count("{") <= DEEPEST:
         return found  # without a look at each of a million numbers
     level: list[Any] = [[found]]
     for _ in range(DEEPEST + 1):
@@ -1624,6 +1655,11 @@ def _count(data: Mapping[str, Any], key: str, most: float = 2**31) -> int:
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < min(most, 2**53):
         raise BadFrameError(f"'{key}' is a number that is not negative")
     return int(value)
+
+
+def _piece(data: Mapping[str, Any]) -> int:
+    """Return how many characters a piece of a frame shall have; 0 if it shall be sent as a whole."""
+    return max(SMALLEST_PIECE, size) if (size := _count(data, "fragment_size")) else 0
 
 
 def _named(given: object, names: Sequence[str]) -> dict[str, Any]:

@@ -993,11 +993,19 @@ class GatewaySession:
     def _withdraw(self, end: Closable) -> None:
         self._bus.withdraw(NAME, end)
 
+    def _client_of(self, kind: type[object], name: str, type_: Any, make: Callable[[str, str, Any], Any]) -> Any:
+        """Return the client of a service or an action; a new one if another type is served under its name now."""
+        known, end = self._ends.get((kind, name), (None, None))
+        if known is not type_:
+            if end is not None:
+                self._withdraw(end)
+            end = make(NAME, name, type_)
+            self._ends[kind, name] = type_, end
+        return end
+
     def _call(self, request: ServiceCall, then: Callable[[Reply[Any]], None] | None = None) -> None:
         """Call a service as soon as its server is known to a client of it; the bridge takes the reply, or `then`."""
-        caller = self._ends.get((ServiceCall, request.service))
-        if caller is None:
-            caller = self._ends[ServiceCall, request.service] = self._bus.client(NAME, request.service, request.type)
+        caller = self._client_of(ServiceCall, request.service, request.type, self._bus.client)
         deadline = self._now + request.timeout
 
         def answered(reply: Reply[Any]) -> None:
@@ -1046,9 +1054,8 @@ class GatewaySession:
 
     def _send_goal(self, request: SendGoal) -> None:
         """Send a goal as soon as the server of its action is known to a client of it."""
-        number, caller = request.number, self._ends.get((SendGoal, request.action))
-        if caller is None:
-            caller = self._ends[SendGoal, request.action] = self._bus.action_client(NAME, request.action, request.type)
+        number = request.number
+        caller = self._client_of(SendGoal, request.action, request.type, self._bus.action_client)
         deadline = self._now + _PATIENCE
         unsent = self._goals[number] = _Unsent()
 
