@@ -371,6 +371,27 @@ def test_a_parameter_is_read_by_each_spelling(name: str) -> None:
     assert json.loads(answer["values"]["value"]) == 60.0
 
 
+@pytest.mark.parametrize(
+    ("default", "value"),
+    [("5", 5), ('"front"', "front"), ("front", "front"), ("[1, 2]", [1, 2]), ("", None), (None, None), (0, 0)],
+)
+@pytest.mark.parametrize("name", ["/battery:nothing", "/robot_gui/videoTopic", "/nobody:speed", "speed", ""])
+def test_a_parameter_that_is_not_there_is_its_default(name: str, default: object, value: object) -> None:
+    room = with_parameters()
+    client = room.client()
+    for service, args, expected in (
+        ("get_param", {"name": name, "default_value": default}, {"value": json.dumps(value), "successful": True}),
+        ("has_param", {"name": name}, {"exists": False}),
+    ):
+        answers = client.does("call_service", service=f"/rosapi/{service}", args=args)
+        if name.startswith("/battery"):
+            room.bridge.answered(call(room, "/battery/get_parameters").number, GetParameters.Response())
+            answers = client.gets()
+        (answer,) = answers
+        assert answer["result"]
+        assert answer["values"].items() >= expected.items()
+
+
 def test_a_number_is_set_in_the_type_that_the_parameter_has() -> None:
     room = with_parameters()
     client = room.client()

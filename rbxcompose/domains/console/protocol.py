@@ -985,7 +985,7 @@ class Bridge:
             api = target.name.removeprefix("/rosapi/")
             if api in _PARAMETERS:
                 ask, names = _PARAMETERS[api]
-                ask(self, _named(given, names), number)
+                values = ask(self, _named(given, names), number)
             else:
                 values = self._rosapi(api, _named(given, rosapi.ARGUMENTS[api]))
         else:
@@ -1102,37 +1102,37 @@ class Bridge:
 
     # Parameters, by the names that rosapi has for them: `/battery:runtime`, or `/battery/runtime` as in ROS 1
 
-    def _get_param(self, given: Mapping[str, Any], number: int) -> None:
-        node, name = self._parameter(given)
+    def _get_param(self, given: Mapping[str, Any], number: int) -> dict[str, Any] | None:
+        """Read a parameter; if there is none, the default, else null: roslib gives up unless this is successful."""
+        default = given.get("default_value", "")
+        otherwise = None if default == "" else _read(default)
 
-        def then(response: GetParameters.Response) -> dict[str, Any]:
+        def told(response: GetParameters.Response) -> dict[str, Any]:
             found = parameters.from_message(response.values[0]) if response.values else None
-            if found is None:
-                otherwise = given.get("default_value", "")
-                text = otherwise if isinstance(otherwise, str) else json.dumps(otherwise)
-                return {"value": text, "successful": False, "reason": f"there is no parameter '{name}'"}
-            return {"value": json.dumps(_finite(found)), "successful": True, "reason": ""}
+            value = otherwise if found is None else found
+            return {"value": json.dumps(_finite(value)), "successful": True, "reason": ""}
 
-        self._ask_node(number, node, GetParameters, {"names": [name]}, then)
+        return self._look_up(given, number, told)
 
-    def _has_param(self, given: Mapping[str, Any], number: int) -> None:
+    def _has_param(self, given: Mapping[str, Any], number: int) -> dict[str, Any] | None:
+        return self._look_up(given, number, lambda found: {"exists": any(value.type for value in found.values)})
+
+    def _look_up(
+        self, given: Mapping[str, Any], number: int, told: Callable[[GetParameters.Response], dict[str, Any]]
+    ) -> dict[str, Any] | None:
+        """Ask a node for a parameter; return at once what is told of none if there is no such node."""
         node, name = self._parameter(given)
-
-        def then(response: GetParameters.Response) -> dict[str, Any]:
-            return {"exists": any(value.type for value in response.values)}
-
-        self._ask_node(number, node, GetParameters, {"names": [name]}, then)
+        if not node:
+            return told(GetParameters.Response())
+        self._ask_node(number, node, GetParameters, {"names": [name]}, told)
+        return None
 
     def _set_param(self, given: Mapping[str, Any], number: int) -> None:
         """Set a parameter, whose type decides how its value is read: JavaScript writes 2.0 as 2."""
         node, name = self._parameter(given)
-        value: Any
-        try:
-            value = _loaded(text) if isinstance(text := given.get("value"), str) else text
-        except BadFrameError:
-            raise
-        except ValueError:
-            value = text  # a text without its quotes
+        if not node:
+            raise WrongMessageError(f"there is no node with a parameter '{_short(given['name'])}'")
+        value = _read(given.get("value"))
 
         def told(response: SetParameters.Response) -> dict[str, Any]:
             result = next(iter(response.results), None)
@@ -1150,7 +1150,7 @@ class Bridge:
 
         self._ask_node(number, node, GetParameters, {"names": [name]}, then)
 
-    def _get_param_names(self, given: Mapping[str, Any], number: int) -> None:
+    def _get_param_names(self, given: Mapping[str, Any], number: int) -> dict[str, Any] | None:
         """List the parameters of all nodes, one after the other."""
         client, found = self._clients[self._calls[number].client], list[str]()
         targets = (self._service_target("call_service", service) for service in self._graph.services())
@@ -1174,17 +1174,15 @@ class Bridge:
             self._ask_node(number, node, ListParameters, {}, then)
             return None
 
-        if (empty := ask()) is not None:
-            self._respond(number, empty, is_good=True)
+        return ask()
 
     def _parameter(self, given: Mapping[str, Any]) -> tuple[str, str]:
+        """Return the node that a parameter belongs to, empty if there is none, and its name there."""
         if not isinstance(name := given.get("name"), str):
             raise WrongMessageError("'name' is a text")
-        node, sign, parameter = name.rpartition(":") if ":" in name else name.rpartition("/")
+        node, _, parameter = name.rpartition(":" if ":" in name else "/")
         node = absolute(node)
-        if not sign or f"{node}/get_parameters" not in self._graph.services():
-            raise WrongMessageError(f"there is no node with a parameter '{_short(name)}'")
-        return node, parameter
+        return (node if f"{node}/get_parameters" in self._graph.services() else ""), parameter
 
     def _ask_node(
         self,
@@ -1567,7 +1565,7 @@ _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str,
     **{f"/console/robot/{name}": partial(Bridge._robot_service, name=name) for name in ROBOT_TEXTS},
 }
 """Services of the gateway: what answers, or None if the answer comes later."""
-_PARAMETERS: Mapping[str, tuple[Callable[[Bridge, Mapping[str, Any], int], None], tuple[str, ...]]] = {
+_PARAMETERS: Mapping[str, tuple[Callable[[Bridge, Mapping[str, Any], int], dict[str, Any] | None], tuple[str, ...]]] = {
     "get_param": (Bridge._get_param, ("name", "default_value")),
     "get_param_names": (Bridge._get_param_names, ()),
     "has_param": (Bridge._has_param, ("name",)),
@@ -1623,6 +1621,16 @@ def _loaded(text: str) -> Any:
         if not (level := [value for values in inner for value in values if value and isinstance(value, _NESTS)]):
             return found
     raise BadFrameError(_TOO_DEEP)
+
+
+def _read(value: object) -> Any:
+    """Return what a text says in JSON; a text without its quotes, and what is no text, unchanged."""
+    try:
+        return _loaded(value) if isinstance(value, str) else value
+    except BadFrameError:
+        raise
+    except ValueError:
+        return value
 
 
 def _within(frame: str) -> dict[str, Any]:
