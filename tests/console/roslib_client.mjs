@@ -14,12 +14,13 @@ const told = {};
 told.nodes = await asked((then, no) => ros.getNodes(then, no));
 told.actions = await asked((then, no) => ros.getActionServers(then, no));
 const topics = await asked((then, no) => ros.getTopicsAndRawTypes(then, no));
-told.raw = topics.typedefs_full_text[topics.topics.indexOf("/odom")].split("\n").slice(0, 2);
+told.raw = topics.typedefs_full_text[topics.topics.indexOf("/odom")].split("\n").slice(1, 3); // below a comment
 const details = await asked((then, no) => ros.getMessageDetails("geometry_msgs/Twist", then, no));
 told.decoded = ros.decodeTypeDefs(details);
 const speed = new Param({ ros, name: "/base:max_speed" });
 told.speed = await asked((then, no) => speed.get(then, no));
 told.set = await asked((then, no) => new Param({ ros, name: "/battery:runtime" }).set(120, then, no));
+told.missing = await asked((then, no) => new Param({ ros, name: "/robot_gui/videoTopic" }).get(then, no));
 told.names = await asked((then, no) => ros.getParams(then, no));
 
 for (const compression of ["cbor", "png"]) {

@@ -33,7 +33,7 @@ from rbxcompose.msgs.rcl_interfaces import (
 )
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.sdk.bound import Ended, Outcome
-from tests.console.clients import Client, Room
+from tests.console.clients import TELEOP, Client, Room
 from tests.loops import for_all
 
 NAVIGATE = "nav2_msgs/action/NavigateToPose"
@@ -457,6 +457,25 @@ def test_the_parameters_of_all_nodes_are_listed() -> None:
     assert answer["values"] == {"names": ["/battery:speed", "/base:speed"]}
 
 
+def test_types_are_described_with_their_constants() -> None:
+    client = Room().client()
+    status, _ = client.calls("/rosapi/message_details", {"type": "diagnostic_msgs/DiagnosticStatus"})["typedefs"]
+    assert status["constnames"] == ["OK", "WARN", "ERROR", "STALE"]
+    assert status["constvalues"] == ["0", "1", "2", "3"]
+    answer = client.calls("/rosapi/service_response_details", {"type": "action_msgs/CancelGoal"})["typedefs"][0]
+    assert (answer["constnames"][0], answer["constvalues"][:2]) == ("ERROR_NONE", ["0", "1"])
+
+
+def test_raw_types_are_the_texts_of_all_that_is_in_them() -> None:
+    room = Room()
+    room.graph.known |= {"/diagnostics": "diagnostic_msgs/msg/DiagnosticArray", "/toy": "toy_msgs/msg/Toy", "/odd": "a"}
+    found = room.client().calls("/rosapi/topics_and_raw_types")
+    texts = dict(zip(found["topics"], found["typedefs_full_text"], strict=True))
+    assert "float64 x" in texts[TELEOP].partition("MSG: geometry_msgs/Vector3\n")[2]
+    assert "byte STALE=3" in texts["/diagnostics"].partition("MSG: diagnostic_msgs/DiagnosticStatus\n")[2]
+    assert (texts["/toy"], texts["/odd"]) == ("", "")
+
+
 def test_types_are_described_with_all_that_is_in_them() -> None:
     client = Room().client()
     types = client.calls("/rosapi/message_details", {"type": "geometry_msgs/Twist"})["typedefs"]
@@ -466,7 +485,5 @@ def test_types_are_described_with_all_that_is_in_them() -> None:
     assert request["fieldtypes"] == ["bool"]
     goal = client.calls("/rosapi/action_goal_details", {"type": NAVIGATE})["typedefs"]
     assert goal[0]["fieldnames"] == ["pose", "behavior_tree"]
-    texts = client.calls("/rosapi/topics_and_raw_types")["typedefs_full_text"]
-    assert "MSG: geometry_msgs/Vector3\nfloat64 x" in texts[2]
     assert client.calls("/rosapi/action_servers") == {"action_servers": ["/go_to"]}
     assert client.calls("/rosapi/node_details", {"node": "base"})["publishing"] == ["/odom"]

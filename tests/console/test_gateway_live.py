@@ -330,7 +330,7 @@ def test_roslib_does_all_that_pages_do(robot: Robot) -> None:
     assert "/go_to" in told["actions"]
     assert told["raw"] == ["std_msgs/Header header", "string child_frame_id"]
     assert set(told["decoded"]) == {"linear", "angular"}
-    assert (told["speed"], "/base:max_speed" in told["names"]) == (0.5, True)
+    assert (told["speed"], told["missing"], "/base:max_speed" in told["names"]) == (0.5, None, True)
     assert told["cbor"] == told["png"] == ["base_footprint", 36]
     assert told["fed_back"]
     assert "there is no action '/nothing'" in told["refused"]

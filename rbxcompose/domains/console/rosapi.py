@@ -6,11 +6,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Protocol
 
 from rbxcompose.domains.console.json_messages import WrongMessageError
-from rbxcompose.msgs import registry
+from rbxcompose.msgs import packages, registry
 from rbxcompose.msgs.definitions import FieldShape, FieldType, parse_type
 from rbxcompose.msgs.types import Message
 
-_LINE = "=" * 80
 _EXAMPLES = {"string": "", "wstring": "", "bool": False}
 _HOST = "localhost"
 _VERSION = {"version": 2, "distro": "jazzy"}  # the release whose types and wire format the bus has
@@ -140,18 +139,19 @@ _ANSWERS: Mapping[str, Callable[..., dict[str, Any]]] = {
 
 def _typedefs(message: type[Message]) -> Iterator[dict[str, Any]]:
     """Yield what a message and those within it are made of, each once."""
-    waiting, seen = [message], {message.TYPE}
+    waiting, seen, structures = [message], {message.TYPE}, registry.chosen().structures
     while waiting:
         current = waiting.pop(0)
         types = {name: parse_type(text) for name, text in current.FIELDS.items()}
+        constants = structures[current.TYPE].constants if current.TYPE in structures else ()
         yield {
             "type": _bare(current.TYPE),
             "fieldnames": list(types),
             "fieldtypes": [_bare(type_.base) for type_ in types.values()],
             "fieldarraylen": [_length(type_) for type_ in types.values()],
             "examples": [_example(type_.base, type_.shape) for type_ in types.values()],
-            "constnames": [],
-            "constvalues": [],
+            "constnames": [constant.name for constant in constants],
+            "constvalues": [str(constant.value) for constant in constants],
         }
         for type_ in types.values():
             if type_.is_message and type_.base not in seen:
@@ -166,17 +166,11 @@ def _length(type_: FieldType) -> int:
 
 
 def _definition(type_: str) -> str:
-    """Return the text of a message and those within it, as ROS 1 concatenates them; empty if it is not known here."""
+    """Return the text of a message and those within it; empty if there is none here."""
     try:
-        message = registry.message(type_)
+        return packages.whole_text(registry.message(type_).TYPE)
     except KeyError:
         return ""
-    texts: list[str] = []
-    for typedef in _typedefs(message):
-        of = registry.message(registry.full_name(typedef["type"], "msg"))
-        lines = [f"{text.replace('/msg/', '/')} {name}" for name, text in of.FIELDS.items()]
-        texts.append("\n".join((*((_LINE, f"MSG: {typedef['type']}") if texts else ()), *lines)))
-    return "\n".join(texts)
 
 
 def _example(base: str, shape: FieldShape) -> str:
