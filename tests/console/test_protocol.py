@@ -287,7 +287,25 @@ def test_rosapi_answers_with_and_without_a_slash() -> None:
         assert client.calls(f"{prefix}rosapi/subscribers", {"topic": "odom"}) == {"subscribers": []}
         assert client.calls(f"{prefix}rosapi/nodes") == {"nodes": ["/base"]}
         assert client.calls(f"{prefix}rosapi/get_time")["time"] == {"sec": 5, "nanosec": 7, "secs": 5, "nsecs": 7}
-        assert "/console/stop" in client.calls(f"{prefix}rosapi/services")["services"]
+
+
+def test_each_listed_service_has_a_type_by_which_it_is_found() -> None:
+    client = Room().client()
+    services = client.calls("/rosapi/services")["services"]
+    types = {name: client.calls("/rosapi/service_type", [name])["type"] for name in services}
+    for name, type_ in types.items():
+        for spelling in (type_, type_.replace("/srv/", "/")):
+            assert name in client.calls("/rosapi/services_for_type", [spelling])["services"]
+    assert types["/rosapi/topics_for_type"] == "rosapi_msgs/srv/TopicsForType"
+    assert types["/rosapi/get_param"] == "rosapi_msgs/srv/GetParam"
+    assert types["/rosapi/get_ros_version"] == "rosapi_msgs/srv/GetROSVersion"
+    assert types["/rosapi/action_servers"] == "rosapi_msgs/srv/GetActionServers"
+
+
+def test_rosapi_lists_the_interfaces_of_each_kind() -> None:
+    found = Room().client().calls("/rosapi/interfaces")["interfaces"]
+    assert {"geometry_msgs/msg/Twist", "std_srvs/srv/SetBool", "nav2_msgs/action/NavigateToPose"} < {*found}
+    assert found == sorted(found)
 
 
 def test_anyone_may_stop_and_release_the_robot() -> None:

@@ -801,7 +801,7 @@ class Bridge:
 
     def _service_target(self, op: str, service: str, written: str = "") -> OperationTarget:
         actions, whole = self._graph.actions(), _whole(service)
-        type_ = "" if service in _OWN or service in _ROSAPI else self._graph.services().get(service, "")
+        type_ = "" if service in _OWN or service in rosapi.TYPES else self._graph.services().get(service, "")
         if service == f"{whole}{_CANCELS}" and whole in actions:
             type_ = "action_msgs/srv/CancelGoal"  # hidden, as in ROS 2, but pages cancel goals that others sent
         if (paused := service.removesuffix(f"/{PAUSE}")) in actions:
@@ -981,13 +981,13 @@ class Bridge:
         given, values = data.get("args"), None
         if target.name in _OWN:
             values = _OWN[target.name](self, client, _named(given, _DRIVE_ARGUMENTS), number)
-        elif target.name in _ROSAPI:
+        elif target.name in rosapi.TYPES:
             api = target.name.removeprefix("/rosapi/")
+            named = _named(given, rosapi.ARGUMENTS[api])
             if api in _PARAMETERS:
-                ask, names = _PARAMETERS[api]
-                values = ask(self, _named(given, names), number)
+                values = _PARAMETERS[api](self, named, number)
             else:
-                values = self._rosapi(api, _named(given, rosapi.ARGUMENTS[api]))
+                values = rosapi.answer(api, named, self._graph, self._stamp)
         else:
             self._call(number, target, given, data)
         if values is not None:
@@ -1008,7 +1008,7 @@ class Bridge:
         service, type_ = target.name, data.get("type")
         if not isinstance(type_, str) or not _TYPE.fullmatch(type_):
             raise BadFrameError("'type' is the name of a type of services")
-        if service in self._graph.services() or service in self._served or service in _OWN or service in _ROSAPI:
+        if service in self._graph.services() or service in self._served or service in _OWN or service in rosapi.TYPES:
             raise BadFrameError(f"'{service}' is served already")
         if sum(served.client == client.number for served in self._served.values()) >= MOST_SUBSCRIPTIONS:
             raise BadFrameError(f"a client serves at most {MOST_SUBSCRIPTIONS} services")
@@ -1378,13 +1378,6 @@ class Bridge:
             self._note_when_done(client, number, _CHANGES[name])
         self._requests.append(EditMission(number, request))
 
-    def _rosapi(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the answer of `/rosapi/NAME`."""
-        found = rosapi.answer(name, given, self._graph, self._stamp)
-        if name == "services":
-            found["services"] = sorted({*found["services"], *_OWN, *_ROSAPI})
-        return found
-
     # What they share
 
     def _message_on(self, topic: str, data: Mapping[str, Any]) -> type[Message]:
@@ -1565,14 +1558,13 @@ _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str,
     **{f"/console/robot/{name}": partial(Bridge._robot_service, name=name) for name in ROBOT_TEXTS},
 }
 """Services of the gateway: what answers, or None if the answer comes later."""
-_PARAMETERS: Mapping[str, tuple[Callable[[Bridge, Mapping[str, Any], int], dict[str, Any] | None], tuple[str, ...]]] = {
-    "get_param": (Bridge._get_param, ("name", "default_value")),
-    "get_param_names": (Bridge._get_param_names, ()),
-    "has_param": (Bridge._has_param, ("name",)),
-    "set_param": (Bridge._set_param, ("name", "value")),
+_PARAMETERS: Mapping[str, Callable[[Bridge, Mapping[str, Any], int], dict[str, Any] | None]] = {
+    "get_param": Bridge._get_param,
+    "get_param_names": Bridge._get_param_names,
+    "has_param": Bridge._has_param,
+    "set_param": Bridge._set_param,
 }
-"""Services of rosapi that ask nodes, each with its arguments."""
-_ROSAPI = frozenset(f"/rosapi/{name}" for name in (*rosapi.ARGUMENTS, *_PARAMETERS))
+"""Services of rosapi that ask nodes."""
 _DRIVE_ARGUMENTS = ("take", "name")
 
 

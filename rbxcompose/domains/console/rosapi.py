@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from rbxcompose.domains.console.json_messages import WrongMessageError
 from rbxcompose.msgs import packages, registry
-from rbxcompose.msgs.definitions import FieldShape, FieldType, parse_type
+from rbxcompose.msgs.definitions import KINDS, FieldShape, FieldType, parse_type
 from rbxcompose.msgs.types import Message
 
 _EXAMPLES = {"string": "", "wstring": "", "bool": False}
@@ -52,7 +52,7 @@ class GraphView(Protocol):
 
 
 ARGUMENTS: Mapping[str, tuple[str, ...]] = {
-    **dict.fromkeys(("action_servers", "get_ros_version", "get_time", "nodes", "services"), ()),
+    **dict.fromkeys(("action_servers", "get_ros_version", "get_time", "interfaces", "nodes", "services"), ()),
     **dict.fromkeys(("topics", "topics_and_raw_types"), ()),
     **dict.fromkeys(("publishers", "subscribers", "topic_type"), ("topic",)),
     **dict.fromkeys(("services_for_type", "topics_for_type"), ("type",)),
@@ -62,8 +62,17 @@ ARGUMENTS: Mapping[str, tuple[str, ...]] = {
     "action_type": ("action",),
     "service_providers": ("service",),
     "node_details": ("node",),
+    "get_param": ("name", "default_value"),
+    "get_param_names": (),
+    "has_param": ("name",),
+    "set_param": ("name", "value"),
 }
-"""The services of this module, each with its arguments."""
+"""The services of rosapi, each with its arguments."""
+_TYPE_NAMES = {"action_servers": "GetActionServers", "get_ros_version": "GetROSVersion"}
+TYPES: Mapping[str, str] = {
+    f"/rosapi/{name}": f"rosapi_msgs/srv/{_TYPE_NAMES.get(name) or name.title().replace('_', '')}" for name in ARGUMENTS
+}
+"""Their types, by their names on the bus."""
 _PARTS = {
     "service_request_details": ("srv", "Request"),
     "service_response_details": ("srv", "Response"),
@@ -77,7 +86,7 @@ def answer(name: str, given: Mapping[str, Any], graph: GraphView, stamp: int) ->
     """Return the answer of `/rosapi/NAME`.
 
     Args:
-        name: one of `ARGUMENTS`.
+        name: one of `ARGUMENTS`, but none of a parameter.
         given: its arguments.
         graph: what is on the bus.
         stamp: the time [ns].
@@ -107,6 +116,11 @@ def _topics_and_raw_types(graph: GraphView) -> dict[str, Any]:
     }
 
 
+def _services(graph: GraphView) -> dict[str, str]:
+    """Return the types of the services that clients find: those of the bus, and of rosapi."""
+    return {**graph.services(), **TYPES}
+
+
 def _node_details(graph: GraphView, node: str) -> dict[str, Any]:
     wanted = absolute(node)
     return {
@@ -119,18 +133,19 @@ def _node_details(graph: GraphView, node: str) -> dict[str, Any]:
 _ANSWERS: Mapping[str, Callable[..., dict[str, Any]]] = {
     "topics": lambda graph: {"topics": list(graph.topics()), "types": list(graph.topics().values())},
     "topics_and_raw_types": _topics_and_raw_types,
-    "services": lambda graph: {"services": sorted(graph.services())},
+    "interfaces": lambda graph: {"interfaces": sorted(name for kind in KINDS for name in registry.names(kind))},
+    "services": lambda graph: {"services": sorted(_services(graph))},
     "action_servers": lambda graph: {"action_servers": sorted(graph.actions())},
     "action_type": lambda graph, action: {"type": graph.actions().get(absolute(action), "")},
     "nodes": lambda graph: {"nodes": list(graph.nodes())},
     "node_details": _node_details,
     "topic_type": lambda graph, topic: {"type": graph.topics().get(absolute(topic), "")},
-    "service_type": lambda graph, service: {"type": graph.services().get(absolute(service), "")},
+    "service_type": lambda graph, service: {"type": _services(graph).get(absolute(service), "")},
     "service_node": lambda graph, service: {"node": next(iter(graph.servers(absolute(service))), "")},
-    "service_host": lambda graph, service: {"host": _HOST if absolute(service) in graph.services() else ""},
-    "service_providers": lambda graph, type_: {"providers": _of_type(graph.services(), type_, "srv")},
+    "service_host": lambda graph, service: {"host": _HOST if absolute(service) in _services(graph) else ""},
+    "service_providers": lambda graph, type_: {"providers": _of_type(_services(graph), type_, "srv")},
     "topics_for_type": lambda graph, type_: {"topics": _of_type(graph.topics(), type_, "msg")},
-    "services_for_type": lambda graph, type_: {"services": _of_type(graph.services(), type_, "srv")},
+    "services_for_type": lambda graph, type_: {"services": _of_type(_services(graph), type_, "srv")},
     "publishers": lambda graph, topic: {"publishers": list(graph.publishers(absolute(topic)))},
     "subscribers": lambda graph, topic: {"subscribers": list(graph.subscribers(absolute(topic)))},
     "get_ros_version": lambda graph: dict(_VERSION),
