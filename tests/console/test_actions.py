@@ -178,6 +178,29 @@ def test_a_goal_of_another_client_is_canceled_by_the_service_of_its_action() -> 
     assert bytes(call.request.goal_info.goal_id.uuid) == bytes(range(16))  # type: ignore[attr-defined]
 
 
+@pytest.mark.parametrize(
+    ("newer", "said", "state", "text"),
+    [
+        ("/go_to", "", 2, "replaced by a newer goal"),
+        ("/move_base", "replaced", 2, "replaced"),
+        ("", "no way there", 4, "no way there"),
+        ("/elsewhere", "", 4, ""),
+    ],
+)
+def test_a_goal_that_a_newer_one_replaces_is_preempted(newer: str, said: str, state: int, text: str) -> None:
+    room = Room()
+    client = room.client()
+    client.does("subscribe", topic="/go_to/result")
+    client.does("publish", topic="/go_to/goal", msg={"goal": {}})
+    number = sent(room).number
+    room.graph.acted["/elsewhere"] = "nav2_msgs/action/Wait"
+    if newer:
+        client.does("publish", topic=f"{newer}/goal", msg={"goal": {}})
+    room.bridge.ended(number, Ended(Outcome.ABORTED, NavigateToPose.Result(error_msg=said)))
+    (result,) = client.gets()
+    assert (result["msg"]["status"]["status"], result["msg"]["status"]["text"]) == (state, text)
+
+
 def test_an_empty_cancel_ends_all_goals_of_the_action() -> None:
     room = Room()
     client = room.client()

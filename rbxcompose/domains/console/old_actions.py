@@ -10,7 +10,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from rbxcompose.sdk.bound import Outcome
+from rbxcompose.missions.execution.errands import text_in
+from rbxcompose.sdk.bound import Ended, Outcome
 
 _TOPIC = re.compile(r"(?P<action>/.+)/(?P<part>goal|cancel|status|feedback|result)")
 _STANDS_FOR = {"/move_base": "nav2_msgs/action/NavigateToPose"}
@@ -50,6 +51,22 @@ def goal_of(message: Mapping[str, Any], fields: Mapping[str, str]) -> tuple[obje
 def feedback_of(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return feedback with its fields by their old names, too."""
     return {**values, **{old: values[new] for new, old in _OLD_NAMES.items() if new in values}}
+
+
+def end_of(end: Ended[Any], values: Mapping[str, Any], *, is_replaced: bool) -> tuple[int, str]:
+    """Return the state in which a goal ended, and why.
+
+    ROS 2 aborts a goal that another one replaces, ROS 1 preempts it.
+
+    Args:
+        end: how it ended on the bus.
+        values: the fields of its result.
+        is_replaced: whether a newer goal is open.
+    """
+    text = end.message or text_in(values)
+    if end.outcome is Outcome.ABORTED and is_replaced:
+        return STATES[Outcome.CANCELED], text or "replaced by a newer goal"
+    return STATES[end.outcome], text
 
 
 def status_of(identity: object, state: int, stamp: Mapping[str, Any], text: str = "") -> dict[str, Any]:

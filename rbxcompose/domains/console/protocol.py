@@ -730,9 +730,10 @@ class Bridge:
             client.open_calls -= 1
         values = None if end.result is None else to_json(end.result)
         if goal.is_old:
-            state = old_actions.STATES[end.outcome]
-            status = old_actions.status_of(goal.id, state, self._old_stamp, end.message)
-            self._note_old(goal, state, end.message)
+            is_newer = any(other > number and each.action == goal.action for other, each in self._goals.items())
+            state, text = old_actions.end_of(end, values or {}, is_replaced=is_newer)
+            status = old_actions.status_of(goal.id, state, self._old_stamp, text)
+            self._note_old(goal, state, text)
             self._pass_old(goal.name, "result", status=status, result=values or {})
         else:
             said = end.message if values is None else values
