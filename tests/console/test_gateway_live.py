@@ -38,6 +38,7 @@ from rbxcompose.sdk.ports import Qos
 from tests.cli.live_robot import PATIENCE, Robot
 from tests.conftest import ROOT
 from tests.console.browser import CHROMIUM, chromium, console
+from tests.console.foxglove_client import Foxglove
 
 TELEOP = "/cmd_vel/teleop"
 
@@ -341,42 +342,12 @@ def test_roslib_does_all_that_pages_do(robot: Robot) -> None:
     assert '"error_code":4' in told["unwanted"]["said"]
 
 
-class Foxglove:
-    """A client of Foxglove's protocol, as far as a test needs it."""
-
-    def __init__(self, socket: ClientConnection) -> None:
-        self.socket = socket
-        self.offered: dict[str, dict[str, Any]] = {}  # topics and services, by name
-
-    async def says(self, op: str, **more: Any) -> None:
-        await self.socket.send(json.dumps({"op": op, **more}))
-
-    async def gets(self, op: str | int) -> Any:
-        """Return the next frame of an operation: a text, or bytes of the kind."""
-        while True:
-            frame = await asyncio.wait_for(self.socket.recv(), 10)
-            if isinstance(frame, bytes):
-                if frame[0] == op:
-                    return frame
-                continue
-            told = json.loads(frame)
-            for each in (*told.get("channels", ()), *told.get("services", ())):
-                self.offered[each.get("topic") or each["name"]] = each
-            if told["op"] == op:
-                return told
-
-    async def knows(self, *names: str) -> None:
-        """Wait until all of these are offered."""
-        while not self.offered.keys() >= {*names}:
-            await self.gets("advertise" if "/odom" not in self.offered else "advertiseServices")
-
-
 async def at_foxglove() -> ClientConnection:
     """Return a connection as soon as it is served."""
     deadline = time.monotonic() + PATIENCE
     while True:
         try:
-            return await connect(f"ws://127.0.0.1:{FOXGLOVE}", subprotocols=[websockets.Subprotocol("foxglove.sdk.v1")])
+            return await Foxglove.at(FOXGLOVE)
         except OSError:
             if time.monotonic() > deadline:
                 raise
@@ -389,7 +360,7 @@ def test_foxglove_sees_topics_calls_services_and_sets_parameters_but_does_not_dr
     async def talk() -> None:
         async with await at_foxglove() as socket_:
             client = Foxglove(socket_)
-            await client.knows("/battery_level", "/set_battery_level", "/battery/get_parameters")
+            await client.knows("/battery_level", "/robot_description", "/set_battery_level", "/battery/get_parameters")
             level = client.offered["/battery_level"]
             assert (level["encoding"], level["schemaName"]) == ("cdr", "std_msgs/msg/Float32")
             assert "float32 data" in level["schema"]
@@ -399,6 +370,12 @@ def test_foxglove_sees_topics_calls_services_and_sets_parameters_but_does_not_dr
             assert (await client.gets(3))[1:5] == struct.pack("<I", service["id"])
             await client.says("subscribe", subscriptions=[{"id": 5, "channelId": level["id"]}])
             assert 50 < struct.unpack("<f", (await client.gets(1))[-4:])[0] <= 60
+            model = {"id": 6, "channelId": client.offered["/robot_description"]["id"]}
+            async with await at_foxglove() as other_socket:
+                for each in (client, Foxglove(other_socket)):
+                    await each.says("subscribe", subscriptions=[model])
+                    while (await each.gets(1))[1:5] != struct.pack("<I", 6):
+                        pass
             await client.says("setParameters", parameters=[{"name": "/battery.runtime", "value": 130}], id="a")
             (runtime,) = (await client.gets("parameterValues"))["parameters"]
             assert runtime["value"] == 130

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as NoAnswerInTimeError
 from dataclasses import field
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from rbxcompose.base.dataclass import dataclass
@@ -34,7 +35,9 @@ class RobotAccess:
     """What the server asks of the robot; each may be called in any thread."""
 
     listen: Callable[[str, Callable[[bytes], None]], Callable[[], None]]
-    """Pass the messages of a topic on as CDR, and return what ends that."""
+    """Pass the messages of a topic on as CDR, first those that are latched, and return what ends that."""
+    is_latched: Callable[[str], bool]
+    """Return whether the last message of a topic is kept for late subscribers."""
     publish: Callable[[str, Message], None]
     """Publish on a topic."""
     call: Callable[[str, type[Service[Any, Any]], Message], Future[Any]]
@@ -71,6 +74,7 @@ class FoxgloveServer:
         self._types: dict[str, str] = {}
         self._services: dict[str, str] = {}
         self._listening: dict[str, tuple[int, Callable[[], None]]] = {}  # clients of a topic, and what ends it
+        self._lock = Lock()  # of it: each client is served in a thread of its own
         self._clients: dict[int, _Client] = {}
         self._server = foxglove.start_server(
             name=name,
@@ -120,18 +124,26 @@ class FoxgloveServer:
     # What the library calls
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:
-        """Listen to a topic as long as somebody wants it."""
-        count, end = self._listening.get(channel.topic, (0, None))
+        """Listen to a topic as long as somebody wants it.
+
+        If it is latched, listen anew for each client: the library sends to all of them or none, so all get it again.
+        """
         log = self._channels[channel.topic].log
-        self._listening[channel.topic] = count + 1, end or self._robot.listen(channel.topic, log)
+        with self._lock:
+            count, end = self._listening.pop(channel.topic, (0, None))
+            if end is not None and self._robot.is_latched(channel.topic):
+                end()
+                end = None
+            self._listening[channel.topic] = count + 1, end or self._robot.listen(channel.topic, log)
 
     def on_unsubscribe(self, client: Client, channel: ChannelView) -> None:
         """Listen no more if nobody does."""
-        count, end = self._listening.pop(channel.topic, (1, lambda: None))
-        if count > 1:
-            self._listening[channel.topic] = count - 1, end
-        else:
-            end()
+        with self._lock:
+            count, end = self._listening.pop(channel.topic, (1, lambda: None))
+            if count > 1:
+                self._listening[channel.topic] = count - 1, end
+            else:
+                end()
 
     def on_client_advertise(self, client: Client, channel: ClientChannel) -> None:
         """Take what a client is going to publish, unless it may not."""

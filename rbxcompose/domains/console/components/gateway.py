@@ -925,7 +925,14 @@ class GatewaySession:
 
     def _serve_foxglove(self, port: int) -> None:
         """Serve Foxglove beside the page, as soon as the port is free; the page is served all the same."""
-        robot = RobotAccess(self._listen_raw, self._publish_soon, self._call_soon, resolve, self._refused_to_foxglove)
+        robot = RobotAccess(
+            listen=self._listen_raw,
+            is_latched=self._graph.is_latched,
+            publish=self._publish_soon,
+            call=self._call_soon,
+            full_name=resolve,
+            refused=self._refused_to_foxglove,
+        )
         try:
             self._foxglove = server = FoxgloveServer(robot, self._folder.path.name, port)
         except RuntimeError as error:

@@ -1,0 +1,79 @@
+"""The server for Foxglove, at a robot that is not there."""
+
+from __future__ import annotations
+
+import asyncio
+import struct
+from collections.abc import Awaitable, Callable, Iterator
+from concurrent.futures import Future
+from contextlib import AsyncExitStack
+from typing import Any
+
+import pytest
+
+from rbxcompose.bus.names import resolve
+from rbxcompose.domains.console.foxglove_server import FoxgloveServer, RobotAccess
+from rbxcompose.msgs.types import Message, Service
+from tests.console.foxglove_client import Foxglove
+
+pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")
+
+STRING = "std_msgs/msg/String"
+
+
+class FakeRobot:
+    """A robot with a model, which is latched, and a topic of messages that are lost on who comes too late."""
+
+    def __init__(self) -> None:
+        self.latched = {"/robot_description": [b"model"], "/tf_static": [b"base", b"arm"]}
+        self.listeners: list[tuple[str, Callable[[bytes], None]]] = []
+        access = RobotAccess(self.listen, self.latched.__contains__, self.publish, self.call, resolve, lambda topic: "")
+        self.server = FoxgloveServer(access, "fake", 0)
+        self.server.offer(dict.fromkeys((*self.latched, "/talk"), STRING), {})
+
+    def listen(self, topic: str, take: Callable[[bytes], None]) -> Callable[[], None]:
+        listener = topic, take
+        self.listeners.append(listener)
+        for message in self.latched.get(topic, ()):
+            take(message)
+        return lambda: self.listeners.remove(listener)
+
+    def publish(self, topic: str, message: Message) -> None:
+        raise NotImplementedError
+
+    def call(self, name: str, type_: type[Service[Any, Any]], request: Message) -> Future[Any]:
+        raise NotImplementedError
+
+
+@pytest.fixture
+def robot() -> Iterator[FakeRobot]:
+    robot = FakeRobot()
+    yield robot
+    robot.server.close()
+
+
+def talk(robot: FakeRobot, what: Callable[[Foxglove, Foxglove], Awaitable[None]]) -> None:
+    """Let two clients talk to the server."""
+
+    async def run() -> None:
+        async with AsyncExitStack() as stack:
+            sockets = [await stack.enter_async_context(Foxglove.at(robot.server.port)) for _ in range(2)]
+            await what(*map(Foxglove, sockets))
+
+    asyncio.run(run())
+
+
+def test_every_client_gets_what_is_latched_also_beside_others(robot: FakeRobot) -> None:
+    async def both(first: Foxglove, second: Foxglove) -> None:
+        for client in (first, second):
+            await client.gets("advertise")
+            for number, topic in enumerate(robot.latched):
+                channel = client.offered[topic]["id"]
+                await client.says("subscribe", subscriptions=[{"id": number, "channelId": channel}])
+                got = [await client.gets(1) for _ in robot.latched[topic]]
+                assert [(frame[1:5], frame[13:]) for frame in got] == [
+                    (struct.pack("<I", number), message) for message in robot.latched[topic]
+                ]
+        assert sorted(topic for topic, _ in robot.listeners) == sorted(robot.latched)
+
+    talk(robot, both)
