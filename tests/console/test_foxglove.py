@@ -13,12 +13,15 @@ import pytest
 
 from rbxcompose.bus.names import resolve
 from rbxcompose.domains.console.foxglove_server import FoxgloveServer, RobotAccess
+from rbxcompose.msgs.rcl_interfaces import GetParameters, ParameterValue
 from rbxcompose.msgs.types import Message, Service
+from rbxcompose.sdk.parameters import to_message
 from tests.console.foxglove_client import Foxglove
 
 pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")
 
 STRING = "std_msgs/msg/String"
+SERVICES = {"/battery/get_parameters": GetParameters.TYPE}
 
 
 class FakeRobot:
@@ -26,10 +29,12 @@ class FakeRobot:
 
     def __init__(self) -> None:
         self.latched = {"/robot_description": [b"model"], "/tf_static": [b"base", b"arm"]}
+        self.parameters: dict[str, object] = {"runtime": 90.0, "names": ("a", "b")}
+        self.called: list[str] = []
         self.listeners: list[tuple[str, Callable[[bytes], None]]] = []
         access = RobotAccess(self.listen, self.latched.__contains__, self.publish, self.call, resolve, lambda topic: "")
         self.server = FoxgloveServer(access, "fake", 0)
-        self.server.offer(dict.fromkeys((*self.latched, "/talk"), STRING), {})
+        self.server.offer(dict.fromkeys((*self.latched, "/talk"), STRING), SERVICES)
 
     def listen(self, topic: str, take: Callable[[bytes], None]) -> Callable[[], None]:
         listener = topic, take
@@ -42,7 +47,13 @@ class FakeRobot:
         raise NotImplementedError
 
     def call(self, name: str, type_: type[Service[Any, Any]], request: Message) -> Future[Any]:
-        raise NotImplementedError
+        """Answer for parameters of the battery; nobody else ever answers."""
+        future: Future[Any] = Future()
+        self.called.append(name)
+        if isinstance(request, GetParameters.Request) and name in SERVICES:
+            values = [to_message(self.parameters.get(name)) or ParameterValue() for name in request.names]
+            future.set_result(GetParameters.Response(values=tuple(values)))
+        return future
 
 
 @pytest.fixture
@@ -77,3 +88,16 @@ def test_every_client_gets_what_is_latched_also_beside_others(robot: FakeRobot) 
         assert sorted(topic for topic, _ in robot.listeners) == sorted(robot.latched)
 
     talk(robot, both)
+
+
+def test_parameters_that_nobody_has_are_left_out_and_hold_nobody_up(robot: FakeRobot) -> None:
+    names = ["/nix.x", "~nay.y", "/battery.nix", "/battery.runtime", "/battery.names"]
+
+    async def ask(client: Foxglove, other: Foxglove) -> None:
+        await client.says("getParameters", parameterNames=names, id="a")
+        got = (await client.gets("parameterValues"))["parameters"]
+        values = {each["name"]: each["value"] for each in got}
+        assert values == {"/battery.runtime": 90.0, "/battery.names": '["a", "b"]'}
+        assert robot.called == ["/battery/get_parameters"]
+
+    talk(robot, ask)

@@ -7,7 +7,7 @@ the library, so that these wait for a loop that is busy.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as NoAnswerInTimeError
 from dataclasses import field
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.msgs import packages, registry
 from rbxcompose.msgs.cdr import CdrError, decode, encode
-from rbxcompose.msgs.rcl_interfaces import GetParameters, ListParameters, Parameter, SetParameters
+from rbxcompose.msgs.rcl_interfaces import GetParameters, ListParameters, Parameter, ParameterValue, SetParameters
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.sdk import parameters
 
@@ -249,21 +249,19 @@ class FoxgloveServer:
         return foxglove.Service(name, schema=whole, handler=handle)
 
     def _answer(self, name: str, type_: type[Service[Any, Any]], request: Message) -> Any:
+        """Return the response, None without one: at once if nobody serves it, since all clients wait meanwhile."""
         try:
+            if self._robot.full_name(name) not in self._services:
+                return None
             return self._robot.call(name, type_, request).result(PATIENCE)
-        except (NoAnswerInTimeError, RuntimeError):
+        except (NoAnswerInTimeError, RuntimeError, ValueError):
             return None
 
     def _values(self, names: list[str]) -> list[foxglove.Parameter]:
-        import foxglove
-
-        found = []
+        found: list[foxglove.Parameter] = []
         for node, wanted in _by_node(names).items():
             got = self._answer(f"{node}/get_parameters", GetParameters, GetParameters.Request(names=tuple(wanted)))
-            for name, message in zip(wanted, got.values if got is not None else (), strict=False):
-                value = parameters.from_message(message)
-                plain = value if isinstance(value, bool | int | float | str) else json.dumps(value, default=list)
-                found.append(foxglove.Parameter(f"{node}{_SEPARATOR}{name}", value=plain))
+            found += _shown(node, zip(wanted, got.values if got is not None else (), strict=False))
         return found
 
     def _set(self, wanted: foxglove.Parameter) -> None:
@@ -293,6 +291,18 @@ def _definition(type_name: str) -> str | None:
         return packages.whole_text(registry.message(type_name).TYPE)
     except (KeyError, OSError):
         return None
+
+
+def _shown(node: str, values: Iterable[tuple[str, ParameterValue]]) -> list[foxglove.Parameter]:
+    """Return the parameters of a node for a client, without those that are not set or do not exist."""
+    import foxglove
+
+    found = []
+    for name, message in values:
+        if (value := parameters.from_message(message)) is not None:
+            plain = value if isinstance(value, bool | int | float | str) else json.dumps(value, default=list)
+            found.append(foxglove.Parameter(f"{node}{_SEPARATOR}{name}", value=plain))
+    return found
 
 
 def _by_node(names: list[str]) -> dict[str, list[str]]:
