@@ -13,13 +13,15 @@ import pytest
 
 from rbxcompose.bus.names import resolve
 from rbxcompose.domains.console.foxglove_server import FoxgloveServer, RobotAccess
-from rbxcompose.msgs.rcl_interfaces import GetParameters, ParameterValue
+from rbxcompose.msgs.cdr import encode
+from rbxcompose.msgs.rcl_interfaces import GetParameters, Parameter, ParameterEvent, ParameterValue
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.sdk.parameters import to_message
 from tests.console.foxglove_client import Foxglove
 
 pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")
 
+EVENTS = "/parameter_events"
 STRING = "std_msgs/msg/String"
 SERVICES = {"/battery/get_parameters": GetParameters.TYPE}
 
@@ -34,7 +36,8 @@ class FakeRobot:
         self.listeners: list[tuple[str, Callable[[bytes], None]]] = []
         access = RobotAccess(self.listen, self.latched.__contains__, self.publish, self.call, resolve, lambda topic: "")
         self.server = FoxgloveServer(access, "fake", 0)
-        self.server.offer(dict.fromkeys((*self.latched, "/talk"), STRING), SERVICES)
+        topics = {**dict.fromkeys((*self.latched, "/talk"), STRING), EVENTS: ParameterEvent.TYPE}
+        self.server.offer(topics, SERVICES)
 
     def listen(self, topic: str, take: Callable[[bytes], None]) -> Callable[[], None]:
         listener = topic, take
@@ -42,6 +45,13 @@ class FakeRobot:
         for message in self.latched.get(topic, ()):
             take(message)
         return lambda: self.listeners.remove(listener)
+
+    def changes(self, name: str, value: object) -> None:
+        changed = (Parameter(name=name, value=to_message(value) or ParameterValue()),)
+        event = encode(ParameterEvent(node="/battery", changed_parameters=changed))
+        for topic, take in self.listeners:
+            if topic == EVENTS:
+                take(event)
 
     def publish(self, topic: str, message: Message) -> None:
         raise NotImplementedError
@@ -85,7 +95,7 @@ def test_every_client_gets_what_is_latched_also_beside_others(robot: FakeRobot) 
                 assert [(frame[1:5], frame[13:]) for frame in got] == [
                     (struct.pack("<I", number), message) for message in robot.latched[topic]
                 ]
-        assert sorted(topic for topic, _ in robot.listeners) == sorted(robot.latched)
+        assert sorted(topic for topic, _ in robot.listeners) == sorted([*robot.latched, EVENTS])
 
     talk(robot, both)
 
@@ -101,3 +111,16 @@ def test_parameters_that_nobody_has_are_left_out_and_hold_nobody_up(robot: FakeR
         assert robot.called == ["/battery/get_parameters"]
 
     talk(robot, ask)
+
+
+def test_who_wants_a_parameter_gets_its_changes_whoever_makes_them(robot: FakeRobot) -> None:
+    async def subscribe(client: Foxglove, other: Foxglove) -> None:
+        await client.says("subscribeParameterUpdates", parameterNames=["/battery.runtime"])
+        await client.says("getParameters", parameterNames=["/battery.names"], id="a")  # answered after that
+        assert (await client.gets("parameterValues"))["id"] == "a"
+        robot.changes("names", ("c",))
+        robot.changes("runtime", 80.0)
+        (runtime,) = (await client.gets("parameterValues"))["parameters"]
+        assert (runtime["name"], runtime["value"]) == ("/battery.runtime", 80.0)
+
+    talk(robot, subscribe)

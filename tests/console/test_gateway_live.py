@@ -382,6 +382,12 @@ def test_foxglove_sees_topics_calls_services_and_sets_parameters_but_does_not_dr
             await client.says("getParameters", parameterNames=[], id="b")
             names = [each["name"] for each in (await client.gets("parameterValues"))["parameters"]]
             assert {"/battery.runtime", "/base.max_speed"} <= {*names}
+            await client.says("subscribeParameterUpdates", parameterNames=["/battery.runtime"])
+            async with connect(f"ws://{HOST}/rosbridge") as page:
+                change = {"name": "runtime", "value": {"type": 3, "double_value": 120.0}}
+                await Browser(page).calls("/battery/set_parameters", parameters=[change])
+            (runtime,) = (await client.gets("parameterValues"))["parameters"]
+            assert (runtime["name"], runtime["value"]) == ("/battery.runtime", 120)
             wrong = {"encoding": "cdr", "schemaName": "geometry_msgs/msg/Twist"}
             for number, spelling in enumerate((TELEOP, TELEOP.lstrip("/"))):
                 await client.says("advertise", channels=[{"id": number, "topic": spelling, **wrong}])

@@ -17,7 +17,14 @@ from typing import TYPE_CHECKING, Any
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.msgs import packages, registry
 from rbxcompose.msgs.cdr import CdrError, decode, encode
-from rbxcompose.msgs.rcl_interfaces import GetParameters, ListParameters, Parameter, ParameterValue, SetParameters
+from rbxcompose.msgs.rcl_interfaces import (
+    GetParameters,
+    ListParameters,
+    Parameter,
+    ParameterEvent,
+    ParameterValue,
+    SetParameters,
+)
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.sdk import parameters
 
@@ -27,6 +34,7 @@ if TYPE_CHECKING:
 
 CDR, ROS = "cdr", "ros2msg"
 PATIENCE = 5.0  # [s] for an answer of the robot
+_EVENTS = "/parameter_events"  # the topic on which nodes say which of their parameters have changed
 _SEPARATOR = "."  # between the name of a node and that of its parameter
 
 
@@ -74,6 +82,7 @@ class FoxgloveServer:
         self._types: dict[str, str] = {}
         self._services: dict[str, str] = {}
         self._listening: dict[str, tuple[int, Callable[[], None]]] = {}  # clients of a topic, and what ends it
+        self._end_events: Callable[[], None] | None = None  # once it listens to them
         self._lock = Lock()  # of it: each client is served in a thread of its own
         self._clients: dict[int, _Client] = {}
         self._server = foxglove.start_server(
@@ -97,6 +106,8 @@ class FoxgloveServer:
         for _, end in self._listening.values():
             end()
         self._listening.clear()
+        if self._end_events is not None:
+            self._end_events()
 
     def offer(self, topics: Mapping[str, str], services: Mapping[str, str]) -> None:
         """Offer just these topics and services, each with its type; types that are not known here are left out."""
@@ -120,6 +131,8 @@ class FoxgloveServer:
         if new:
             self._server.add_services([*new.values()])
             self._services |= {name: services[name] for name in new}
+        if self._end_events is None and topics.get(_EVENTS) == ParameterEvent.TYPE:
+            self._end_events = self._robot.listen(_EVENTS, self._push_changes)
 
     # What the library calls
 
@@ -206,7 +219,7 @@ class FoxgloveServer:
         return self._values([wanted.name for wanted in parameters])
 
     def on_parameters_subscribe(self, param_names: list[str]) -> None:
-        """Do nothing: clients get what they set."""
+        """Do nothing: the library knows who wants which of all that is pushed."""
 
     def on_parameters_unsubscribe(self, param_names: list[str]) -> None:
         """Do nothing."""
@@ -263,6 +276,12 @@ class FoxgloveServer:
             got = self._answer(f"{node}/get_parameters", GetParameters, GetParameters.Request(names=tuple(wanted)))
             found += _shown(node, zip(wanted, got.values if got is not None else (), strict=False))
         return found
+
+    def _push_changes(self, event: bytes) -> None:
+        """Push the parameters that have changed, whoever changed them, to the clients that want them."""
+        told = decode(ParameterEvent, event)
+        changed = ((each.name, each.value) for each in (*told.new_parameters, *told.changed_parameters))
+        self._server.publish_parameter_values(_shown(told.node, changed))
 
     def _set(self, wanted: foxglove.Parameter) -> None:
         value = wanted.get_value()
