@@ -7,6 +7,7 @@ import struct
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import Future
 from contextlib import AsyncExitStack
+from queue import Queue
 from typing import Any
 
 import pytest
@@ -15,6 +16,7 @@ from rbxcompose.bus.names import resolve
 from rbxcompose.domains.console.foxglove_server import FoxgloveServer, RobotAccess
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.rcl_interfaces import GetParameters, Parameter, ParameterEvent, ParameterValue
+from rbxcompose.msgs.std_msgs import String
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.sdk.parameters import to_message
 from tests.console.foxglove_client import Foxglove
@@ -32,9 +34,13 @@ class FakeRobot:
     def __init__(self) -> None:
         self.latched = {"/robot_description": [b"model"], "/tf_static": [b"base", b"arm"]}
         self.parameters: dict[str, object] = {"runtime": 90.0, "names": ("a", "b")}
+        self.published: list[Message] = []
+        self.withdrawn: Queue[str] = Queue()
         self.called: list[str] = []
         self.listeners: list[tuple[str, Callable[[bytes], None]]] = []
-        access = RobotAccess(self.listen, self.latched.__contains__, self.publish, self.call, resolve, lambda topic: "")
+        access = RobotAccess(
+            self.listen, self.latched.__contains__, self.publisher, self.call, resolve, lambda topic: ""
+        )
         self.server = FoxgloveServer(access, "fake", 0)
         topics = {**dict.fromkeys((*self.latched, "/talk"), STRING), EVENTS: ParameterEvent.TYPE}
         self.server.offer(topics, SERVICES)
@@ -53,8 +59,8 @@ class FakeRobot:
             if topic == EVENTS:
                 take(event)
 
-    def publish(self, topic: str, message: Message) -> None:
-        raise NotImplementedError
+    def publisher(self, topic: str) -> tuple[Callable[[Message], object], Callable[[], object]]:
+        return self.published.append, lambda: self.withdrawn.put(topic)
 
     def call(self, name: str, type_: type[Service[Any, Any]], request: Message) -> Future[Any]:
         """Answer for parameters of the battery; nobody else ever answers."""
@@ -124,3 +130,17 @@ def test_who_wants_a_parameter_gets_its_changes_whoever_makes_them(robot: FakeRo
         assert (runtime["name"], runtime["value"]) == ("/battery.runtime", 80.0)
 
     talk(robot, subscribe)
+
+
+def test_what_a_client_publishes_is_withdrawn_when_it_says_so_or_leaves(robot: FakeRobot) -> None:
+    async def publish(client: Foxglove, other: Foxglove) -> None:
+        ghosts = [{"id": n, "topic": f"/ghost{n}", "encoding": "cdr", "schemaName": STRING} for n in range(2)]
+        await client.says("advertise", channels=ghosts)
+        await client.socket.send(struct.pack("<BI", 1, 1) + encode(String(data="boo")))
+        await client.says("unadvertise", channelIds=[0])
+        assert await asyncio.to_thread(robot.withdrawn.get, timeout=10) == "/ghost0"
+        assert robot.published == [String(data="boo")]
+        await client.socket.close()
+        assert await asyncio.to_thread(robot.withdrawn.get, timeout=10) == "/ghost1"
+
+    talk(robot, publish)

@@ -388,6 +388,15 @@ def test_foxglove_sees_topics_calls_services_and_sets_parameters_but_does_not_dr
                 await Browser(page).calls("/battery/set_parameters", parameters=[change])
             (runtime,) = (await client.gets("parameterValues"))["parameters"]
             assert (runtime["name"], runtime["value"]) == ("/battery.runtime", 120)
+            for number, kind in enumerate(("Bool", "Int8")):  # the name is free for another type
+                ghost = {"id": number, "topic": "/ghost", "encoding": "cdr", "schemaName": f"std_msgs/msg/{kind}"}
+                await client.says("advertise", channels=[ghost])
+                await socket_.send(struct.pack("<BI", 1, number) + b"\x00\x01\x00\x00\x01")
+                await client.knows("/ghost")
+                await client.says("unadvertise", channelIds=[number])
+                seen = client.offered.pop("/ghost")
+                assert seen["schemaName"] == ghost["schemaName"]
+                assert (await client.gets("unadvertise"))["channelIds"] == [seen["id"]]
             wrong = {"encoding": "cdr", "schemaName": "geometry_msgs/msg/Twist"}
             for number, spelling in enumerate((TELEOP, TELEOP.lstrip("/"))):
                 await client.says("advertise", channels=[{"id": number, "topic": spelling, **wrong}])

@@ -10,7 +10,6 @@ import json
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as NoAnswerInTimeError
-from dataclasses import field
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
@@ -46,8 +45,8 @@ class RobotAccess:
     """Pass the messages of a topic on as CDR, first those that are latched, and return what ends that."""
     is_latched: Callable[[str], bool]
     """Return whether the last message of a topic is kept for late subscribers."""
-    publish: Callable[[str, Message], None]
-    """Publish on a topic."""
+    publisher: Callable[[str], tuple[Callable[[Message], object], Callable[[], object]]]
+    """Return what publishes on a topic, and what withdraws that."""
     call: Callable[[str, type[Service[Any, Any]], Message], Future[Any]]
     """Call a service; the future has the response, or fails with the reason."""
     full_name: Callable[[str], str]
@@ -56,11 +55,14 @@ class RobotAccess:
     """Return why clients may not publish on a topic, by its full name; nothing if they may."""
 
 
-@dataclass(slots=True)
-class _Client:
-    """What a client publishes: the type of each of its channels, by number, with its topic."""
+@dataclass(frozen=True, slots=True)
+class _ClientPublisher:
+    """What publishes the messages of one channel of a client."""
 
-    channels: dict[int, tuple[str, type[Message]]] = field(default_factory=dict)
+    topic: str
+    type: type[Message]
+    publish: Callable[[Message], object]
+    withdraw: Callable[[], object]
 
 
 class FoxgloveServer:
@@ -82,9 +84,9 @@ class FoxgloveServer:
         self._types: dict[str, str] = {}
         self._services: dict[str, str] = {}
         self._listening: dict[str, tuple[int, Callable[[], None]]] = {}  # clients of a topic, and what ends it
+        self._lock = Lock()  # of these: each client is served in a thread of its own
         self._end_events: Callable[[], None] | None = None  # once it listens to them
-        self._lock = Lock()  # of it: each client is served in a thread of its own
-        self._clients: dict[int, _Client] = {}
+        self._publishers: dict[tuple[int, int], _ClientPublisher] = {}  # by client and channel
         self._server = foxglove.start_server(
             name=name,
             host="127.0.0.1",
@@ -101,7 +103,8 @@ class FoxgloveServer:
         return self._server.port
 
     def close(self) -> None:
-        """Let all clients go."""
+        """Let all clients go; what they publish is withdrawn with the bus."""
+        self._publishers.clear()
         self._server.stop()
         for _, end in self._listening.values():
             end()
@@ -168,8 +171,8 @@ class FoxgloveServer:
         if why:
             self._complain(f"'{channel.topic}' cannot be published: {why}")
             return
-        publishes = self._clients.setdefault(client.id, _Client())
-        publishes.channels[channel.id] = topic, registry.message(channel.schema_name)
+        type_ = registry.message(channel.schema_name)
+        self._publishers[client.id, channel.id] = _ClientPublisher(topic, type_, *self._robot.publisher(topic))
 
     def _why_not(self, topic: str, encoding: str, type_name: str) -> str:
         if encoding != CDR:
@@ -182,20 +185,19 @@ class FoxgloveServer:
         return self._robot.refused(topic) or ("" if known == wanted else f"it is of the type '{known}'")
 
     def on_client_unadvertise(self, client: Client, client_channel_id: int) -> None:
-        """Forget it."""
-        if (publishes := self._clients.get(client.id)) is not None:
-            publishes.channels.pop(client_channel_id, None)
+        """Withdraw it, also when its client leaves."""
+        if (known := self._publishers.pop((client.id, client_channel_id), None)) is not None:
+            known.withdraw()
 
     def on_message_data(self, client: Client, client_channel_id: int, data: bytes) -> None:
         """Publish a message of a client."""
-        known = self._clients.get(client.id, _Client()).channels.get(client_channel_id)
+        known = self._publishers.get((client.id, client_channel_id))
         if known is None:
             return  # its client got a warning when it advertised
-        topic, type_ = known
         try:
-            self._robot.publish(topic, decode(type_, data))
+            known.publish(decode(known.type, data))
         except CdrError as error:
-            self._complain(f"a message on '{topic}' was dropped: {error}")
+            self._complain(f"a message on '{known.topic}' was dropped: {error}")
 
     def on_get_parameters(
         self, client: Client, param_names: list[str], request_id: str | None = None

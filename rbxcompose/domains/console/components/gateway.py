@@ -37,6 +37,7 @@ from rbxcompose.bus.graph import Graph, GraphName
 from rbxcompose.bus.names import data_key, resolve
 from rbxcompose.bus.services import ServedRequest
 from rbxcompose.bus.tokens import SPACE
+from rbxcompose.bus.topics import Publisher
 from rbxcompose.bus.transport import Closable
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import NAME, Guest
@@ -928,7 +929,7 @@ class GatewaySession:
         robot = RobotAccess(
             listen=self._listen_raw,
             is_latched=self._graph.is_latched,
-            publish=self._publish_soon,
+            publisher=self._publisher_soon,
             call=self._call_soon,
             full_name=resolve,
             refused=self._refused_to_foxglove,
@@ -963,15 +964,23 @@ class GatewaySession:
         end = self._guest.transport.subscribe(key, qos, lambda arrival: take(bytes(arrival.payload)))
         return end.close
 
-    def _publish_soon(self, topic: str, message: Message) -> None:
-        def publish() -> None:
-            end = self._ends.get((FoxgloveServer, topic))
-            if end is None:
-                end = self._ends[FoxgloveServer, topic] = self._bus.publisher(NAME, topic, type(message), Qos.STATE)
-            end(message)
+    def _publisher_soon(self, topic: str) -> tuple[Callable[[Message], object], Callable[[], object]]:
+        """Return what publishes on a topic, declared with the first message, and what withdraws that."""
+        declared: list[Publisher[Any]] = []
+
+        def publish(message: Message) -> None:
+            if not declared:
+                declared.append(self._bus.publisher(NAME, topic, type(message), Qos.STATE))
+            declared[0](message)
             self._pump()
 
-        self._loop.call_soon_threadsafe(publish)
+        def withdraw() -> None:
+            while declared:
+                self._withdraw(declared.pop())
+            self._pump()
+
+        soon = self._loop.call_soon_threadsafe
+        return lambda message: soon(publish, message), lambda: soon(withdraw)
 
     def _call_soon(self, service: str, type_: type[Service[Any, Any]], request: Message) -> Future[Any]:
         future: Future[Any] = Future()
