@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from io import BytesIO
 from typing import Any
+from urllib.parse import parse_qsl
 
 import numpy as np
 import pytest
@@ -43,6 +44,13 @@ def test_an_address_says_what_is_wanted(query: dict[str, str], want: Picture) ->
     assert wanted(query) == want
 
 
+@pytest.mark.parametrize("last", ["topic=/a", "type=png", "width=8", "height=6", "quality=5", "invert"])
+def test_what_pages_append_against_caches_belongs_to_no_parameter(last: str) -> None:
+    others = {"topic=/a", "type=png", "width=8", "height=6", "quality=5", "invert"} - {last}
+    query = dict(parse_qsl("&".join((*others, f"{last}?killcache=0.83")), keep_blank_values=True))
+    assert wanted(query) == Picture("/a", "png", 8, 6, 5, is_inverted=True)
+
+
 @pytest.mark.parametrize(
     "query",
     [
@@ -50,6 +58,7 @@ def test_an_address_says_what_is_wanted(query: dict[str, str], want: Picture) ->
         {"topic": "/"},
         {"topic": "a", "type": "h264"},
         {"topic": "a", "width": "x"},
+        {"topic": "a", "width": "x?killcache=0.83"},
         {"topic": "a", "width": "1e9"},
         {"topic": "a", "quality": "0"},
     ],

@@ -44,6 +44,8 @@ def wanted(query: Mapping[str, str]) -> Picture:
     Raises:
         WrongPictureError: if they make no sense.
     """
+    # Pages put a second `?` and a random number behind an address, against caches: mjpegcanvas does.
+    query = {name.partition("?")[0]: value.partition("?")[0] for name, value in query.items()}
     topic = query.get("topic", "").strip()
     if not topic.strip("/"):
         raise WrongPictureError("'topic' is the name of a topic with pictures")
