@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from io import BytesIO
 from typing import Any
 from urllib.parse import parse_qsl
@@ -12,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image as Pictures
 
-from rbxcompose.domains.console.video import Picture, encoded, wanted
+from rbxcompose.domains.console.video import LARGEST, Picture, encoded, wanted
 from rbxcompose.msgs.images import WrongPictureError, pixels
 from rbxcompose.msgs.sensor_msgs import CompressedImage, Image
 
@@ -132,3 +133,20 @@ def test_what_is_compressed_already_is_passed_on() -> None:
     assert opened(encoded(message, Picture("/a", "jpeg", 2, 0, 95, is_inverted=False))).size == (2, 1)
     with pytest.raises(WrongPictureError):
         encoded(CompressedImage(format="jpeg", data=b"x"), Picture("/a", "png", 0, 0, 3, is_inverted=False))
+
+
+@pytest.mark.parametrize("form", ["PNG", "JPEG", "ICO"])
+def test_few_bytes_are_never_decoded_to_a_huge_picture(form: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Pictures.Image, "convert", None)
+    written = BytesIO()
+    Pictures.new("L", (LARGEST, LARGEST + 1)).save(written, "PNG" if form == "ICO" else form)
+    data = written.getvalue()
+    if form == "ICO":  # which Pillow decodes to open it
+        data = struct.pack("<3H4B2H2I", 0, 1, 1, 16, 16, 0, 0, 1, 1, len(data), 22) + data
+    with pytest.raises(WrongPictureError, match="no picture" if form == "ICO" else "4096 x 4097 pixels"):
+        encoded(CompressedImage(format=form, data=data), Picture("/a", "png", 100, 0, 3, is_inverted=False))
+
+
+def test_a_picture_is_never_scaled_to_a_huge_one() -> None:
+    with pytest.raises(WrongPictureError, match="would have 4096 x 36864000 pixels"):
+        encoded(image("mono8", bytes(9000), 1, 9000), Picture("/a", "png", LARGEST, 0, 3, is_inverted=False))

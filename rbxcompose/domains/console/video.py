@@ -14,6 +14,8 @@ from rbxcompose.msgs.sensor_msgs import CompressedImage, Image
 
 IMAGES = (Image.TYPE, CompressedImage.TYPE)
 LARGEST = 4096  # pixels of a side
+_MOST_PIXELS = LARGEST**2  # to decode or to scale to: a few bytes may stand for gigabytes
+_COMPRESSED = ("JPEG", "PNG", "TIFF", "WEBP", "BMP")  # what cameras send; Pillow decodes some others to open them
 _FORMS = {"mjpeg": "jpeg", "jpeg": "jpeg", "png": "png", "ros_compressed": "jpeg"}
 _QUALITY = {"jpeg": 95, "png": 3}
 _QUALITIES = {"jpeg": (1, 100), "png": (0, 9)}
@@ -105,7 +107,11 @@ def encoded(message: Image | CompressedImage, want: Picture) -> bytes:
         if is_as_wanted and not want.is_inverted:
             return data
         try:
-            picture = Pictures.open(BytesIO(data)).convert("RGB")
+            header = Pictures.open(BytesIO(data), formats=_COMPRESSED)
+            _refuse_large("the compressed picture has", *header.size)
+            picture = header.convert("RGB")
+        except WrongPictureError:
+            raise
         except (OSError, ValueError, SyntaxError, Pictures.DecompressionBombError) as error:
             raise WrongPictureError(f"what is compressed as '{message.format[:40]}' is no picture") from error
     else:
@@ -113,6 +119,7 @@ def encoded(message: Image | CompressedImage, want: Picture) -> bytes:
     if want.width or want.height:
         width = want.width or round(picture.width * want.height / picture.height)
         height = want.height or round(picture.height * want.width / picture.width)
+        _refuse_large("in this size, the picture would have", width, height)
         picture = picture.resize((max(1, width), max(1, height)), Pictures.Resampling.BILINEAR)
     if want.is_inverted:
         picture = picture.transpose(Pictures.Transpose.ROTATE_180)
@@ -122,3 +129,8 @@ def encoded(message: Image | CompressedImage, want: Picture) -> bytes:
     else:
         picture.save(written, "PNG", compress_level=want.quality)
     return written.getvalue()
+
+
+def _refuse_large(what: str, width: int, height: int) -> None:
+    if width * height > _MOST_PIXELS:
+        raise WrongPictureError(f"{what} {width} x {height} pixels; {_MOST_PIXELS} are the most")
