@@ -19,7 +19,8 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Awaitable, Callable, Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing, suppress
+from http.client import HTTPConnection
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
@@ -33,6 +34,7 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from rbxcompose.commands.guest import Guest
 from rbxcompose.domains.console.components.gateway import MOST_CONNECTIONS
+from rbxcompose.domains.console.streams import MOST_STREAMS
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.sdk.ports import Qos
 from tests.cli.live_robot import PATIENCE, Robot
@@ -294,6 +296,57 @@ def test_pictures_are_streamed_as_by_web_video_server(robot: Robot) -> None:
         "'/odom' has no pictures: its messages are 'nav_msgs/msg/Odometry'\n",
     )
     assert get("/snapshot?topic=/camera/image_raw&width=x")[0] == 404
+
+
+def test_the_headers_alone_start_no_stream(robot: Robot) -> None:
+    with closing(HTTPConnection(HOST, timeout=PATIENCE)) as client:
+        for path, status, kind in (
+            ("/stream?topic=/camera/image_raw", 200, "multipart/x-mixed-replace;boundary=boundarydonotcross"),
+            ("/snapshot?topic=/camera/image_raw&type=png", 200, "image/png"),
+            ("/stream?topic=/odom", 404, "text/plain; charset=utf-8"),
+        ):
+            client.request("HEAD", path)
+            answer = client.getresponse()
+            assert (answer.status, answer.headers["content-type"], answer.read()) == (status, kind, b"")
+        client.request("GET", "/streams")
+        assert b"/camera/image_raw" in client.getresponse().read()
+
+
+def test_a_viewer_that_leaves_is_noticed_though_it_asked_for_more_and_no_picture_comes(robot: Robot) -> None:
+    def snapshot() -> int:
+        with closing(HTTPConnection(HOST, timeout=PATIENCE)) as client:
+            client.request("GET", "/snapshot?topic=/camera/image_raw")
+            return client.getresponse().status
+
+    async def looks(browser: Browser) -> None:
+        async def publishes() -> None:
+            while True:
+                await browser.sends("publish", topic="/dot", msg=dot)
+                await asyncio.sleep(0.02)
+
+        dot = {"height": 1, "width": 1, "encoding": "mono8", "step": 1, "data": "AA=="}
+        await browser.sends("advertise", topic="/dot", type="sensor_msgs/Image")
+        publisher = asyncio.create_task(publishes())
+        viewers = []
+        for width in range(1, MOST_STREAMS + 1):
+            reader, writer = await asyncio.open_connection("127.0.0.1", PORT)
+            viewers.append(writer)
+            ask = f"GET /stream?topic=/dot&width={width} HTTP/1.1\r\nHost: {HOST}\r\n\r\n".encode()
+            writer.write(ask)
+            await asyncio.wait_for(reader.readuntil(b"image/jpeg"), PATIENCE)
+            writer.write(ask)
+        publisher.cancel()
+        assert await asyncio.to_thread(snapshot) == 404  # there are as many streams as may be
+        writer.write(b" " * 100_000)
+        with suppress(ConnectionError):
+            await asyncio.wait_for(reader.read(), PATIENCE)  # who asks for much more is cut
+        for writer in viewers:
+            writer.close()
+        deadline = time.monotonic() + PATIENCE
+        while await asyncio.to_thread(snapshot) != 200:
+            assert time.monotonic() < deadline
+
+    browse(looks)
 
 
 def test_the_page_gets_the_body_and_nothing_beside_it(robot: Robot) -> None:

@@ -108,11 +108,20 @@ class Streams:
         await frames.aclose()
         return first
 
-    def _joined(self, want: Picture) -> _Stream:
+    def type_of(self, want: Picture) -> str:
+        """Return the type of the messages with a picture.
+
+        Raises:
+            WrongPictureError: if the topic has no pictures.
+        """
         type_ = self._type_of(want.topic)
         if type_ not in IMAGES:
             what = f"its messages are '{type_}'" if type_ else "there is no such topic"
             raise WrongPictureError(f"'{want.topic}' has no pictures: {what}")
+        return type_
+
+    def _joined(self, want: Picture) -> _Stream:
+        type_ = self.type_of(want)
         if (stream := self._streams.get(want)) is None:
             if len(self._streams) >= MOST_STREAMS:
                 raise WrongPictureError(f"there are {MOST_STREAMS} different streams already")

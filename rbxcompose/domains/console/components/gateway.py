@@ -117,6 +117,7 @@ _SAVING = 30.0  # [s] for a save
 _TRYING = 90.0  # [s] for a dry run, and for the tests of a mission
 _LONG = ("test", "try", "robot/")
 _LONGEST_LOGIN = 4096  # [bytes]
+_MOST_WAITING = 65536  # [bytes] of requests behind one that is being answered
 _COOKIE_AGE = 365 * 24 * 3600  # [s]
 _POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; object-src 'none'"
 _HEADERS = (
@@ -504,6 +505,7 @@ class GatewaySession:
     async def serve(self, listener: socket.socket, stop: asyncio.Event) -> None:
         """Serve until `stop`."""
         import uvicorn
+        from h11 import DONE
         from uvicorn.protocols.http.h11_impl import H11Protocol
 
         class LimitedConnection(H11Protocol):
@@ -515,6 +517,14 @@ class GatewaySession:
                     transport.abort()
                 else:
                     self.loop.call_later(_SHY, self.close_if_idle)
+
+            def data_received(self, data: bytes) -> None:
+                super().data_received(data)
+                if self.conn.their_state is DONE:  # more waits for its turn; only who reads on sees the client leave
+                    if len(self.conn.trailing_data[0]) > _MOST_WAITING:
+                        self.transport.abort()
+                    else:
+                        self.flow.resume_reading()
 
             def close_if_idle(self) -> None:
                 asked: object = self.cycle  # None until there is a request, whatever uvicorn declares
@@ -657,7 +667,16 @@ class GatewaySession:
 
             return answer
 
-        async def stream(_: Request, want: Picture) -> Response:
+        fresh = {"cache-control": "no-store"}
+
+        def headers_alone(want: Picture, kind: str) -> Response:
+            self._streams.type_of(want)
+            return StreamingResponse((), media_type=kind, headers=fresh)  # without a length, which nobody knows
+
+        async def stream(request: Request, want: Picture) -> Response:
+            kind = f"multipart/x-mixed-replace;boundary={BOUNDARY}"
+            if request.method == "HEAD":
+                return headers_alone(want, kind)
             first, frames = await self._streams.begun(want)  # so that what is wrong has an answer of its own
 
             async def parts() -> AsyncIterator[bytes]:
@@ -669,12 +688,12 @@ class GatewaySession:
                 finally:
                     await frames.aclose()
 
-            kind = f"multipart/x-mixed-replace;boundary={BOUNDARY}"
-            return StreamingResponse(parts(), media_type=kind, headers={"cache-control": "no-store"})
+            return StreamingResponse(parts(), media_type=kind, headers=fresh)
 
-        async def snapshot(_: Request, want: Picture) -> Response:
-            frame = await self._streams.snapshot(want)
-            return Answer(frame, media_type=want.mime, headers={"cache-control": "no-store"})
+        async def snapshot(request: Request, want: Picture) -> Response:
+            if request.method == "HEAD":
+                return headers_alone(want, want.mime)
+            return Answer(await self._streams.snapshot(want), media_type=want.mime, headers=fresh)
 
         async def viewer(request: Request, _: Picture) -> Response:
             return HTMLResponse(viewer_page(request.url.query))
