@@ -279,11 +279,11 @@ class FoxgloveServer:
             found += _shown(node, zip(wanted, got.values if got is not None else (), strict=False))
         return found
 
-    def _push_changes(self, event: bytes) -> None:
+    def _push_changes(self, data: bytes) -> None:
         """Push the parameters that have changed, whoever changed them, to the clients that want them."""
-        told = decode(ParameterEvent, event)
-        changed = ((each.name, each.value) for each in (*told.new_parameters, *told.changed_parameters))
-        self._server.publish_parameter_values(_shown(told.node, changed))
+        event = decode(ParameterEvent, data)
+        changed = ((each.name, each.value) for each in (*event.new_parameters, *event.changed_parameters))
+        self._server.publish_parameter_values(_shown(event.node, changed))
 
     def _set(self, wanted: foxglove.Parameter) -> None:
         value = wanted.get_value()

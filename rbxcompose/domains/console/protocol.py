@@ -1108,24 +1108,24 @@ class Bridge:
         default = given.get("default_value", "")
         otherwise = None if default == "" else _read(default)
 
-        def told(response: GetParameters.Response) -> dict[str, Any]:
+        def answer_of(response: GetParameters.Response) -> dict[str, Any]:
             found = parameters.from_message(response.values[0]) if response.values else None
             value = otherwise if found is None else found
             return {"value": json.dumps(_finite(value)), "successful": True, "reason": ""}
 
-        return self._look_up(given, number, told)
+        return self._look_up(given, number, answer_of)
 
     def _has_param(self, given: Mapping[str, Any], number: int) -> dict[str, Any] | None:
         return self._look_up(given, number, lambda found: {"exists": any(value.type for value in found.values)})
 
     def _look_up(
-        self, given: Mapping[str, Any], number: int, told: Callable[[GetParameters.Response], dict[str, Any]]
+        self, given: Mapping[str, Any], number: int, answer_of: Callable[[GetParameters.Response], dict[str, Any]]
     ) -> dict[str, Any] | None:
-        """Ask a node for a parameter; return at once what is told of none if there is no such node."""
+        """Ask a node for a parameter; if there is no such node, return at once the answer about a parameter that is not set."""
         node, name = self._parameter(given)
         if not node:
-            return told(GetParameters.Response())
-        self._ask_node(number, node, GetParameters, {"names": [name]}, told)
+            return answer_of(GetParameters.Response())
+        self._ask_node(number, node, GetParameters, {"names": [name]}, answer_of)
         return None
 
     def _set_param(self, given: Mapping[str, Any], number: int) -> None:
