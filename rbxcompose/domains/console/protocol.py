@@ -1121,7 +1121,7 @@ class Bridge:
     def _look_up(
         self, given: Mapping[str, Any], number: int, answer_of: Callable[[GetParameters.Response], dict[str, Any]]
     ) -> dict[str, Any] | None:
-        """Ask a node for a parameter; if there is no such node, return at once the answer about a parameter that is not set."""
+        """Ask a node for a parameter; without such a node, return the answer about one that is not set."""
         node, name = self._parameter(given)
         if not node:
             return answer_of(GetParameters.Response())
