@@ -86,6 +86,18 @@ export function spansOf(changes: readonly Change[], path: string, from: number, 
   return spans;
 }
 
+/**
+ * Returns the known changes with the later ones that `list` returns. Asks from the last known one on: if the robot no
+ * longer tells it, it came up again or went on too far to know, and all is learned anew.
+ */
+export async function learnChanges(known: Change[], list: (after: number) => Promise<Change[]>): Promise<Change[]> {
+  const last = known.at(-1);
+  if (!last) return list(0);
+  const [same, ...later] = await list(last.number - 1);
+  const isSame = same?.number === last.number && same.time === last.time && same.path === last.path;
+  return isSame ? [...known, ...later] : list(0);
+}
+
 export function treeOf(answer: Json): Tree | null {
   return isMessage(answer) && Array.isArray(answer.lines) ? (answer as unknown as Tree) : null;
 }

@@ -64,6 +64,40 @@ export function setText(element: Element, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
 
+/**
+ * Makes an element have these children, but keeps its own where they are of the same kind, and of the same `data-key` if
+ * they have one: a press on them, the focus and how far they are scrolled outlive it. Listeners stay those of the kept
+ * ones: what a listener does must be the same for all elements of its key.
+ */
+export function refill(element: Element, ...wanted: Child[]): void {
+  const left = [...element.childNodes];
+  const children = wanted.map((child) => {
+    const made = typeof child === "string" ? document.createTextNode(child) : child;
+    const at = left.findIndex((own) => own.nodeName === made.nodeName && keyOf(own) === keyOf(made));
+    if (at < 0) return made;
+    const own = left[at]!;
+    for (const gone of left.splice(0, at + 1)) if (gone !== own) gone.remove();
+    if (own instanceof Element && made instanceof Element) become(own, made);
+    else if (own.nodeValue !== made.nodeValue) own.nodeValue = made.nodeValue;
+    return own;
+  });
+  for (const gone of left) gone.remove();
+  children.forEach((child, at) => {
+    if (element.childNodes[at] !== child) element.insertBefore(child, element.childNodes[at] ?? null);
+  });
+}
+
+function become(own: Element, made: Element): void {
+  if (own.isEqualNode(made)) return;
+  for (const { name } of [...own.attributes]) if (!made.hasAttribute(name)) own.removeAttribute(name);
+  for (const { name, value } of made.attributes) if (own.getAttribute(name) !== value) own.setAttribute(name, value);
+  refill(own, ...made.childNodes);
+}
+
+function keyOf(node: Node): string | undefined {
+  return node instanceof HTMLElement ? node.dataset.key : undefined;
+}
+
 /** Disables controls for a reason, which they tell; enables them if it is empty. */
 export function disable(why: string, ...controls: (HTMLButtonElement | HTMLInputElement | HTMLSelectElement)[]): void {
   for (const control of controls) [control.disabled, control.title] = [why !== "", why];

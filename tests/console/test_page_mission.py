@@ -191,17 +191,17 @@ def line(path: str, level: int, message: str, *, is_group: bool = False) -> dict
     }
 
 
-def tree(level: int) -> dict[str, Any]:
+def tree(level: int, message: str = "overheated") -> dict[str, Any]:
     lines = [
         line("/arm", level, "", is_group=True),
-        line("/arm/elbow", level, "overheated" if level else "OK"),
+        line("/arm/elbow", level, message if level else "OK"),
         line("/base", 0, "", is_group=True),
         line("/base/wheels", 0, "OK"),
     ]
     return {
         "time": 100.0,
         "level": level,
-        "cause": "/arm: elbow: overheated" if level else "",
+        "cause": f"/arm: elbow: {message}" if level else "",
         "lines": lines,
         "left_out": 0,
     }
@@ -224,6 +224,32 @@ def test_what_is_wrong_and_why_is_seen_at_once(open_page: Callable[..., Page], g
     page.get_by_role("button", name="Acknowledge", exact=True).click()
     expect(page.get_by_text("acknowledged", exact=True)).to_be_visible()
     assert gateway.asked("diagnostics.Acknowledge")[0]["path"] == ""
+
+
+def test_a_press_and_the_focus_outlive_what_is_measured_meanwhile(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    changes = [{"number": 1, "time": 60.0, "path": "/arm/elbow", "old": 0, "new": 2, "cause": "overheated"}]
+    gateway.windows[TREE] = tree(2)
+    gateway.answers["diagnostics.ListChanges"] = lambda asked: [
+        change for change in changes if change["number"] > asked["after"]
+    ]
+    page = open_page(page_name="diagnostics")
+    row = page.locator(".levels").get_by_role("button", name="elbow")
+    details = page.get_by_label("Details")
+    row.hover()
+    page.mouse.down()
+    gateway.show(TREE, tree(2, "overheated: 72 °C") | {"time": 101.0})
+    expect(row).to_contain_text("72 °C")
+    expect(page.get_by_label("History", exact=True)).to_contain_text("overheated")
+    page.mouse.up()
+    expect(page.get_by_role("treeitem", name="elbow")).to_have_attribute("aria-selected", "true")
+    page.locator(".levels").get_by_role("button", name="arm Error", exact=True).click()
+    details.get_by_role("button", name="Acknowledge this group").focus()
+    changes[0] |= {"time": 2.0, "cause": "jammed"}  # the robot came up again
+    gateway.show(TREE, tree(2, "jammed") | {"time": 3.0})
+    expect(row).to_contain_text("jammed")
+    expect(details.get_by_role("button", name="Acknowledge this group")).to_be_focused()
 
 
 @pytest.mark.parametrize("name", ["diagnostics", "mission"])

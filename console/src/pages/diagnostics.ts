@@ -1,6 +1,6 @@
 /** Diagnostics: what is wrong and why, the tree with its details, and what changed when. */
-import { isFolded, levelOf, problems, spansOf, treeOf, type Change, type Tree, type TreeLine } from "../diagnostics";
-import { emptyCard, h, icon, svg } from "../dom";
+import { isFolded, learnChanges, levelOf, problems, spansOf, treeOf, type Change, type Tree, type TreeLine } from "../diagnostics";
+import { emptyCard, h, icon, refill, svg } from "../dom";
 import { formatAge } from "../format";
 import type { Page, Robot } from "../page";
 import type { Json } from "../rosbridge";
@@ -75,17 +75,15 @@ class DiagnosticsView {
     const look = levelOf(tree.level);
     const found = problems(tree.lines);
     const words = found.length === 0 ? "Everything is fine" : `${look.word}: ${tree.cause || found[0]!.message}`;
-    const key = `${tree.level} ${words} ${found.map(({ path, message }) => path + message).join()}`;
-    if (this.#head.dataset.key === key) return;
-    this.#head.dataset.key = key;
     const acknowledge = h("button", { type: "button" }, icon("check"), "Acknowledge");
     acknowledge.title = "Let levels that were latched follow the present again";
     acknowledge.onclick = () => void this.#acknowledge("");
-    this.#head.replaceChildren(
+    refill(
+      this.#head,
       h("div", { role: "status" }, h("h2", { "data-kind": look.kind }, icon(look.icon), words)),
       ...(tree.level > 0 ? [acknowledge] : []),
     );
-    this.#problems.replaceChildren(...found.map((line) => h("li", {}, this.#choice(line, `${line.name}: ${line.message}`))));
+    refill(this.#problems, ...found.map((line) => h("li", { "data-key": line.path }, this.#choice(line, `${line.name}: ${line.message}`))));
   }
 
   #choice(line: TreeLine, words: string): HTMLElement {
@@ -102,18 +100,15 @@ class DiagnosticsView {
 
   #showTree(tree: Tree): void {
     const shown = tree.lines.filter(({ path }) => !isFolded(path, this.#folded));
-    const focused = this.#tree.contains(document.activeElement) ? (document.activeElement as HTMLElement).dataset.path : "";
     const rows = shown.map((line) => {
       const button = this.#choice(line, line.is_group ? line.name : `${line.name} \u2013 ${line.message}`);
-      button.dataset.path = line.path;
-      const row = h("li", { role: "treeitem", "aria-level": String(line.depth + 1) });
+      const row = h("li", { role: "treeitem", "aria-level": String(line.depth + 1), "data-key": `${line.path} ${line.is_group}` });
       row.style.setProperty("--depth", String(line.depth));
       row.setAttribute("aria-selected", String(line.path === this.#chosen));
       if (line.is_group) {
         const folded = this.#folded.has(line.path);
         row.setAttribute("aria-expanded", String(!folded));
         const fold = h("button", { type: "button", class: "fold", "aria-label": `${folded ? "Show" : "Hide"} ${line.name}` }, icon("down"));
-        fold.dataset.path = `${line.path} fold`;
         fold.onclick = () => {
           if (!this.#folded.delete(line.path)) this.#folded.add(line.path);
           this.#showTree(this.#tree_!);
@@ -123,30 +118,28 @@ class DiagnosticsView {
       row.append(button);
       return row;
     });
-    this.#tree.replaceChildren(...rows);
-    if (focused) this.#tree.querySelector<HTMLElement>(`[data-path="${CSS.escape(focused)}"]`)?.focus();
+    refill(this.#tree, ...rows);
   }
 
   #showDetails(tree: Tree): void {
     const line = tree.lines.find(({ path }) => path === this.#chosen) ?? problems(tree.lines)[0];
     if (!line) {
-      this.#details.replaceChildren(h("h2", {}, "Details"), h("p", { class: "label" }, "Choose an item of the tree."));
+      refill(this.#details, h("h2", {}, "Details"), h("p", { class: "label" }, "Choose an item of the tree."));
       this.#showHistory(tree, "");
       return;
     }
     const look = levelOf(line.level);
     const rows = line.values.map(([key, value]) => h("tr", {}, h("th", { scope: "row" }, key.replaceAll("_", " ")), h("td", {}, value)));
-    this.#details.replaceChildren(
+    const button = h("button", { type: "button", "data-key": line.path }, icon("check"), "Acknowledge this group");
+    button.onclick = () => void this.#acknowledge(line.path);
+    refill(
+      this.#details,
       h("h2", {}, line.name),
       h("p", { class: "chip", "data-kind": look.kind }, icon(look.icon), `${look.word}: ${line.message || "no message"}`),
       ...(line.hardware_id ? [h("p", { class: "label" }, `Hardware: ${line.hardware_id}`)] : []),
       h("table", {}, ...rows),
+      ...(line.is_group && line.level > 0 ? [button] : []),
     );
-    if (line.is_group && line.level > 0) {
-      const button = h("button", { type: "button" }, icon("check"), "Acknowledge this group");
-      button.onclick = () => void this.#acknowledge(line.path);
-      this.#details.append(button);
-    }
     this.#showHistory(tree, line.path);
   }
 
@@ -174,9 +167,10 @@ class DiagnosticsView {
       .map((change) => {
         const look = levelOf(change.new);
         const age = formatAge((tree.time - change.time) * 1000);
-        return h("li", { "data-kind": look.kind }, h("time", {}, `${age} ago `), icon(look.icon), ` ${change.path} ${look.word} ${change.cause}`);
+        return h("li", { "data-kind": look.kind, "data-key": String(change.number) }, h("time", {}, `${age} ago `), icon(look.icon), ` ${change.path} ${look.word} ${change.cause}`);
       });
-    this.#history.replaceChildren(
+    refill(
+      this.#history,
       h("h2", {}, "History"),
       drawing,
       h("p", { class: "label" }, `The last ${formatAge((tree.time - from) * 1000)}; now is on the right`),
@@ -184,14 +178,15 @@ class DiagnosticsView {
     );
   }
 
-  /** Asks for the changes after the last one that is known. */
+  /** Asks for the changes that are not known yet. */
   async #learn(): Promise<void> {
     if (this.#asked) return;
     this.#asked = true;
     try {
-      const after = this.#changes.at(-1)?.number ?? 0;
-      const answer: Json = await this.#robot.link.ask({ type: "diagnostics.ListChanges", after });
-      if (Array.isArray(answer)) this.#changes.push(...(answer as unknown as Change[]));
+      this.#changes = await learnChanges(this.#changes, async (after) => {
+        const answer: Json = await this.#robot.link.ask({ type: "diagnostics.ListChanges", after });
+        return Array.isArray(answer) ? (answer as unknown as Change[]) : [];
+      });
     } catch {
       // The connection is shown by the frame; the next look asks again.
     } finally {
