@@ -3,6 +3,7 @@ import type { Component, Port } from "./description";
 import { h, icon, setText } from "./dom";
 import { FieldError, fieldsOf, labelOf, leavesOf, messageOf, NO_HINTS, type Field, type TypeDef } from "./forms";
 import { formatName, formatNumber, UNKNOWN } from "./format";
+import { runningGoal, sendGoal, type KeptGoal } from "./goals";
 import type { Robot } from "./page";
 import { isMessage, type Json, type Message } from "./rosbridge";
 
@@ -39,6 +40,7 @@ export function fillCard(body: HTMLElement, component: Component, robot: Robot):
   const more = h("details", { class: "more" }, h("summary", {}, "Connections"));
   if (plain.length > 0) more.append(h("div", { class: "skills" }, ...plain.map((port) => skillOf(port, robot))));
   more.append(connections(component));
+  more.open = more.querySelector("details[open]") !== null;
   body.append(more);
   return () => closers.forEach((close) => close());
 }
@@ -127,6 +129,7 @@ export function skillOf(port: Port, robot: Robot, title = formatName(port.skill 
   box.addEventListener("toggle", () => {
     if (box.open && box.childElementCount === 1) void fillForm(box, port, robot, title, says);
   });
+  box.open = runningGoal(robot.link, goalName(port, title)) !== undefined;
   return box;
 }
 
@@ -182,27 +185,28 @@ function inputOf(one: Field, port: Port): { element: HTMLElement; read: () => st
   return { element: h("div", { class: "field" }, label, input), read: () => input.value };
 }
 
-/** Returns a button that calls a service, or sends a goal and becomes the one that cancels it. */
+function goalName(port: Port, title: string): string {
+  return `${port.topic} ${title}`;
+}
+
+/** Returns a button that calls a service, or sends a goal and becomes the one that cancels it, also if it runs already. */
 export function runButton(port: Port, robot: Robot, title: string, message: () => Message, says: HTMLElement): HTMLButtonElement {
   const isAction = port.kind === "serves_action";
   const button = h("button", { type: "button" }, icon(isAction ? "play" : "skip"), title);
   let cancel: (() => void) | null = null;
-  const run = async () => {
-    if (cancel) {
-      cancel();
-      return;
-    }
+  const run = async (kept?: KeptGoal) => {
     try {
-      const request = message();
-      setText(says, "\u2026");
       if (isAction) {
-        const sent = robot.link.act(port.topic, port.type, request, (feedback) => setText(says, sentence(feedback)));
+        const sent = kept ?? sendGoal(robot.link, goalName(port, title), port.topic, port.type, message());
         cancel = sent.cancel;
         button.replaceChildren(icon("cross"), `Cancel ${title.toLowerCase()}`);
+        sent.feedback.watch((feedback) => setText(says, feedback ? sentence(feedback) : "\u2026"));
         const { status, values } = await sent.done;
         says.dataset.kind = status === FINISHED ? "good" : "bad";
         setText(says, [SETTLED[status] ?? "Ended", sentence(values)].filter(Boolean).join(": "));
       } else {
+        const request = message();
+        setText(says, "\u2026");
         const answer = await robot.link.call(port.topic, request, 15_000);
         const failed = isMessage(answer) && answer.success === false;
         says.dataset.kind = failed ? "bad" : "good";
@@ -216,7 +220,9 @@ export function runButton(port: Port, robot: Robot, title: string, message: () =
       button.replaceChildren(icon(isAction ? "play" : "skip"), title);
     }
   };
-  button.onclick = () => void run();
+  button.onclick = () => (cancel ? cancel() : void run());
+  const kept = runningGoal(robot.link, goalName(port, title));
+  if (kept) void run(kept);
   return button;
 }
 

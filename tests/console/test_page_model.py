@@ -216,8 +216,14 @@ def test_a_goal_of_an_arm_is_planned_shown_and_executed(open_page: Callable[...,
     expect(page.get_by_text("Moving")).to_be_visible()
     go = crane.goals()[-1]
     assert go["args"]["trajectory"] == WAY
+    page.get_by_role("button", name="Let go of its tip").click()
+    page.get_by_role("link", name="Log").click()
+    page.get_by_role("link", name="Model").click()  # the arm moves on, and can be canceled
+    expect(page.get_by_text("Moving")).to_be_visible()
+    expect(page.get_by_role("button", name="Cancel")).to_be_enabled()
     crane.act("action_result", go, {"error_code": {"val": 1}}, status=4, result=True)
     expect(page.get_by_text("It is there.")).to_be_visible()
+    expect(page.get_by_role("button", name="Cancel")).to_be_hidden()
     assert violations(page) == []
 
 

@@ -135,6 +135,29 @@ def test_a_component_that_nobody_knows_has_a_card_with_all_it_offers(
     assert violations(page) == []
 
 
+def test_a_goal_is_followed_and_canceled_after_another_page_was_looked_at(
+    open_page: Callable[..., Page], robot: FakeGateway
+) -> None:
+    page = open_page(page_name="robot")
+    card = page.get_by_label("sprayer", exact=True)
+    card.get_by_text("Spray", exact=True).click()
+    card.get_by_label("Angle").fill("10")
+    card.get_by_label("Amount").fill("0.5")
+    card.get_by_role("button", name="Spray").click()
+    expect(card.get_by_role("button", name="Cancel spray")).to_be_visible()
+    (goal,) = robot.goals()
+    page.get_by_role("link", name="Log").click()
+    expect(card).to_have_count(0)
+    robot.act("action_feedback", goal, {"left": 3})
+    page.get_by_role("link", name="Robot").click()
+    expect(card).to_contain_text("left 3")
+    robot.act("action_feedback", goal, {"left": 2})
+    expect(card).to_contain_text("left 2")
+    card.get_by_role("button", name="Cancel spray").click()
+    expect(card).to_contain_text("Canceled")
+    expect(card.get_by_role("button", name="Spray", exact=True)).to_be_visible()
+
+
 @pytest.mark.soak  # further cards are tested here
 def test_cards_of_what_is_known_show_what_matters(open_page: Callable[..., Page], robot: FakeGateway) -> None:
     page = open_page(page_name="robot")

@@ -3,11 +3,12 @@ import { watchComponents, type Component } from "../description";
 import { emptyCard, h, icon, setText } from "../dom";
 import type { RobotScene, Pose, View } from "../elements/robot_scene";
 import { formatName, numberIn } from "../format";
+import { runningGoal, sendGoal, type KeptGoal } from "../goals";
 import { armsOf, centred, moversOf, onWay, planOf, positionsOf, randomized, sliderOf, thingsOf, wayOf, type Arm, type JointSlider, type Mover, type Waypoint } from "../model";
 import type { Page, Robot } from "../page";
 import { PartsEditor } from "../parts_editor";
 import { Sender, tidy } from "../parameters";
-import { isMessage, type Goal, type Json, type Message } from "../rosbridge";
+import { isMessage, type Json, type Message } from "../rosbridge";
 import { quaternionOf } from "../forms";
 import { Surroundings } from "../surroundings";
 import "./model.css";
@@ -15,6 +16,7 @@ import "./model.css";
 const LOOK = 50; // [ms] between two positions of joints
 const PAUSE = 150; // [ms] between two goals of a slider
 const SOLVED = 1; // moveit_msgs/MoveItErrorCodes
+const MOVING = "Moving\u2026";
 const FINISHED = 4; // action_msgs/GoalStatus
 
 export const page: Page = {
@@ -272,19 +274,20 @@ class ModelView {
 
 /** A goal for an arm: dragged, planned and shown as a ghost, then executed. */
 class ArmGoal {
-  readonly element = h("div", { class: "arm-goal", hidden: "" });
+  readonly element = h("div", { class: "arm-goal" });
+  readonly #tools = h("div", { class: "arm-goal", hidden: "" });
   readonly #robot: Robot;
   readonly #scene: RobotScene;
   readonly #arm: Arm;
   readonly #ghost: (positions: Record<string, number> | null) => void;
   readonly #says = h("p", { class: "says", role: "status" });
   readonly #execute = h("button", { type: "button" }, icon("play"), "Execute");
-  readonly #cancel = h("button", { type: "button" }, icon("cross"), "Cancel");
+  readonly #cancel = h("button", { type: "button", hidden: "" }, icon("cross"), "Cancel");
   readonly #poses: HTMLInputElement[];
   #plan: Json = null;
   #way: Waypoint[] = [];
   #frame = 0;
-  #running: Goal | null = null;
+  #running: KeptGoal | undefined;
   #turn = 0;
 
   constructor(robot: Robot, scene: RobotScene, arm: Arm, ghost: (positions: Record<string, number> | null) => void) {
@@ -296,7 +299,7 @@ class ArmGoal {
     });
     this.#execute.onclick = () => void this.#go();
     this.#cancel.onclick = () => this.#running?.cancel();
-    this.#execute.disabled = this.#cancel.disabled = true;
+    this.#execute.disabled = true;
     const fields = ["x", "y", "z", "roll", "pitch", "yaw"].map((name, at) => {
       const input = h("input", { id: `tip-${arm.name}-${name}`, inputmode: "decimal", autocomplete: "off" });
       const unit = at < 3 ? "cm" : "\u00b0";
@@ -315,11 +318,14 @@ class ArmGoal {
       void this.#planTo(pose);
     };
     const words = h("p", { class: "label" }, "Drag the arrows at the tip, or write where it is to be. The plan is shown as a ghost.");
-    this.element.append(h("div", { class: "row" }, ...modes, this.#execute, this.#cancel), words, this.#says, form);
+    this.#tools.append(h("div", { class: "row" }, ...modes, this.#execute), words, form);
+    this.element.append(this.#tools, this.#says, this.#cancel);
+    const kept = runningGoal(robot.link, arm.execute);
+    if (kept) void this.#follow(kept);
   }
 
   async open(): Promise<void> {
-    this.element.hidden = false;
+    this.#tools.hidden = false;
     this.#scene.onDrag = (pose) => {
       this.#write(pose);
       void this.#planTo(pose);
@@ -336,12 +342,13 @@ class ArmGoal {
   }
 
   close(): void {
-    this.element.hidden = true;
+    this.#tools.hidden = true;
     this.#turn += 1;
     this.#stopShowing();
     this.#scene.setHandle(null);
     this.#scene.onDrag = () => undefined;
-    this.#say("", "");
+    if (this.#running) this.#say(MOVING, "");
+    else this.#say("", "");
   }
 
   #write(pose: Pose): void {
@@ -397,17 +404,27 @@ class ArmGoal {
   async #go(): Promise<void> {
     const trajectory = this.#plan;
     this.#stopShowing();
-    this.#cancel.disabled = false;
-    this.#say("Moving\u2026", "");
+    const { execute } = this.#arm;
+    await this.#follow(sendGoal(this.#robot.link, execute, execute, "moveit_msgs/action/ExecuteTrajectory", { trajectory }));
+  }
+
+  /** Shows a goal that runs, until it has ended or another has taken its place. */
+  async #follow(goal: KeptGoal): Promise<void> {
+    this.#running = goal;
+    this.#cancel.hidden = false;
+    this.#say(MOVING, "");
+    const end = (text: string, kind: string) => {
+      if (this.#running !== goal) return;
+      this.#running = undefined;
+      this.#cancel.hidden = true;
+      this.#say(text, kind);
+    };
     try {
-      this.#running = this.#robot.link.act(this.#arm.execute, "moveit_msgs/action/ExecuteTrajectory", { trajectory });
-      const { status, values } = await this.#running.done;
-      this.#say(status === FINISHED ? "It is there." : `It stopped: ${reason(values) || "canceled"}`, status === FINISHED ? "good" : "bad");
+      const { status, values } = await goal.done;
+      if (status === FINISHED) end("It is there.", "good");
+      else end(`It stopped: ${reason(values) || "canceled"}`, "bad");
     } catch (error) {
-      this.#say((error as Error).message, "bad");
-    } finally {
-      this.#running = null;
-      this.#cancel.disabled = true;
+      end((error as Error).message, "bad");
     }
   }
 
