@@ -130,6 +130,19 @@ def test_the_body_is_drawn_and_moves_with_its_joints(open_page: Callable[..., Pa
     assert violations(page) == []
 
 
+def test_a_body_that_could_not_be_loaded_is_loaded_once_connected(
+    open_page: Callable[..., Page], crane: FakeGateway
+) -> None:
+    page = open_page(page_name="parameters")
+    crane.is_away = True
+    crane.drop()
+    expect(page.locator(".connection")).to_contain_text("Not connected")
+    page.get_by_role("link", name="Model").click()
+    expect(page.get_by_text("The robot's model cannot be loaded: not connected.")).to_be_visible()
+    crane.is_away = False
+    expect(page.locator(".scene")).to_have_attribute("data-drawn", "2")
+
+
 def test_sliders_move_a_ghost_unless_they_may_move_the_robot(
     open_page: Callable[..., Page], crane: FakeGateway
 ) -> None:

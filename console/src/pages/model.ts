@@ -18,6 +18,7 @@ const PAUSE = 150; // [ms] between two goals of a slider
 const SOLVED = 1; // moveit_msgs/MoveItErrorCodes
 const MOVING = "Moving\u2026";
 const FINISHED = 4; // action_msgs/GoalStatus
+const NOT_CONNECTED = "The robot's model cannot be loaded: not connected.";
 
 export const page: Page = {
   name: "model",
@@ -27,31 +28,41 @@ export const page: Page = {
     const box = h("div", {}, emptyCard("wait", "Loading the body\u2026"));
     host.append(box);
     let view: ModelView | null = null;
-    let isClosed = false;
-    void load(robot).then(
-      (made) => {
-        if (isClosed) {
-          made.close();
-          return;
-        }
+    let turn = 0; // of the attempt to load whose outcome counts
+    const attempt = async () => {
+      const own = (turn += 1);
+      box.replaceChildren(emptyCard("wait", "Loading the body\u2026"));
+      try {
+        const made = await load(robot);
+        if (own !== turn) return made.close();
         view = made;
         box.replaceChildren(made.element);
-      },
-      (error: Error) => box.replaceChildren(emptyCard("warning", error.message)),
-    );
+      } catch (error) {
+        if (own === turn) box.replaceChildren(emptyCard("warning", (error as Error).message));
+      }
+    };
+    const unwatch = robot.link.state.watch(({ is }) => {
+      if (view) return;
+      if (is === "open") void attempt();
+      else if (is === "lost") box.replaceChildren(emptyCard("warning", NOT_CONNECTED));
+    });
     return () => {
-      isClosed = true;
+      turn += 1;
+      unwatch();
       view?.close();
     };
   },
 };
 
 async function load(robot: Robot): Promise<ModelView> {
-  const response = await fetch("console/model.urdf");
+  const fail = () => {
+    throw new Error(NOT_CONNECTED);
+  };
+  const response = await fetch("console/model.urdf").catch(fail);
   if (response.status === 404) throw new Error("This robot has no body. It is described by `body:` in its manifest.");
-  if (!response.ok) throw new Error(`The body cannot be loaded (${response.status}).`);
-  const urdf = await response.text();
-  const { RobotScene } = await import("../elements/robot_scene");
+  if (!response.ok) throw new Error(`The robot's model cannot be loaded (${response.status}).`);
+  const urdf = await response.text().catch(fail);
+  const { RobotScene } = await import("../elements/robot_scene").catch(fail);
   return new ModelView(robot, new RobotScene(), urdf);
 }
 
