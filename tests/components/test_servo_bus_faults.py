@@ -17,6 +17,7 @@ from rbxcompose.domains.servos.models import servo_models
 from rbxcompose.domains.servos.twins.fault_script import InjectFault, ListFaults
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64
+from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, FakeLine, FakePort, FakeServo, instance
 from tests.soak import rare
@@ -173,3 +174,38 @@ def test_servos_without_faults_and_those_whose_faults_are_over_move_alike() -> N
         head.robot.advance(3.0)
         moved.append(np.array([state.position for state in head.states]))
     assert np.array_equal(moved[0], moved[1])
+
+
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        ("overheat", "it was too hot and rests"),
+        ("mute", "nothing has been measured for"),
+        ("power_off", "nothing has been measured for"),
+        ("stop", "the robot is stopped"),
+    ],
+)
+def test_a_joint_that_would_take_no_command_all_the_same_is_not_enabled_and_says_why(fault: str, reason: str) -> None:
+    head = Head()
+    told: list[Any] = []
+    enable = head.robot.bus.client("me", "/pan/enable", SetBool)
+    enable_all = head.robot.bus.client("me", "/servos/enable_all", SetBool)
+    head.robot.advance(1.0)
+    if fault == "stop":
+        head.driver.stop()
+    else:
+        head.robot.host.ask("servos", InjectFault(fault, "pan", 60.0))
+    head.robot.advance(3.0)
+    enable(SetBool.Request(data=False), told.append)
+    head.robot.advance(0.1)
+    enable(SetBool.Request(data=True), told.append)
+    enable_all(SetBool.Request(data=True), told.append)
+    head.robot.advance(0.1)
+    off, one, all_ = (reply.response for reply in told)
+    assert off.success
+    assert (one.success, all_.success) == (False, False)
+    assert reason in one.message
+    assert f"pan: {reason}" in all_.message
+    assert ("tilt" in all_.message) == (fault == "stop")
+    assert head.modes()[0] == JointMode.DISABLED
+    assert ("pan" in head.states[-1].name) == (fault in ("overheat", "stop"))  # where it is, is known

@@ -167,6 +167,12 @@ def test_cards_of_what_is_known_show_what_matters(open_page: Callable[..., Page]
     servos.get_by_role("button", name="Relax pan").click()
     expect(servos).to_contain_text("Pan: relaxed")
     assert robot.calls("/pan/relax") == [{}]
+    robot.answers["/pan/enable"] = lambda _: {"success": False, "message": "it was too hot and rests for 49 s"}
+    servos.get_by_role("button", name="Enable pan").click()
+    expect(servos).to_contain_text("Pan: not enabled: it was too hot and rests for 49 s")
+    robot.repeated = {"/joint_states": {"name": ["pan"], "position": [0.7853981]}}
+    expect(servos.get_by_role("row", name="Slide")).to_contain_text("\u2013")
+    expect(servos.get_by_role("row", name="Pan")).to_contain_text("45\u202f\u00b0")
     expect(page.get_by_label("base", exact=True)).to_contain_text("0.25\u202fm/s of 0.50\u202fm/s")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Literal
 
@@ -254,6 +254,16 @@ class JointDrive(ABC):
         else:
             self._requests.append(request)
 
+    def objection(self, now: float, *requests: joint_states.JointRequest) -> str:
+        """Return why these requests, one after the other, would be refused at `now` [s]; empty if they would not."""
+        _, actions = joint_states.step_joint(self.condition, self._inputs(requests), now, self.policy)
+        reasons = (action.reason for action in actions if isinstance(action, joint_states.Refuse))
+        return self.hindrance or next(reasons, "")
+
+    def _inputs(self, requests: Iterable[joint_states.JointRequest]) -> joint_states.JointInputs:
+        position, at = self.measured.position, self.measured_at
+        return joint_states.JointInputs(position, at, self.warmest, self.error, tuple(requests))
+
     def relax(self) -> None:
         """Switch torque off in the next cycle, until the next command."""
         self.ask(joint_states.Relax())
@@ -272,8 +282,7 @@ class JointDrive(ABC):
 
     def step(self, now: float, dt: float) -> list[Writes]:
         """Return what is to be written in the cycle that ends `dt` [s] from `now`, one after the other."""
-        found = tuple(self._requests)
-        inputs = joint_states.JointInputs(self.measured.position, self.measured_at, self.warmest, self.error, found)
+        inputs = self._inputs(self._requests)
         self._requests.clear()
         was_blocked = self.condition.is_blocked
         self.condition, actions = joint_states.step_joint(self.condition, inputs, now, self.policy)

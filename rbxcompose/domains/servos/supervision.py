@@ -176,7 +176,7 @@ class ServoReport:
 
 
 def joint_state(drives: Iterable[JointDrive], stamp: int) -> JointState | None:
-    """Return where the joints are that have been measured, None if none has; `stamp` is in ns."""
+    """Return where the joints are, without those that are not measured now, None if none is; `stamp` is in ns."""
     return _joint_state([(drive, drive.measured) for drive in drives], stamp)
 
 
@@ -186,7 +186,8 @@ def joint_command(drives: Iterable[JointDrive], stamp: int) -> JointState | None
 
 
 def _joint_state(samples: Iterable[tuple[JointDrive, JointSample]], stamp: int) -> JointState | None:
-    if not (known := [(drive, sample) for drive, sample in samples if math.isfinite(sample.position)]):
+    known = [each for each in samples if math.isfinite(each[1].position) and not each[0].condition.is_lost]
+    if not known:
         return None
     return JointState(
         header=Header(stamp=to_time(stamp)),

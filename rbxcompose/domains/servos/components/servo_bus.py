@@ -361,15 +361,18 @@ class ServoBusDriver(Component[ServoBusConfig]):
         return Trigger.Response(success=True)
 
     def enable(self, name: str, request: SetBool.Request) -> SetBool.Response:
-        """Enable a joint; while it is disabled, it has no torque and commands are refused."""
-        self.cycle.drives[name].ask(Enable(request.data))
-        return SetBool.Response(success=True)
+        """Enable a joint, unless it would take no command all the same; disabled, it has no torque and takes none."""
+        drive = self.cycle.drives[name]
+        refused = (self.refusal() or drive.objection(self.now, Enable(True), Hold())) if request.data else ""
+        if not refused:
+            drive.ask(Enable(request.data))
+        return SetBool.Response(success=not refused, message=refused)
 
     def on_enable_all(self, request: SetBool.Request) -> SetBool.Response:
-        """Enable all joints, or disable them."""
-        for drive in self.cycle.drives.values():
-            drive.ask(Enable(request.data))
-        return SetBool.Response(success=True)
+        """Enable all joints that can be, or disable all; name those that stay as they are."""
+        answers = {name: self.enable(name, request) for name in self.cycle.drives}
+        refused = [f"{name}: {answer.message}" for name, answer in answers.items() if not answer.success]
+        return SetBool.Response(success=not refused, message="; ".join(refused))
 
     def set_speed(self, name: str, request: SetSpeed.Request) -> SetSpeed.Response:
         """Set how fast a joint moves by single commands, within its limits."""
