@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from math import pi
+from typing import Any
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -15,12 +16,21 @@ from tests.console.looks import PHONE, overflows, violations
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
 
 
+TYPES = {"/base/odom": "nav_msgs/msg/Odometry", "/tf": "tf2_msgs/msg/TFMessage"}
+
+
+def odometry(x: float, z: float = 0.0) -> dict[str, Any]:
+    pose = {"position": {"x": x, "y": 1.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": z, "w": 1.0}}
+    return {"header": {"frame_id": "odom"}, "child_frame_id": "base_link", "pose": {"pose": pose}}
+
+
 def says(gateway: FakeGateway, mission: str, x: float) -> None:
     gauge = {"topic": "/battery_level", "message": "std_msgs/Float32", "unit": "%"}
     gateway.windows[RUNNING] = {"stop": None, "batteries": {"main_battery": gauge}}
     gateway.windows["mission/ListMissions"] = [{"name": mission, "about": "", "state": "running", "claims": []}]
     gateway.latched["/diagnostics_toplevel_state"] = {"level": 0, "message": ""}
-    gateway.latched["/odom"] = {"pose": {"pose": {"position": {"x": x, "y": 1.0}, "orientation": {"z": 0.0, "w": 1.0}}}}
+    gateway.answers["/rosapi/topics"] = lambda _: {"topics": list(TYPES), "types": list(TYPES.values())}
+    gateway.latched["/base/odom"] = odometry(x)
 
 
 @pytest.fixture
@@ -50,10 +60,27 @@ def test_robots_of_a_system_are_seen_at_once_and_one_opens_each(
     expect(cards["Digger"]).to_contain_text("Error: servo 3 is hot")
     expect(cards["Digger"].get_by_role("link", name="Open")).to_have_attribute("href", fleet.url)
     expect(cards["Lost one"]).to_contain_text("Does not answer")
-    expect(page.locator(".fleet-map")).to_contain_text("Digger at 4.00, 1.00 m")
-    fleet.say("/odom", {"pose": {"pose": {"position": {"x": 2.0, "y": 1.0}, "orientation": {"z": pi, "w": 1.0}}}})
-    expect(page.locator(".fleet-map")).to_contain_text("Digger at 2.00, 1.00 m")
+    places = page.locator(".fleet-map")
+    expect(places).to_contain_text("Digger at 4.00, 1.00 m in odom")
+    fleet.say("/base/odom", odometry(2.0, pi))
+    expect(places).to_contain_text("Digger at 2.00, 1.00 m in odom")
+    turned = {"translation": {"x": 5.0, "y": 0.0, "z": 0.0}, "rotation": {"x": 0.0, "y": 0.0, "z": 1.0, "w": 0.0}}
+    link = {"header": {"frame_id": "map"}, "child_frame_id": "odom", "transform": turned}
+    fleet.say("/tf", {"transforms": [link]})
+    expect(places).to_contain_text("Digger at 3.00, \u22121.00 m")
+    expect(places).to_contain_text("Turtlebot at 0.00, 1.00 m in odom")
     assert violations(page) == []
+
+
+def test_the_map_is_empty_when_all_robots_are_gone(
+    open_page: Callable[..., Page], gateway: FakeGateway, fleet: FakeGateway
+) -> None:
+    page = open_page(page_name="fleet", foreign=[fleet.url, "http://127.0.0.1:9/"])
+    expect(page.locator(".fleet-map")).to_contain_text("Digger at 4.00")
+    for robot in (gateway, fleet):
+        robot.is_away = True
+        robot.drop()
+    expect(page.locator(".fleet-map")).to_have_text("Waiting for the first position\u2026")
 
 
 def test_it_fits_a_phone(open_page: Callable[..., Page], fleet: FakeGateway) -> None:

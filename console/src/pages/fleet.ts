@@ -1,5 +1,6 @@
 /** Fleet: the robots of a system, each with its charge, mission, diagnostics and place, and the way to its console. */
-import { pluck, type Config } from "../config";
+import { pluck } from "../config";
+import { watchComponents } from "../description";
 import { levelOf } from "../diagnostics";
 import { h, icon, setText, svg, type Icon } from "../dom";
 import { BatteryGauge } from "../elements/battery_gauge";
@@ -7,16 +8,20 @@ import { frameOf, gridOf, pageOf } from "../fleet";
 import { formatName, formatNumber } from "../format";
 import type { Page, Robot } from "../page";
 import { isMessage, Rosbridge, type Json } from "../rosbridge";
+import { Whereabouts } from "../whereabouts";
 import "./fleet.css";
 
 const SLOW = 1_000; // [ms] between two looks at a robot
+const LOOK = 2_000; // [ms] between two looks at its topics
+const DRAW = 500; // [ms]
+
 export const page: Page = {
   name: "fleet",
   title: "Fleet",
   order: 5,
   isFor: ({ config }) => Object.keys(config.fleet).length > 0,
   open(host, robot) {
-    const map = new FleetMap(robot.config);
+    const map = new FleetMap();
     const rows = Object.entries(robot.config.fleet).map(([name, address]) => robotCard(robot, name, address, map));
     host.append(
       h(
@@ -26,7 +31,11 @@ export const page: Page = {
         map.element,
       ),
     );
-    return () => rows.forEach(({ close }) => close());
+    const timer = setInterval(() => map.draw(), DRAW);
+    return () => {
+      clearInterval(timer);
+      rows.forEach(({ close }) => close());
+    };
   },
 };
 
@@ -53,7 +62,7 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
     const is = link.state.value.is;
     const lost = is !== "open";
     element.classList.toggle("lost", lost);
-    if (lost) map.move(name, null);
+    if (lost) place.pose = null;
     const [picture, words]: [Icon, string] = lost
       ? ["unlink", is === "connecting" ? "Connecting\u2026" : "Does not answer"]
       : stoppedBy
@@ -85,8 +94,23 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
     const words = running.map(({ name: mission_, state: is }) => `${formatName(String(mission_))} is ${String(is)}`);
     setText(mission, words.join(", ") || "No mission is running");
   };
+  const place = new Whereabouts();
+  map.places.set(name, place);
+  const followed = new Map<string, (() => void) | null>();
+  const follow = async () => {
+    const found = await link.call("/rosapi/topics").catch(() => null); // there is another look soon
+    if (isClosed || !isMessage(found) || !Array.isArray(found.topics) || !Array.isArray(found.types)) return;
+    for (const [turn, topic] of found.topics.map(String).entries()) {
+      if (!followed.has(topic)) followed.set(topic, place.follow(link, topic, String(found.types[turn])));
+    }
+  };
+  const timer = setInterval(() => void follow(), LOOK);
+  let isClosed = false;
   const closers = [
-    link.state.watch(showState),
+    link.state.watch((state) => {
+      showState();
+      if (state.is === "open") void follow();
+    }),
     link.watch("robot/RobotStatus", showStatus, SLOW),
     link.watch("mission/ListMissions", showMissions, SLOW),
     link.subscribe(
@@ -98,60 +122,45 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
       },
       { type: "diagnostic_msgs/DiagnosticStatus" },
     ),
-    link.subscribe(
-      "/odom",
-      (message) => {
-        const x = pluck(message, "pose.pose.position.x");
-        const y = pluck(message, "pose.pose.position.y");
-        const z = pluck(message, "pose.pose.orientation.z") ?? 0;
-        const w = pluck(message, "pose.pose.orientation.w") ?? 1;
-        if (x !== null && y !== null) map.move(name, { x, y, heading: 2 * Math.atan2(z, w) });
-      },
-      { type: "nav_msgs/Odometry", throttle: SLOW / 2 },
-    ),
+    watchComponents(link, (components) => place.learn(components)),
+    () => clearInterval(timer),
+    () => followed.forEach((end) => end?.()),
   ];
   return {
     element,
     close: () => {
+      isClosed = true;
       for (const close of [...closers, ...gauges.values()]) close();
       if (!isOwn) link.close();
     },
   };
 }
 
-interface Pose {
-  x: number;
-  y: number;
-  heading: number;
-}
-
-/** All robots from above, where their odometry has them; x points right. */
+/** All robots from above, in `map`, or where their odometry has them if they have no such frame; x points right. */
 class FleetMap {
-  readonly element: HTMLElement;
   readonly #drawing = svg("svg", { role: "img", "aria-label": "Where the robots are" });
-  readonly #caption = h("p", { class: "label" }, "Waiting for the first position\u2026");
-  readonly #poses = new Map<string, Pose>();
+  readonly #caption = h("p", { class: "label" });
+  readonly element = h("section", { class: "card fleet-map", "aria-label": "Map" }, this.#drawing, this.#caption);
+  readonly places = new Map<string, Whereabouts>();
 
-  constructor(config: Config) {
-    this.element = h("section", { class: "card fleet-map", "aria-label": "Map" }, this.#drawing, this.#caption);
-    for (const name of Object.keys(config.fleet)) this.move(name, null);
+  constructor() {
+    this.draw();
   }
 
-  move(name: string, pose: Pose | null): void {
-    if (pose) this.#poses.set(name, pose);
-    else this.#poses.delete(name);
-    this.#draw();
-  }
-
-  #draw(): void {
-    const poses = [...this.#poses];
+  draw(): void {
+    const known = [...this.places].flatMap(([name, { pose, fixed }]) => (pose ? [{ name, pose, fixed }] : []));
+    const words = known.map(({ name, pose: { x, y }, fixed }) => {
+      const where = `${formatName(name)} at ${formatNumber(x, "m")}, ${formatNumber(y, "m")} m`;
+      return fixed === "map" ? where : `${where} in ${fixed}`;
+    });
+    setText(this.#caption, words.join("; ") || "Waiting for the first position\u2026");
     this.#drawing.replaceChildren();
-    if (poses.length === 0) return;
-    const { left, top, size } = frameOf(poses.map(([, pose]) => pose));
+    if (known.length === 0) return;
+    const { left, top, size } = frameOf(known.map(({ pose }) => pose));
     this.#drawing.setAttribute("viewBox", `${left} ${top} ${size} ${size}`);
     const unit = size / 100;
     this.#drawing.append(svg("path", { d: gridOf(left, top, size), class: "fleet-grid" }));
-    for (const [name, { x, y, heading }] of poses) {
+    for (const { name, pose: { x, y, heading } } of known) {
       const turn = `translate(${x} ${-y}) rotate(${(-heading * 180) / Math.PI}) scale(${unit})`;
       const arrow = svg("path", { d: "M3 0L-2.500 2L-1.500 0L-2.500 -2Z", transform: turn, class: "fleet-arrow" });
       const label = svg("text", { x: String(x), y: String(-y + 7 * unit), class: "fleet-label" });
@@ -159,9 +168,5 @@ class FleetMap {
       label.textContent = formatName(name);
       this.#drawing.append(arrow, label);
     }
-    setText(
-      this.#caption,
-      poses.map(([name, { x, y }]) => `${formatName(name)} at ${formatNumber(x, "m")}, ${formatNumber(y, "m")} m`).join("; "),
-    );
   }
 }

@@ -8,16 +8,11 @@ import {
   applied,
   distance,
   frameOf,
-  Frames,
-  plain,
   poseMessage,
-  poseOf,
   readGrid,
   readMarkers,
   readPath,
   readScan,
-  readTransform,
-  readTransforms,
   Trail,
   type Grid,
   type Markers,
@@ -32,14 +27,13 @@ import { remember, wasOn } from "../remembered";
 import { thingMarkers } from "../seen";
 import { isMessage, type Json, type Message, type Rosbridge } from "../rosbridge";
 import { Trip, type TripState } from "../trip";
+import { Whereabouts } from "../whereabouts";
 import { outlineOf, readWorld, type World } from "../world";
 import "./map.css";
 
-const ODOMETRY = 100; // [ms] between two messages
 const LOOK = 2_000; // [ms] between two looks at the topics
 const TICK = 500;
 const OLD = 2_000; // [ms] after which a position is called old
-const BASES = ["base_footprint", "base_link"]; // of robots that publish no odometry
 const NAVIGATE = "nav2_msgs/action/NavigateToPose";
 const STATUS = "action_msgs/msg/GoalStatusArray";
 const INITIAL = "/initialpose";
@@ -155,17 +149,12 @@ class MapView {
   readonly #layers = h("ul", { class: "map-list" });
   readonly #layersCard = h("section", { class: "card", "aria-label": "Layers" }, h("h2", {}, "Layers"), this.#layers);
   readonly #closers: (() => void)[] = [];
-  readonly #frames = new Frames();
+  readonly #place = new Whereabouts(() => this.#moved());
   readonly #trail = new Trail();
-  readonly #published = new Set<string>(); // frames whose transforms are published
   readonly #drawn = new Map<string, Drawn | null>();
   readonly #followed = new Map<string, () => void>();
-  #base = "";
-  #odometry = ""; // the topic of the base that drives; there may be others
   #fixed = "map";
-  #pose: Pose | null = null;
-  #seenAt = -Infinity; // when the position came [ms]
-  #stamp = 0; // of the newest transform [s]
+  #isPlaced = false;
   #navigator: Port | null = null;
   #isDescribed = false;
   #docks: ReadonlySet<string> = new Set();
@@ -216,7 +205,7 @@ class MapView {
       robot.stopped.watch(() => this.#enable()),
       link.state.watch(({ is }) => {
         if (is === "open") void this.#findTopics();
-        else this.#seenAt = -Infinity;
+        else this.#place.seenAt = -Infinity;
         this.#tick();
       }),
     );
@@ -304,10 +293,7 @@ class MapView {
     if (this.#navigator) this.#watchGoals(this.#navigator.topic);
     const docks = components.flatMap(({ capabilities }) => (capabilities.Charges ?? []).map(({ place }) => place));
     this.#docks = new Set(docks.filter(isMessage).map(({ name }) => String(name)));
-    const drives = components.flatMap(({ ports, capabilities }) =>
-      ports.filter(({ name }) => name === capabilities.Drives?.[0]?.odometry),
-    );
-    this.#odometry = drives[0]?.topic ?? "";
+    this.#place.learn(components);
     this.#isDescribed = components.length > 0;
     this.#showTrip(this.#trip.state.value);
     this.#tick();
@@ -360,14 +346,9 @@ class MapView {
     if (this.#followed.has(topic)) return;
     const { link } = this.#robot;
     const kind = type.split("/").at(-1)!;
-    if (kind === "TFMessage") {
-      this.#followed.set(topic, link.subscribe(topic, (message) => this.#onTransforms(message, topic), { type }));
-    } else if (kind === "Odometry") {
-      const listener = (message: Message) => this.#onOdometry(topic, message);
-      this.#followed.set(topic, link.subscribe(topic, listener, { type, throttle: ODOMETRY }));
-    } else if (LAYERS[kind]?.only?.test(topic) ?? LAYERS[kind]) {
-      this.#addLayer(topic, type, LAYERS[kind]);
-    }
+    const close = this.#place.follow(link, topic, type);
+    if (close) this.#followed.set(topic, close);
+    else if (LAYERS[kind]?.only?.test(topic) ?? LAYERS[kind]) this.#addLayer(topic, type, LAYERS[kind]);
   }
 
   #addLayer(topic: string, type: string, { words, throttle, read, remembered }: Layer): void {
@@ -401,49 +382,18 @@ class MapView {
 
   // Where the robot is
 
-  #onTransforms(message: Message, topic: string): void {
-    const base = this.#baseFrame();
-    const above = this.#frames.above(base);
-    for (const { parent, child, transform, stamp } of readTransforms(message)) {
-      if (!topic.endsWith("tf_static")) this.#stamp = stamp;
-      this.#frames.set(parent, child, transform);
-      this.#published.add(child);
-      if (above.has(child)) this.#seenAt = performance.now();
-    }
-    this.#moved();
-  }
-
-  /** Takes the pose of an odometry for a transform, unless somebody publishes that as well. */
-  #onOdometry(topic: string, message: Message): void {
-    const child = plain(String(message.child_frame_id ?? ""));
-    const transform = isMessage(message.pose) ? readTransform(message.pose.pose) : null;
-    if (!child || !transform) return;
-    if (!this.#base || topic === this.#odometry) this.#base = child;
-    this.#seenAt = performance.now();
-    if (!this.#published.has(child)) this.#frames.set(frameOf(message), child, transform);
-    this.#moved();
-  }
-
-  #baseFrame(): string {
-    return this.#base || (BASES.find((frame) => this.#frames.has(frame)) ?? "");
-  }
-
   #moved(): void {
-    const base = this.#baseFrame();
-    if (!this.#frames.has(base)) return;
-    const fixed = this.#frames.fixedFor(base);
+    const { fixed, pose } = this.#place;
     if (fixed !== this.#fixed) this.#trail.clear();
-    this.#fixed = fixed;
-    const transform = this.#frames.lookUp(fixed, base);
-    const isFirst = this.#pose === null;
-    this.#pose = transform && poseOf(transform);
-    if (this.#pose) this.#trail.add(this.#pose, performance.now());
+    const isFirst = !this.#isPlaced;
+    [this.#fixed, this.#isPlaced] = [fixed, pose !== null];
+    if (pose) this.#trail.add(pose, performance.now());
     if (isFirst) this.#tick();
     this.#draw();
   }
 
   #isOld(): boolean {
-    return performance.now() - this.#seenAt > OLD;
+    return performance.now() - this.#place.seenAt > OLD;
   }
 
   // What is shown
@@ -457,7 +407,7 @@ class MapView {
 
   #paint(): void {
     const drawn = [...this.#drawn.values()].flatMap((each) => {
-      const place = each && this.#frames.lookUp(this.#fixed, each.frame);
+      const place = each && this.#place.frames.lookUp(this.#fixed, each.frame);
       return each && place ? [{ each, place }] : [];
     });
     const lines = (is: "path" | "scan") =>
@@ -466,7 +416,7 @@ class MapView {
     const on = (place: Transform, points: readonly Point[]) => points.map(({ x, y }) => applied(place, { x, y, z: 0 }));
     const markers = drawn.flatMap(({ each, place }) => (each.is === "markers" ? [{ each, place }] : []));
     this.#canvas.show({
-      robot: this.#pose,
+      robot: this.#place.pose,
       isOld: this.#isOld(),
       trail: this.#trail.points,
       places: this.#shownPlaces(),
@@ -478,7 +428,7 @@ class MapView {
       ),
       labels: markers.flatMap(({ each, place }) => each.labels.map(({ at, text }) => ({ text, ...applied(place, at) }))),
       outlines: drawn.flatMap(({ each, place }) =>
-        each.is === "world" ? each.world.shapes.map((shape) => on(place, outlineOf(shape, each.world.epoch + this.#stamp))) : [],
+        each.is === "world" ? each.world.shapes.map((shape) => on(place, outlineOf(shape, each.world.epoch + this.#place.stamp))) : [],
       ),
       paths: lines("path"),
       scans: lines("scan"),
@@ -507,13 +457,13 @@ class MapView {
   #tick(): void {
     const old = this.#isOld();
     for (const { place, note } of this.#places) {
-      const from = !old && this.#placesAreOnMap() ? this.#pose : null;
+      const from = !old && this.#placesAreOnMap() ? this.#place.pose : null;
       const away = from ? `, ${metres(distance(from, place))} away` : "";
       setText(note, `${this.#docks.has(place.name) ? "Dock: it charges here. " : ""}${numbersOf(place)}${away}`);
     }
-    if (this.#pose) {
-      const age = Number.isFinite(this.#seenAt) ? ` ${formatAge(performance.now() - this.#seenAt)} ago` : " before";
-      setText(this.#where, `${old ? `Robot, as it was${age}` : "Robot"}: ${numbersOf(this.#pose)}, in ${this.#fixed}`);
+    if (this.#place.pose) {
+      const age = Number.isFinite(this.#place.seenAt) ? ` ${formatAge(performance.now() - this.#place.seenAt)} ago` : " before";
+      setText(this.#where, `${old ? `Robot, as it was${age}` : "Robot"}: ${numbersOf(this.#place.pose)}, in ${this.#fixed}`);
     }
     this.#enable();
     this.#showHint();
@@ -525,7 +475,7 @@ class MapView {
       this.#measured,
       TOOLS[this.#tool][1],
       this.#failure,
-      this.#pose ? "" : UNKNOWN,
+      this.#place.pose ? "" : UNKNOWN,
       this.#placesAreOnMap() || !this.#places.length ? "" : NOT_IN_MAP,
     ];
     setText(this.#hint, texts.find(Boolean) ?? "");
@@ -581,7 +531,7 @@ class MapView {
   /** Opens the editor of places in place of their list; it stays while the view is moved or something is measured. */
   #edit(): void {
     if (this.#editor) return;
-    const stands = () => (this.#placesAreOnMap() ? this.#pose : null);
+    const stands = () => (this.#placesAreOnMap() ? this.#place.pose : null);
     this.#editor = new PlacesEditor(this.#robot, () => this.#draw(), () => this.#endEdit(), stands);
     this.#placesCard.hidden = true;
     this.#placesCard.before(this.#editor.element);
