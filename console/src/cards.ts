@@ -1,6 +1,7 @@
 /** Cards of components, drawn from what they declare; a domain may bring a better one as a file in `cards/`. */
+import { whyNot } from "./config";
 import type { Component, Port } from "./description";
-import { h, icon, setText } from "./dom";
+import { disable, h, icon, setText } from "./dom";
 import { FieldError, fieldsOf, labelOf, leavesOf, messageOf, NO_HINTS, type Field, type TypeDef } from "./forms";
 import { formatName, formatNumber, UNKNOWN } from "./format";
 import { runningGoal, sendGoal, type KeptGoal } from "./goals";
@@ -119,10 +120,10 @@ function declaredText(fields: Record<string, Json>): string {
 /** Returns the button of a service or action, with its form if it has one. */
 export function skillOf(port: Port, robot: Robot, title = formatName(port.skill || port.name)): HTMLElement {
   const says = h("p", { class: "says", role: "status" });
-  if (/\/(Trigger|Empty)$/.test(port.type)) return h("div", { class: "skill" }, runButton(port, robot, title, () => ({}), says), says);
+  if (/\/(Trigger|Empty)$/.test(port.type)) return h("div", { class: "skill" }, ownButton(port, robot, title, () => ({}), says), says);
   if (/\/SetBool$/.test(port.type)) {
-    const on = runButton(port, robot, `${title}: on`, () => ({ data: true }), says);
-    const off = runButton(port, robot, `${title}: off`, () => ({ data: false }), says);
+    const on = ownButton(port, robot, `${title}: on`, () => ({ data: true }), says);
+    const off = ownButton(port, robot, `${title}: off`, () => ({ data: false }), says);
     return h("div", { class: "skill" }, h("div", { class: "row" }, on, off), says);
   }
   const box = h("details", { class: "skill" }, h("summary", {}, title));
@@ -147,7 +148,7 @@ async function fillForm(box: HTMLElement, port: Port, robot: Robot, title: strin
   setText(says, "");
   const inputs = fields.map((one) => inputOf(one, port));
   const form = h("form", {}, ...inputs.map(({ element }) => element));
-  const run = runButton(port, robot, title, () => messageOf(fields, inputs.map(({ read }) => read())), says);
+  const run = ownButton(port, robot, title, () => messageOf(fields, inputs.map(({ read }) => read())), says);
   run.type = "submit";
   form.append(run);
   form.onsubmit = (event) => event.preventDefault();

@@ -15,7 +15,7 @@ from rbxcompose.base.requests import Refused
 from tests.console.browser import CHROMIUM
 from tests.console.fake_gateway import CONFIG, FakeGateway, FakeLog
 from tests.console.looks import PHONE, expect_fit, violations
-from tests.console.test_page_robot import DESCRIBED, component
+from tests.console.test_page_robot import DESCRIBED, component, port
 from tests.soak import rare
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
@@ -82,6 +82,12 @@ def test_a_message_is_published_and_what_is_wrong_is_said(open_page: Callable[..
     page.get_by_label("Hz").fill("1000")
     page.get_by_role("button", name="Publish again and again").click()
     expect(page.get_by_text("a number up to 50 Hz")).to_be_visible()
+    gateway.others = "Ada"
+    text.fill('{"linear": {"x": 1}}')
+    page.get_by_label("Hz").fill("50")
+    page.get_by_role("button", name="Publish again and again").click()
+    expect(page.get_by_text("not yours")).to_be_visible()
+    expect(page.get_by_role("button", name="Publish again and again")).to_be_visible()
 
 
 def an_input(name: str, priority: int, state: str, **more: Any) -> dict[str, Any]:
@@ -139,13 +145,20 @@ def test_who_may_only_look_is_offered_nothing_that_the_robot_refuses(
     open_page: Callable[..., Page], gateway: FakeGateway
 ) -> None:
     has_mux(gateway)
+    has_topics(gateway)
+    rinse = port("rinse", "serves", "/rinse", "std_srvs/srv/Trigger", skill="rinse")
+    gateway.windows[DESCRIBED] = [component("cmd_vel", "mux", rinse, requests={"mux.LookAtMux": False})]
     gateway.config = {**CONFIG, "role": "view"}
     gateway.windows["robot/RobotStatus"] = {"stop": {"by": "the console", "time": 1.0}}
     page = open_page(page_name="mux")
-    for name in ("Lock navigation", "Lock all", "Unlock all", "Release"):
-        button = page.get_by_role("button", name=name, exact=True)
-        expect(button).to_be_disabled()
-        expect(button).to_have_attribute("title", "This needs the link of the role operate.")
+
+    def expect_refused(*names: str) -> None:
+        for name in names:
+            button = page.get_by_role("button", name=name, exact=True)
+            expect(button).to_be_disabled()
+            expect(button).to_have_attribute("title", "This needs the link of the role operate.")
+
+    expect_refused("Lock navigation", "Lock all", "Unlock all", "Release")
     page.get_by_role("link", name="Drive").click()
     expect(page.locator(".hint").first).to_have_text("Driving needs the link of the role operate.")
     expect(page.get_by_label("Top speed")).to_be_disabled()
@@ -153,6 +166,12 @@ def test_who_may_only_look_is_offered_nothing_that_the_robot_refuses(
     page.keyboard.press("Shift+ArrowUp")
     assert {frame["op"] for _, frame in gateway.frames} == {"subscribe", "unsubscribe"}
     assert violations(page) == []
+    page.get_by_role("link", name="Robot").click()
+    expect_refused("Rinse")
+    page.get_by_role("link", name="Data").click()
+    page.get_by_role("button", name="/pose").click()
+    page.get_by_text("Publish", exact=True).click()
+    expect_refused("Publish once", "Publish again and again")
 
 
 def test_the_log_grows_and_is_filtered(open_page: Callable[..., Page], gateway: FakeGateway) -> None:

@@ -1,7 +1,8 @@
 /** Data: topics with their types and rates, what they carry, plots of numbers, and publishing. */
 import type uPlot from "uplot";
+import { whyNot } from "../config";
 import { columns, numberAt, Rate, Series, shapeOf, valueAt, writable, type Path } from "../data";
-import { emptyCard, h, icon, setText } from "../dom";
+import { disable, emptyCard, h, icon, setText } from "../dom";
 import { numberIn } from "../format";
 import type { Page, Robot } from "../page";
 import { isMessage, type Json, type Message } from "../rosbridge";
@@ -111,6 +112,7 @@ class TopicView {
   readonly #shownRate = h("span", { class: "label", role: "status" });
   readonly #tree = h("div", { class: "echo" }, h("p", { class: "label" }, "No message has come yet."));
   readonly #text = h("textarea", { id: "publish", rows: "6", spellcheck: "false" });
+  readonly #again = h("button", { type: "button" });
   readonly #says = h("p", { class: "says", role: "status" });
   readonly #open = new Set<string>();
   /** What shows each value that can be seen: where a message is as the last one, nothing is drawn again under a finger. */
@@ -217,26 +219,22 @@ class TopicView {
   #publisher(): HTMLElement {
     const rate = h("input", { id: "publish-rate", inputmode: "decimal", value: "10", autocomplete: "off" });
     const once = h("button", {}, icon("skip"), "Publish once");
-    const again = h("button", { type: "button" }, icon("play"), "Publish again and again");
-    const stop = () => {
-      clearInterval(this.#timer);
-      this.#timer = undefined;
-      again.replaceChildren(icon("play"), "Publish again and again");
-    };
-    again.onclick = () => {
-      if (this.#timer !== undefined) return stop();
+    disable(whyNot(this.#robot.config, "operate"), once, this.#again);
+    this.#stop();
+    this.#again.onclick = () => {
+      if (this.#timer !== undefined) return this.#stop();
       const hertz = numberIn(rate.value);
       if (!(hertz > 0 && hertz <= 50)) return this.#say("The rate is a number up to 50 Hz.", "bad");
       if (!this.#send()) return;
-      this.#timer = setInterval(() => this.#send() || stop(), 1000 / hertz);
-      again.replaceChildren(icon("pause"), "Stop publishing");
+      this.#timer = setInterval(() => this.#send() || this.#stop(), 1000 / hertz);
+      this.#again.replaceChildren(icon("pause"), "Stop publishing");
     };
     const form = h(
       "form",
       { class: "card publish", "aria-label": "Publish" },
       h("label", { for: "publish" }, `A message for ${this.topic}, as JSON; what is left out is zero`),
       this.#text,
-      h("div", { class: "row" }, once, again, h("div", { class: "field rate" }, h("label", { for: rate.id }, "Hz"), rate)),
+      h("div", { class: "row" }, once, this.#again, h("div", { class: "field rate" }, h("label", { for: rate.id }, "Hz"), rate)),
       this.#says,
     );
     form.onsubmit = (event) => {
@@ -244,6 +242,12 @@ class TopicView {
       this.#send();
     };
     return h("details", {}, h("summary", {}, "Publish"), form);
+  }
+
+  #stop(): void {
+    clearInterval(this.#timer);
+    this.#timer = undefined;
+    this.#again.replaceChildren(icon("play"), "Publish again and again");
   }
 
   /** Publishes what is written; returns whether that was possible. */
@@ -259,7 +263,11 @@ class TopicView {
       this.#say("A message is written {...}.", "bad");
       return false;
     }
-    this.#robot.link.onStatus = ({ level, msg }) => level === "error" && this.#say(msg, "bad");
+    this.#robot.link.onStatus = ({ level, msg }) => {
+      if (level !== "error") return;
+      this.#stop();
+      this.#say(msg, "bad");
+    };
     const isSent = this.#robot.link.publish(this.topic, message, { type: this.#type, id: "data" });
     this.#say(isSent ? "Published." : "Not connected.", isSent ? "good" : "bad");
     return isSent;
