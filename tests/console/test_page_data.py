@@ -218,6 +218,9 @@ def test_they_fit_a_phone(open_page: Callable[..., Page], gateway: FakeGateway, 
     ready = {"data": "/pose", "mux": "Lock all", "log": "Pause"}[name]
     page.get_by_role("button", name=ready).first.click()
     page.wait_for_load_state()
+    assert page.evaluate(
+        "[...document.querySelectorAll('.mux .wide')].every(box => box.scrollWidth <= box.clientWidth)"
+    )
     expect_fit(page)
 
 
