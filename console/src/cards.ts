@@ -1,12 +1,14 @@
 /** Cards of components, drawn from what they declare; a domain may bring a better one as a file in `cards/`. */
 import { whyNot } from "./config";
 import type { Component, Port } from "./description";
+import { levelOf } from "./diagnostics";
 import { disable, h, icon, setText } from "./dom";
 import { FieldError, fieldsOf, labelOf, leavesOf, messageOf, NO_HINTS, type Field, type TypeDef } from "./forms";
 import { formatName, formatNumber, UNKNOWN } from "./format";
 import { runningGoal, sendGoal, type KeptGoal } from "./goals";
 import type { Robot } from "./page";
 import { isMessage, type Json, type Message } from "./rosbridge";
+import { plain, unitsIn } from "./units";
 
 export interface Card {
   isFor(component: Component): boolean;
@@ -24,6 +26,10 @@ const LONGEST = 80; // letters of a text
 const SETTLED: Record<string, string> = { "4": "Done", "5": "Canceled", "6": "Failed" };
 /** Messages that are drawn or followed, not read. */
 const UNREADABLE = /robot_description|Image$|PointCloud|OccupancyGrid|LaserScan|TFMessage|Marker|Path$|Trajectory|DiagnosticArray|SceneObjects|PlanningScene/;
+/** What people read of messages of a type, in place of their values. */
+const READERS: Record<string, (message: Message) => string> = {
+  "diagnostic_msgs/DiagnosticStatus": ({ level, message }) => [levelOf(level).word, level ? message : ""].filter(Boolean).join(": "),
+};
 const FINISHED = 4;
 
 /** Fills a card with all that a component offers, and returns what closes it. */
@@ -63,14 +69,16 @@ function showValue(list: HTMLElement, port: Port, robot: Robot): () => void {
     }
     return cell;
   };
-  const waiting = row("data");
+  row("data");
   list.append(group);
+  const [read, units] = [READERS[plain(port.type)], unitsIn(port.type)];
   return robot.link.subscribe(
     port.topic,
     (message) => {
-      const leaves = leavesOf(message, MOST);
-      if (!leaves.some(([name]) => name === "data") && rows.delete("data")) waiting.parentElement!.remove();
-      for (const [name, value] of leaves) setText(row(name), shown(value, name === "data" ? port.unit : ""));
+      const leaves = leavesOf(read ? { data: read(message) } : message, MOST, units);
+      if (leaves.length === 0) leaves.push(["data", null, ""]);
+      for (const [name, value, unit] of leaves) setText(row(name), shown(value, name === "data" ? port.unit : unit));
+      for (const [name, cell] of rows) cell.parentElement!.hidden = !leaves.some(([own]) => own === name);
     },
     { type: port.type, throttle: LOOK },
   );
@@ -78,6 +86,7 @@ function showValue(list: HTMLElement, port: Port, robot: Robot): () => void {
 
 /** Returns a value as people read it. */
 export function shown(value: Json, unit = ""): string {
+  if (Array.isArray(value)) return value.map((each) => shown(each)).join(", ") + (unit && `\u202f${unit}`);
   if (typeof value === "string" && value.length > LONGEST) return `${value.slice(0, LONGEST)}\u2026`;
   const text = typeof value === "number" ? (Number.isInteger(value) && !unit ? String(value) : formatNumber(value, unit)) : value === null ? UNKNOWN : String(value);
   return unit && value !== null ? `${text}\u202f${unit}` : text;

@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { fieldsOf, leavesOf, messageOf, NO_HINTS, type TypeDef } from "./forms";
+import { unitsIn } from "./units";
 
 const GOAL: TypeDef[] = [
   { type: "demo/Reach_Goal", fieldnames: ["tip", "speed", "pose", "keep", "names"], fieldtypes: ["demo/Tip", "float64", "string", "bool", "string"], fieldarraylen: [-1, -1, -1, -1, 0] },
@@ -64,6 +65,18 @@ describe("a form", () => {
     expect(Object.keys(to).sort()).toEqual(["w", "x", "y", "z"]);
   });
 
+  it("has the units of standard types, unless the robot says others", () => {
+    const number = (type: string, ...fieldnames: string[]) => ({ type, fieldnames, fieldtypes: fieldnames.map(() => "float64"), fieldarraylen: fieldnames.map(() => -1) });
+    const types = [
+      { type: "a/Go_Goal", fieldnames: ["to", "twist", "other"], fieldtypes: ["geometry_msgs/msg/Point", "geometry_msgs/msg/Twist", "geometry_msgs/msg/Point"], fieldarraylen: [-1, -1, -1] },
+      number("geometry_msgs/Point", "x"),
+      { type: "geometry_msgs/Twist", fieldnames: ["linear", "angular"], fieldtypes: ["geometry_msgs/Vector3", "geometry_msgs/Vector3"], fieldarraylen: [-1, -1] },
+      number("geometry_msgs/Vector3", "x"),
+    ];
+    const fields = fieldsOf(types, "a/Go_Goal", { ...NO_HINTS, measures: { other: { x: "%" } } });
+    expect(fields.map(({ unit }) => unit)).toEqual(["m", "m/s", "\u00b0/s", "%"]);
+  });
+
   it("ends with a type that contains itself", () => {
     const loop = [{ type: "a/A", fieldnames: ["a"], fieldtypes: ["a/A"], fieldarraylen: [-1] }];
     expect(fieldsOf(loop, "a/A")).toHaveLength(1);
@@ -72,7 +85,19 @@ describe("a form", () => {
 
 describe("the leaves of a message", () => {
   it("are its values, counted and without its header", () => {
-    const message = { header: { frame_id: "x" }, a: { b: 1, c: [1, 2] }, d: "e", f: true };
-    expect(leavesOf(message, 3)).toEqual([["a b", 1], ["a c", "2 items"], ["d", "e"]]);
+    const message = { header: { frame_id: "x" }, a: { b: 1, c: ["u", "v"], none: "", empty: [] }, d: "e", f: true };
+    expect(leavesOf(message, 3)).toEqual([["a b", 1, ""], ["a c", "2 items", ""], ["d", "e", ""]]);
+  });
+
+  it("have the units that standard types have", () => {
+    const odometry = { pose: { pose: { position: { x: 1 } } }, twist: { twist: { linear: { x: 0.3 }, angular: { z: 1 } } } };
+    expect(leavesOf(odometry, 6, unitsIn("nav_msgs/msg/Odometry")).map(([, , unit]) => unit)).toEqual(["m", "m/s", "rad/s"]);
+    expect(leavesOf({ voltage: 12, present: true }, 6, unitsIn("sensor_msgs/BatteryState"))).toEqual([["voltage", 12, "V"], ["present", true, ""]]);
+  });
+
+  it("are the numbers of a short list, with the names that a message has for them", () => {
+    const many = Array.from({ length: 40 }, () => 0);
+    expect(leavesOf({ name: ["pan", "tilt"], position: [0.5, -1], effort: [null, null] }, 6)).toEqual([["position", ["pan 0.50", "tilt \u22121.00"], ""]]);
+    expect(leavesOf({ data: [1, 2], many }, 6)).toEqual([["data", [1, 2], ""], ["many", "40 items", ""]]);
   });
 });

@@ -1,6 +1,7 @@
 /** Forms for messages: from the definition of a type, its units and the words it may hold, to what is sent. */
-import { numberIn } from "./format";
+import { formatNumber, numberIn } from "./format";
 import { isMessage, type Json, type Message } from "./rosbridge";
+import { plain, unitsAt, unitsIn } from "./units";
 
 /** One type as rosapi describes it; `fieldarraylen` is -1 for what is no array, and 0 for one of any length. */
 export interface TypeDef {
@@ -39,6 +40,7 @@ const NUMBERS = /^(float|double)(32|64)?$/;
 const TIMES = /(^|\/)(Time|Duration)$|^time$|^duration$/;
 const RANGE = /^(-?[\d.]+) to (-?[\d.]+)$/;
 const DEEPEST = 6;
+const SHORT = 12; // numbers of a list
 const TURNS = ["roll", "pitch", "yaw"] as const; // what people write in place of a quaternion
 
 /** Returns the fields of a message, nested ones by their path; a header is left to the robot but for its frame. */
@@ -58,7 +60,7 @@ function within(
   return type.fieldnames.flatMap((name, at) => {
     const kind = plain(type.fieldtypes[at] ?? "");
     const isArray = (type.fieldarraylen[at] ?? -1) >= 0;
-    const inner = isMessage(measures ?? null) ? (measures as Message)[name] : undefined;
+    const inner = unitsAt(measures, name) ?? unitsAt(unitsIn(type.type), name);
     const here = [...path, name];
     if (!isArray && kind === "geometry_msgs/Quaternion") return TURNS.map((turn) => field([...here, turn], "angle", "rad"));
     const nested = known.get(kind);
@@ -84,11 +86,6 @@ function field(path: string[], kind: Kind, unit: string): Field {
   const isAngle = unit === "rad" || unit === "rad/s"; // people think in degrees
   const shown = range ? "" : isAngle ? unit.replace("rad", "\u00b0") : unit;
   return { path, kind, unit: shown, scale: isAngle ? Math.PI / 180 : 1, choices: [], least, most, value: kind === "text" ? "" : "0" };
-}
-
-/** Returns the name of a type without `msg`, `srv` or `action` in its middle. */
-function plain(type: string): string {
-  return type.replace(/\/(msg|srv|action)\//, "/");
 }
 
 /** Returns what a field is called: the path without what is said by the last word. */
@@ -153,14 +150,33 @@ function valueOf(one: Field, text: string): Json {
   return number * one.scale;
 }
 
-/** Returns the plain values of a message with their paths, so many at most; arrays are counted, headers left out. */
-export function leavesOf(message: Json, most: number, path: readonly string[] = []): [string, Json][] {
-  if (!isMessage(message)) return [[path.join(" "), Array.isArray(message) ? `${message.length} items` : message]];
-  const found: [string, Json][] = [];
+/** One value of a message: where it is, what it is, and its unit, empty if that is not known. */
+export type Leaf = [path: string, value: Json, unit: string];
+
+/** Returns the plain values of a message, so many at most: without headers, empty ones, and lists but short ones of numbers. */
+export function leavesOf(message: Json, most: number, units?: Json, path: readonly string[] = []): Leaf[] {
+  const unit = typeof units === "string" ? units : "";
+  if (!isMessage(message)) return message === "" ? [] : [[path.join(" "), message, unit]];
+  const found: Leaf[] = [];
   for (const [name, value] of Object.entries(message)) {
     if (found.length >= most) break;
     if (name === "header" || name === "stamp" || name.startsWith("covariance")) continue;
-    found.push(...leavesOf(value, most - found.length, [...path, name]));
+    const inner = unitsAt(units, name);
+    if (!Array.isArray(value)) found.push(...leavesOf(value, most - found.length, inner, [...path, name]));
+    else if (value.some((each) => each !== null) && !isNames(message, name, value.length))
+      found.push([[...path, name].join(" "), listed(value, message.name), typeof inner === "string" ? inner : ""]);
   }
   return found;
+}
+
+/** Returns whether a list only names the numbers of others, as in a `JointState`. */
+function isNames(message: Message, name: string, length: number): boolean {
+  return name === "name" && Object.entries(message).some(([other, list]) => other !== name && Array.isArray(list) && list.length === length);
+}
+
+/** Returns a short list of numbers, with names if there are as many; of another list how long it is. */
+function listed(list: readonly Json[], names: Json | undefined): Json {
+  if (list.length > SHORT || !list.every((each) => typeof each === "number" || each === null)) return `${list.length} items`;
+  if (!Array.isArray(names) || names.length !== list.length) return [...list];
+  return list.map((each, at) => `${String(names[at])} ${formatNumber(each as number | null, "")}`);
 }

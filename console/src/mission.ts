@@ -1,5 +1,6 @@
 /** A mission as its page shows it: rows of its picture, with the status of each node. */
 import type { Stop } from "./debugging";
+import { formatName } from "./format";
 import { isMessage, type Json, type Message } from "./rosbridge";
 
 /** One node of the picture; an interrupt is a node without a number. */
@@ -155,4 +156,10 @@ export function testedText(tested: Tested, picture: Picture): string {
   if (tested.count !== picture.count) return `The tests of ${when} were for another version of this mission.`;
   const tried = tested.ways - tested.missing.length;
   return `Tests took ${tried} of ${tested.ways} ways (${tested.tests} test${tested.tests === 1 ? "" : "s"}, ${when}).`;
+}
+
+/** Returns which missions run, of the answer to `ListMissions`. */
+export function runningText(missions: Json): string {
+  const running = (Array.isArray(missions) ? missions.filter(isMessage) : []).filter(({ state }) => ["running", "paused", "waiting"].includes(String(state)));
+  return running.map(({ name, state }) => `${formatName(String(name))} is ${String(state)}`).join(", ") || "No mission is running";
 }

@@ -62,6 +62,15 @@ MUX = component(
     capabilities={"Forwards": [{"inputs": ["teleop"], "output": "output"}]},
     requests={"mux.LookAtMux": False},
 )
+MISSION = component(
+    "mission",
+    "mission",
+    port("events", "out", "/mission/events", "std_msgs/msg/String"),
+    port("level", "out", "/level", "diagnostic_msgs/msg/DiagnosticStatus"),
+    port("sent", "out", "/sent", "geometry_msgs/msg/Twist"),
+    port("wanted", "out", "/wanted", "sensor_msgs/msg/JointState"),
+    requests={"mission.ListMissions": False},
+)
 ARM = component(
     "left_arm",
     "arm",
@@ -90,7 +99,7 @@ SPRAY = definition("acme_msgs/Spray_Goal", nozzle="string", angle="float64", amo
 
 
 def has_components(gateway: FakeGateway) -> None:
-    gateway.windows[DESCRIBED] = [STRANGER, BASE, MUX, SERVOS, ARM]
+    gateway.windows[DESCRIBED] = [STRANGER, BASE, MUX, SERVOS, ARM, MISSION]
     gateway.windows[RUNNING] = {
         "stop": None,
         "components": [state("sprayer", state="failed", restarts=3, note="no water"), state("base"), state("cmd_vel")],
@@ -104,6 +113,14 @@ def has_components(gateway: FakeGateway) -> None:
     gateway.latched["/robot_description"] = {"data": "<robot><joint name='slide' type='prismatic'/></robot>"}
     gateway.latched["/odom"] = {"twist": {"twist": {"linear": {"x": 0.25}, "angular": {"z": 0}}}}
     gateway.latched["/cmd_vel/active"] = {"data": "teleop"}
+    gateway.windows["mission/ListMissions"] = [
+        {"name": "patrol", "state": "running"},
+        {"name": "dock", "state": "idle"},
+    ]
+    gateway.latched["/mission/events"] = {"data": '{"event": "node"}'}
+    gateway.latched["/level"] = {"level": 1, "name": "", "message": "low battery", "hardware_id": "", "values": []}
+    gateway.latched["/sent"] = {"linear": {"x": 0.3, "y": 0.0}, "angular": {"z": 1.05}}
+    gateway.latched["/wanted"] = {"name": ["pan", "tilt"], "position": [0.5, -0.25], "velocity": []}
     gateway.latched["/flow"] = {"data": 3.25}
     gateway.latched["/joint_states"] = {"name": ["pan", "slide"], "position": [0.7853981, 0.012]}
 
@@ -122,6 +139,15 @@ def test_a_component_that_nobody_knows_has_a_card_with_all_it_offers(
     expect(card).to_contain_text("What a acme_sprayer does.")
     expect(card.get_by_role("status").first).to_have_text("Failed (no water)")
     expect(card).to_contain_text("3.3\u202fV")
+    missions = page.get_by_label("mission", exact=True)
+    for words in (
+        "Patrol is running",
+        "LevelWarning: low battery",
+        "Sent angular z1.05\u202frad/s",
+        "Wanted positionpan 0.50, tilt \u22120.25",
+    ):
+        expect(missions).to_contain_text(words)
+    expect(missions).not_to_contain_text('"event"')
     card.get_by_role("button", name="Rinse").click()
     expect(card).to_contain_text("Failed: no water")
     card.get_by_text("Set level").click()

@@ -6,6 +6,7 @@ import { h, icon, setText, svg, type Icon } from "../dom";
 import { BatteryGauge } from "../elements/battery_gauge";
 import { frameOf, gridOf, pageOf } from "../fleet";
 import { formatName, formatNumber } from "../format";
+import { runningText } from "../mission";
 import type { Page, Robot } from "../page";
 import { isMessage, Rosbridge, type Json } from "../rosbridge";
 import { Whereabouts } from "../whereabouts";
@@ -44,7 +45,7 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
   const isOwn = name === robot.config.robot;
   const link = isOwn ? robot.link : new Rosbridge(`${url.replace(/^http/, "ws")}rosbridge`);
   const state = h("p", { class: "fleet-state", role: "status" });
-  const mission = h("p", { class: "fleet-mission" }, "No mission is running");
+  const mission = h("p", { class: "fleet-mission" }, runningText(null));
   const health = h("p", { class: "fleet-health" });
   const charges = h("div", { class: "fleet-charges" });
   const open = isOwn ? h("span", { class: "label" }, "This page") : h("a", { href: url, class: "button" }, "Open");
@@ -87,13 +88,6 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
       gauges.set(battery, stop);
     }
   };
-  const showMissions = (missions: Json) => {
-    const running = (Array.isArray(missions) ? missions.filter(isMessage) : []).filter(({ state: is }) =>
-      ["running", "paused", "waiting"].includes(String(is)),
-    );
-    const words = running.map(({ name: mission_, state: is }) => `${formatName(String(mission_))} is ${String(is)}`);
-    setText(mission, words.join(", ") || "No mission is running");
-  };
   const place = new Whereabouts();
   map.places.set(name, place);
   const followed = new Map<string, (() => void) | null>();
@@ -112,7 +106,7 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
       if (state.is === "open") void follow();
     }),
     link.watch("robot/RobotStatus", showStatus, SLOW),
-    link.watch("mission/ListMissions", showMissions, SLOW),
+    link.watch("mission/ListMissions", (missions) => setText(mission, runningText(missions)), SLOW),
     link.subscribe(
       "/diagnostics_toplevel_state",
       ({ level, message }) => {
