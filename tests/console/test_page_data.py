@@ -57,6 +57,12 @@ def test_a_topic_shows_its_messages_and_a_number_is_plotted(
     expect(messages.get_by_role("button", name="x 3, plot")).to_be_visible()
     if (shots := os.environ.get("SHOTS")) is not None:
         page.screenshot(path=f"{shots}/data.png", full_page=True)
+    page.get_by_role("link", name="Log").click()
+    expect(messages).to_be_hidden()
+    gateway.latched["/pose"] = POSE | {"x": 3.0}
+    page.get_by_role("link", name="Data").click()
+    expect(page.get_by_role("button", name="Remove /pose x")).to_be_visible()
+    expect(messages.get_by_role("button", name="x 3, plot")).to_be_visible()
     messages.get_by_role("button", name="Pause").click()
     gateway.say("/pose", POSE | {"x": 4.0})
     page.get_by_role("button", name="Remove /pose x").click()

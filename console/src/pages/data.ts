@@ -1,11 +1,11 @@
-/** Data: topics with their types and rates, what they carry, plots of numbers, and publishing. */
+/** Data: topics with their types, the rate of the chosen one, what it carries, plots of numbers, and publishing. */
 import type uPlot from "uplot";
 import { whyNot } from "../config";
 import { columns, numberAt, Rate, Series, shapeOf, valueAt, writable, type Path } from "../data";
 import { disable, emptyCard, h, icon, setText } from "../dom";
 import { numberIn } from "../format";
 import type { Page, Robot } from "../page";
-import { isMessage, type Json, type Message } from "../rosbridge";
+import { isMessage, type Json, type Message, type Rosbridge } from "../rosbridge";
 import "uplot/dist/uPlot.min.css";
 import "./data.css";
 
@@ -15,6 +15,14 @@ const MOST_ITEMS = 50; // of a list
 const PLOTS = 6; // lines at once
 const FONT = "12px system-ui, sans-serif"; // of the labels of a plot
 const COLOURS = ["#1a7fd0", "#d0651a", "#2a9a4a", "#a83ab0", "#b0162a", "#6a6f00"];
+
+/** What a person has chosen, for when the page is opened again; nothing is subscribed to meanwhile. */
+interface Chosen {
+  topic: [topic: string, type: string] | null;
+  lines: Map<string, [topic: string, type: string, path: Path]>;
+}
+
+const choices = new WeakMap<Rosbridge, Chosen>();
 
 export const page: Page = {
   name: "data",
@@ -38,16 +46,20 @@ class TopicsView {
   readonly #timers: ReturnType<typeof setInterval>[];
   readonly #unwatch: () => void;
   #topics = new Map<string, string>();
+  readonly #choice: Chosen;
   #chosen: TopicView | null = null;
 
   constructor(robot: Robot) {
     this.#robot = robot;
-    this.#plot = new Plot(robot);
+    this.#choice = choices.get(robot.link) ?? { topic: null, lines: new Map() };
+    choices.set(robot.link, this.#choice);
+    this.#plot = new Plot(robot, this.#choice.lines);
     this.#filter.oninput = () => this.#show();
     const side = h("section", { class: "card", "aria-label": "Topics" }, this.#filter, this.#empty, this.#list);
     this.element.append(side, h("div", { class: "data-side" }, this.#plot.element, this.#topic));
     this.#timers = [setInterval(() => void this.#ask(), LIST), setInterval(() => this.#tick(), DRAW)];
     this.#unwatch = robot.link.state.watch(() => void this.#ask());
+    if (this.#choice.topic) this.#choose(...this.#choice.topic);
   }
 
   close(): void {
@@ -86,7 +98,10 @@ class TopicsView {
       ...rows.map(([topic, type]) => {
         const button = h("button", { type: "button", class: "line" }, h("span", {}, topic), h("small", {}, type));
         button.setAttribute("aria-pressed", String(this.#chosen?.topic === topic));
-        button.onclick = () => this.#choose(topic, type);
+        button.onclick = () => {
+          this.#choose(topic, type);
+          if (matchMedia("(max-width: 47rem)").matches) this.#topic.scrollIntoView({ block: "start" });
+        };
         return h("li", {}, button);
       }),
     );
@@ -96,8 +111,8 @@ class TopicsView {
     this.#chosen?.close();
     this.#chosen = new TopicView(this.#robot, topic, type, (path) => this.#plot.toggle(topic, type, path));
     this.#topic.replaceChildren(this.#chosen.element);
+    this.#choice.topic = [topic, type];
     this.#show();
-    if (matchMedia("(max-width: 47rem)").matches) this.#topic.scrollIntoView({ block: "start" });
   }
 }
 
@@ -293,12 +308,14 @@ class Plot {
   readonly #legend = h("ul", { class: "plot-legend" });
   readonly #host = h("div", { class: "plot-host" });
   readonly #lines = new Map<string, PlotLine>();
+  readonly #wanted: Chosen["lines"];
   #chart: uPlot | null = null;
   #library: typeof uPlot | null = null;
 
-  constructor(robot: Robot) {
-    this.#robot = robot;
+  constructor(robot: Robot, wanted: Chosen["lines"]) {
+    [this.#robot, this.#wanted] = [robot, wanted];
     this.element.append(this.#host, this.#legend);
+    for (const line of [...wanted.values()]) this.toggle(...line);
   }
 
   close(): void {
@@ -309,34 +326,37 @@ class Plot {
   /** Plots a number of a topic, or no longer. */
   toggle(topic: string, type: string, path: Path): void {
     const name = `${topic} ${path.join(" ")}`;
-    const old = this.#lines.get(name);
-    if (old) {
-      old.close();
-      this.#lines.delete(name);
-    } else if (this.#lines.size >= PLOTS) {
+    if (this.#lines.has(name)) {
+      this.#remove(name);
+      return;
+    }
+    if (this.#lines.size >= PLOTS) {
       this.#robot.notify(`A plot has ${PLOTS} lines at most: press one below it to remove it.`);
       return;
-    } else {
-      const series = new Series();
-      const taken = new Set([...this.#lines.values()].map(({ colour }) => colour));
-      const colour = COLOURS.find((one) => !taken.has(one))!;
-      const close = this.#robot.link.subscribe(topic, (message) => series.add(performance.now(), numberAt(message, path)), { type });
-      this.#lines.set(name, { name, series, colour, close });
     }
+    const series = new Series();
+    const taken = new Set([...this.#lines.values()].map(({ colour }) => colour));
+    const colour = COLOURS.find((one) => !taken.has(one))!;
+    const close = this.#robot.link.subscribe(topic, (message) => series.add(performance.now(), numberAt(message, path)), { type });
+    this.#lines.set(name, { name, series, colour, close });
+    this.#wanted.set(name, [topic, type, path]);
+    void this.#rebuild();
+  }
+
+  #remove(name: string): void {
+    this.#lines.get(name)?.close();
+    this.#lines.delete(name);
+    this.#wanted.delete(name);
     void this.#rebuild();
   }
 
   async #rebuild(): Promise<void> {
     this.element.hidden = this.#lines.size === 0;
     this.#legend.replaceChildren(
-      ...[...this.#lines.values()].map(({ name, colour, close }) => {
+      ...[...this.#lines.values()].map(({ name, colour }) => {
         const button = h("button", { type: "button", "aria-label": `Remove ${name}` }, h("i", {}), name, icon("cross"));
         button.style.setProperty("--colour", colour);
-        button.onclick = () => {
-          close();
-          this.#lines.delete(name);
-          void this.#rebuild();
-        };
+        button.onclick = () => this.#remove(name);
         return h("li", {}, button);
       }),
     );
