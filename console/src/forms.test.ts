@@ -97,7 +97,7 @@ describe("the leaves of a message", () => {
 
   it("are the numbers of a short list, with the names that a message has for them", () => {
     const many = Array.from({ length: 40 }, () => 0);
-    expect(leavesOf({ name: ["pan", "tilt"], position: [0.5, -1], effort: [null, null] }, 6)).toEqual([["position", ["pan 0.50", "tilt \u22121.00"], ""]]);
+    expect(leavesOf({ name: ["head_pan_joint", "tilt"], position: [0.5, -1], effort: [null, null] }, 6)).toEqual([["position", ["head pan 0.50", "tilt \u22121.00"], ""]]);
     expect(leavesOf({ data: [1, 2], many }, 6)).toEqual([["data", [1, 2], ""], ["many", "40 items", ""]]);
   });
 });

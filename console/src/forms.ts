@@ -178,5 +178,6 @@ function isNames(message: Message, name: string, length: number): boolean {
 function listed(list: readonly Json[], names: Json | undefined): Json {
   if (list.length > SHORT || !list.every((each) => typeof each === "number" || each === null)) return `${list.length} items`;
   if (!Array.isArray(names) || names.length !== list.length) return [...list];
-  return list.map((each, at) => `${String(names[at])} ${formatNumber(each as number | null, "")}`);
+  const shortened = names.map((name) => String(name).replace(/_joint$/, "").replaceAll("_", " "));
+  return list.map((each, at) => `${shortened[at]} ${formatNumber(each as number | null, "")}`);
 }
