@@ -129,10 +129,10 @@ function declaredText(fields: Record<string, Json>): string {
 /** Returns the button of a service or action, with its form if it has one. */
 export function skillOf(port: Port, robot: Robot, title = formatName(port.skill || port.name)): HTMLElement {
   const says = h("p", { class: "says", role: "status" });
-  if (/\/(Trigger|Empty)$/.test(port.type)) return h("div", { class: "skill" }, ownButton(port, robot, title, () => ({}), says), says);
+  if (/\/(Trigger|Empty)$/.test(port.type)) return h("div", { class: "skill" }, runButton(port, robot, title, () => ({}), says), says);
   if (/\/SetBool$/.test(port.type)) {
-    const on = ownButton(port, robot, `${title}: on`, () => ({ data: true }), says);
-    const off = ownButton(port, robot, `${title}: off`, () => ({ data: false }), says);
+    const on = runButton(port, robot, `${title}: on`, () => ({ data: true }), says);
+    const off = runButton(port, robot, `${title}: off`, () => ({ data: false }), says);
     return h("div", { class: "skill" }, h("div", { class: "row" }, on, off), says);
   }
   const box = h("details", { class: "skill" }, h("summary", {}, title));
@@ -157,7 +157,7 @@ async function fillForm(box: HTMLElement, port: Port, robot: Robot, title: strin
   setText(says, "");
   const inputs = fields.map((one) => inputOf(one, port));
   const form = h("form", {}, ...inputs.map(({ element }) => element));
-  const run = ownButton(port, robot, title, () => messageOf(fields, inputs.map(({ read }) => read())), says);
+  const run = runButton(port, robot, title, () => messageOf(fields, inputs.map(({ read }) => read())), says);
   run.type = "submit";
   form.append(run);
   form.onsubmit = (event) => event.preventDefault();
@@ -203,6 +203,7 @@ function goalName(port: Port, title: string): string {
 export function runButton(port: Port, robot: Robot, title: string, message: () => Message, says: HTMLElement): HTMLButtonElement {
   const isAction = port.kind === "serves_action";
   const button = h("button", { type: "button" }, icon(isAction ? "play" : "skip"), title);
+  disable(whyNot(robot.config, "operate"), button);
   let cancel: (() => void) | null = null;
   const run = async (kept?: KeptGoal) => {
     try {

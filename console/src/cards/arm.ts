@@ -1,5 +1,5 @@
 /** An arm: buttons for the poses that have names, and the way to the page where its tip is dragged. */
-import { ownButton, type Card } from "../cards";
+import { runButton, type Card } from "../cards";
 import type { Component } from "../description";
 import { h, icon } from "../dom";
 import { formatName } from "../format";
@@ -13,7 +13,7 @@ export const card: Card = {
   open(body, component, robot) {
     const move = movesOf(component)!;
     const says = h("p", { class: "says", role: "status" });
-    const poses = (move.choices.pose ?? []).map((pose) => ownButton(move, robot, formatName(pose), () => ({ pose }), says));
+    const poses = (move.choices.pose ?? []).map((pose) => runButton(move, robot, formatName(pose), () => ({ pose }), says));
     const drag = h("a", { class: "button", href: "./#model" }, icon("play"), "Drag its tip");
     body.append(h("div", { class: "row", role: "group", "aria-label": "Poses" }, ...poses, drag), says);
     return () => undefined;

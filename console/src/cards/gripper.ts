@@ -1,5 +1,5 @@
 /** Grippers: how far each one is open, closing it, and opening it as far as is written. */
-import { ownButton, type Card } from "../cards";
+import { runButton, type Card } from "../cards";
 import type { Component } from "../description";
 import { h } from "../dom";
 import { formatName, numberIn } from "../format";
@@ -25,7 +25,7 @@ export const card: Card = {
       };
       body.append(
         h("div", { class: "field" }, h("label", { for: id }, name, h("span", { class: "label" }, " opening, mm")), opening),
-        h("div", { class: "row" }, ownButton(grip, robot, "Open", open, says), ownButton(grip, robot, "Close", () => ({ opening: 0 }), says)),
+        h("div", { class: "row" }, runButton(grip, robot, "Open", open, says), runButton(grip, robot, "Close", () => ({ opening: 0 }), says)),
         says,
       );
     }
