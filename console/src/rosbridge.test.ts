@@ -92,6 +92,31 @@ describe("the connection", () => {
     expect(link.state.value.is).toBe("lost");
   });
 
+  it("is given up when the server says nothing, not even that it is there", () => {
+    const link = make();
+    const first = last().open();
+    const asked = () => first.sent.filter(({ service }) => service === "/rosapi/get_time").length;
+    for (let turn = 0; turn < 5; turn++) {
+      vi.advanceTimersByTime(2000);
+      first.receive({ op: "publish", topic: "/a", msg: {} });
+    }
+    expect(asked()).toBe(0);
+    vi.advanceTimersByTime(3000);
+    expect(asked()).toBe(1);
+    first.receive({ op: "status", level: "error", msg: "not yours", id: "alive:1" });
+    vi.advanceTimersByTime(3000);
+    expect([asked(), link.state.value.is]).toEqual([2, "open"]);
+    vi.advanceTimersByTime(2000);
+    expect([first.closed, link.state.value.is]).toEqual([true, "lost"]);
+  });
+
+  it("begins anew at once for a visitor who has another role", () => {
+    const link = make();
+    const first = last().open();
+    link.reconnect();
+    expect([first.closed, FakeSocket.all.length, last().open() === first, link.state.value.is]).toEqual([true, 2, false, "open"]);
+  });
+
   it("is tried at once when a person says so, and never twice at a time", () => {
     const link = make();
     last().lose();
@@ -184,6 +209,14 @@ describe("services", () => {
     const call = link.call("/s");
     answer(frame);
     await expect(call).rejects.toThrow(new CallError(reason));
+  });
+
+  it("that the server may not carry out fail with its status", async () => {
+    const link = make();
+    last().open();
+    const call = link.call("/s");
+    last().receive({ op: "status", level: "error", id: last().sent.at(-1)?.id, msg: "this needs the role 'view'" });
+    await expect(call).rejects.toThrow(new CallError("this needs the role 'view'"));
   });
 
   it("are not waited for for ever, nor beyond the connection", async () => {

@@ -34,14 +34,21 @@ const FIRST_WAIT = 250; // [ms]
 const LONGEST_WAIT = 5_000;
 const CALL_TIMEOUT = 5_000;
 const OPEN_TIMEOUT = 5_000;
+const QUIET = 3_000; // [ms] without a frame, after which the server is asked for one
+const SILENT = 2_000; // after that, the connection counts as lost
 
-/** A call of a service that brought no result: refused by the server, not answered in time, or the link was lost. */
+/** A call of a service that brought no result: refused by the server, or not answered. */
 export class CallError extends Error {
   override name = "CallError";
 }
 
+/** A call that was not answered: there was no connection, or no answer in time. */
+export class UnansweredError extends CallError {
+  override name = "UnansweredError";
+}
+
 /** A call whose outcome nobody knows: the link was lost meanwhile. */
-export class LostError extends CallError {
+export class LostError extends UnansweredError {
   override name = "LostError";
 }
 
@@ -140,6 +147,7 @@ export class Rosbridge {
   readonly #open: (url: string) => Socket;
   #socket: Socket | undefined;
   #attempt = 0;
+  #heard = 0; // when the last frame came [ms]
   #timer: ReturnType<typeof setTimeout> | undefined;
   #lastId = 0;
   readonly #subscriptions = new Map<string, Subscription>();
@@ -163,7 +171,16 @@ export class Rosbridge {
     this.#timer = setTimeout(() => this.#lose(socket), OPEN_TIMEOUT);
     socket.onopen = () => this.#opened(socket);
     socket.onclose = () => this.#lose(socket);
-    socket.onmessage = (event) => this.#receive(event.data);
+    socket.onmessage = (event) => {
+      this.#heard = performance.now();
+      this.#receive(event.data);
+    };
+  }
+
+  /** Connects anew, as a visitor who has another role by now. */
+  reconnect(): void {
+    if (this.#socket) this.#lose(this.#socket);
+    this.connect();
   }
 
   /** Ends the link for good. */
@@ -228,12 +245,12 @@ export class Rosbridge {
     const id = this.#nextId("call");
     return new Promise((resolve, reject) => {
       if (!this.#send({ op: "call_service", id, service, args })) {
-        reject(new CallError("not connected"));
+        reject(new UnansweredError("not connected"));
         return;
       }
       const timer = setTimeout(() => {
         this.#calls.delete(id);
-        reject(new CallError(`no answer from ${service} in ${timeout / 1000} s`));
+        reject(new UnansweredError(`no answer from ${service} in ${timeout / 1000} s`));
       }, timeout);
       this.#calls.set(id, { resolve, reject, timer });
     });
@@ -274,11 +291,24 @@ export class Rosbridge {
     if (socket !== this.#socket) return;
     clearTimeout(this.#timer);
     this.#attempt = 0;
+    this.#heard = performance.now();
+    this.#guard(socket);
     this.state.set({ is: "open" });
     for (const [topic, type] of this.#advertised) {
       this.#send({ op: "advertise", id: this.#nextId("advertise"), topic, type });
     }
     for (const [topic, subscription] of this.#subscriptions) this.#sendSubscribe(topic, subscription);
+  }
+
+  /** Watches over an open connection: a network that is gone closes none. `asked` is when the server was asked [ms]. */
+  #guard(socket: Socket, wait = QUIET, asked = -Infinity): void {
+    this.#timer = setTimeout(() => {
+      const now = performance.now();
+      if (this.#heard < asked) return this.#lose(socket);
+      if (now - this.#heard < QUIET) return this.#guard(socket, QUIET - (now - this.#heard));
+      this.#send({ op: "call_service", id: this.#nextId("alive"), service: "/rosapi/get_time", args: {} });
+      this.#guard(socket, SILENT, now);
+    }, wait);
   }
 
   #lose(socket: Socket): void {
@@ -305,7 +335,7 @@ export class Rosbridge {
     const frame = parseFrame(text);
     if (!frame) return;
     if (frame.op === "status") {
-      const refused = frame.level === "error" ? this.#take(frame.id) : undefined;
+      const refused = frame.level === "error" ? (this.#takeCall(frame.id) ?? this.#take(frame.id)) : undefined;
       if (refused) refused.reject(new CallError(frame.msg));
       else this.onStatus(frame);
     } else if (frame.op === "action_feedback") {
@@ -320,13 +350,18 @@ export class Rosbridge {
       if (subscription && frame.topic.startsWith(WINDOWS)) subscription.last = frame.msg;
       for (const listener of [...(subscription?.listeners ?? [])]) listener(frame.msg);
     } else {
-      const call = this.#calls.get(frame.id);
-      if (!call) return;
-      this.#calls.delete(frame.id);
-      clearTimeout(call.timer);
-      if (frame.result) call.resolve(frame.values);
-      else call.reject(new CallError(reasonOf(frame.values)));
+      const call = this.#takeCall(frame.id);
+      if (frame.result) call?.resolve(frame.values);
+      else call?.reject(new CallError(reasonOf(frame.values)));
     }
+  }
+
+  /** Returns a call that was answered, and forgets it. */
+  #takeCall(id: string): Call | undefined {
+    const call = this.#calls.get(id);
+    this.#calls.delete(id);
+    clearTimeout(call?.timer);
+    return call;
   }
 
   /** Returns a goal that has ended, and forgets it. */
