@@ -3,9 +3,9 @@ import type { Config } from "./config";
 import { h, icon, setText } from "./dom";
 import { formatAge } from "./format";
 import { pages as allPages, type Robot } from "./page";
-import { isMessage, type LinkState, type Rosbridge } from "./rosbridge";
+import type { LinkState, Rosbridge } from "./rosbridge";
 import { Signal } from "./signal";
-import { stopButtons } from "./stop";
+import { Stop, stopBanner, stopButtons } from "./stop";
 
 const NOTICE = 6_000; // [ms] for which a notice is shown
 
@@ -58,19 +58,11 @@ export function showFrame(config: Config, link: Rosbridge): void {
   const title = h("h1", {}, config.robot);
   const tabs = h("nav", { "aria-label": "Pages" });
   const bar = h("header", {}, h("div", { class: "who" }, title, h("p", {}, config.about)), connection(link, config.role));
-  const stops = stopButtons(robot);
+  const stop = new Stop(link);
+  stop.state.watch(({ is }) => robot.stopped.set(is !== "free" && is !== "refused"));
   const host = h("main", { id: "page" });
-  const banner = stoppedBanner();
-  document.body.replaceChildren(bar, stops, tabs, lostBanner(link), banner.element, host, notice);
+  document.body.replaceChildren(bar, stopButtons(robot, stop), tabs, lostBanner(link), stopBanner(stop), host, notice);
   link.state.watch((state) => document.body.classList.toggle("offline", state.is !== "open"));
-  let by = "";
-  robot.stopped.watch((stopped) => banner.show(stopped, by));
-  link.watch("robot/RobotStatus", (status) => {
-    if (!isMessage(status)) return;
-    by = isMessage(status.stop) ? String(status.stop.by) : "";
-    robot.stopped.set(by !== "");
-    banner.show(robot.stopped.value, by);
-  });
   route(host, tabs, robot);
 }
 
@@ -129,7 +121,7 @@ function lostBanner(link: Rosbridge): HTMLElement {
     if (state.is === "open") lost = false;
     if (state.is === "lost") lost = true;
     banner.hidden = !lost;
-    setText(message, lost ? "Connection lost. The robot stops by itself. " : "");
+    setText(message, lost ? "Connection lost. The robot stops whoever drives by hand; missions and goals go on. " : "");
     setText(
       text,
       state.is === "lost"
@@ -141,15 +133,4 @@ function lostBanner(link: Rosbridge): HTMLElement {
   link.state.watch(show);
   setInterval(show, 500);
   return banner;
-}
-
-function stoppedBanner(): { element: HTMLElement; show: (stopped: boolean, by: string) => void } {
-  const message = h("p", { role: "alert" });
-  const element = h("div", { class: "banner stopped" }, icon("stop"), message);
-  const show = (stopped: boolean, by: string) => {
-    element.hidden = !stopped;
-    const who = by ? ` by ${by}` : "";
-    setText(message, stopped ? `Stopped${who}. Nothing moves until you press Release.` : "");
-  };
-  return { element, show };
 }

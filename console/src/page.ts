@@ -6,7 +6,7 @@ import type { Signal } from "./signal";
 export interface Robot {
   config: Config;
   link: Rosbridge;
-  /** Whether the robot is stopped, by anyone, and not released. */
+  /** Whether the robot is stopped, by anyone, and not released, or about to be. */
   stopped: Signal<boolean>;
   /** What a person should read now, shown for a while and read out by screen readers. */
   notify(text: string): void;

@@ -256,8 +256,15 @@ def test_a_lost_connection_is_said_and_comes_back_without_motion(
 ) -> None:
     page = open_page()
     drive_by_keys(page, gateway)
+    gateway.is_away = True
     gateway.drop()
-    expect(page.get_by_role("alert").filter(has_text="Connection lost")).to_be_visible()
+    lost = page.get_by_role("alert").filter(has_text="Connection lost")
+    expect(lost).to_have_text("Connection lost. The robot stops whoever drives by hand; missions and goals go on.")
+    page.get_by_role("button", name="STOP").click()
+    expect(page.get_by_role("alert").filter(has_text="STOP has not arrived: not connected.")).to_be_visible()
+    page.get_by_role("button", name="Release").click()
+    gateway.is_away = False
+    page.get_by_role("button", name="Try now").click()
     expect(page.locator(".connection")).to_have_text("Connected")
     since = time.monotonic()
     expect(page.locator("battery-gauge").first).to_contain_text("78%")
