@@ -410,6 +410,9 @@ def test_what_is_not_known_is_said(open_page: Callable[..., Page], gateway: Fake
     expect(page.get_by_text("This robot has no skill that drives to a pose.")).to_be_visible()
     expect(tool(page, "Go")).to_be_hidden()
     assert violations(page) == []
+    gateway.is_away = True
+    gateway.drop()
+    expect(page.get_by_text("Where the robot is, is not known: there is no connection.")).to_be_visible()
 
 
 def test_an_old_position_is_said_to_be_old(open_page: Callable[..., Page], rolling: FakeGateway) -> None:

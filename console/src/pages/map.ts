@@ -40,6 +40,7 @@ const INITIAL = "/initialpose";
 const SPREAD: Record<number, number> = { 0: 0.25, 7: 0.25, 35: 0.07 }; // of a pose shown by hand [m², m², rad²]
 const NUMBER = { type: "number", step: "any", required: "", value: "0" };
 const UNKNOWN = "Where the robot is, is not known yet: nobody publishes its odometry or transforms.";
+const OFFLINE = "Where the robot is, is not known: there is no connection.";
 const NOT_IN_MAP = "Places are poses in map, and no transform leads there: they are not drawn.";
 const DEGREES = 180 / Math.PI;
 
@@ -475,7 +476,7 @@ class MapView {
       this.#measured,
       TOOLS[this.#tool][1],
       this.#failure,
-      this.#place.pose ? "" : UNKNOWN,
+      this.#place.pose ? "" : this.#robot.link.state.value.is === "open" ? UNKNOWN : OFFLINE,
       this.#placesAreOnMap() || !this.#places.length ? "" : NOT_IN_MAP,
     ];
     setText(this.#hint, texts.find(Boolean) ?? "");
