@@ -1,5 +1,5 @@
 /** What stands around every page: the robot's name, the connection, tabs, STOP, and what went wrong. */
-import type { Config } from "./config";
+import { fetchConfig, LockedError, logIn, tokenOf, type Config } from "./config";
 import { h, icon, setText } from "./dom";
 import { formatAge } from "./format";
 import { pages as allPages, type Robot } from "./page";
@@ -8,6 +8,7 @@ import { Signal } from "./signal";
 import { Stop, stopBanner, stopButtons } from "./stop";
 
 const NOTICE = 6_000; // [ms] for which a notice is shown
+const BUSY = ".editor-bar, dialog[open], .lease[data-kind='mine']"; // where a page that begins anew takes work away
 
 /** Shows a screen without a robot: loading, or an error with a button to try again. */
 export function showState(kind: "loading" | "error", text: string, retry?: () => void): void {
@@ -63,10 +64,52 @@ export function showFrame(config: Config, link: Rosbridge): void {
   const host = h("main", { id: "page" });
   document.body.replaceChildren(bar, stopButtons(robot, stop), tabs, lostBanner(link), stopBanner(stop), host, notice);
   link.state.watch((state) => document.body.classList.toggle("offline", state.is !== "open"));
-  route(host, tabs, robot);
+  followConfig(robot, stop, route(host, tabs, robot));
 }
 
-function route(host: HTMLElement, tabs: HTMLElement, robot: Robot): void {
+/** Lets the page follow what the robot says about itself: it may have been restarted or changed, and its links renewed. */
+function followConfig(robot: Robot, stop: Stop, open: () => void): void {
+  const { config, link, notify } = robot;
+  let isOutdated = false;
+  let behindDoor: Node[] | null = null;
+  const isUnsaved = () => !window.dispatchEvent(new Event("beforeunload", { cancelable: true }));
+  const renew = () => {
+    if (!isOutdated || document.querySelector(BUSY)) return;
+    if (isUnsaved()) open();
+    else if (["free", "stopped"].includes(stop.state.value.is)) location.reload(); // else somebody waits for its answer
+  };
+  const look = async () => {
+    try {
+      const now = await fetchConfig();
+      if (behindDoor) document.body.replaceChildren(...behindDoor);
+      behindDoor = null;
+      if (JSON.stringify(now) === JSON.stringify(config)) return;
+      isOutdated = true;
+      Object.assign(config, now);
+      renew();
+    } catch (error) {
+      const { message } = error as Error;
+      if (!(error instanceof LockedError)) return notify(message);
+      if (behindDoor) return;
+      behindDoor = [...document.body.childNodes]; // with what is typed there
+      showDoor("The robot does not know you any more: its links may have been renewed.", async (given) => {
+        await logIn(tokenOf(given) || given);
+        link.reconnect();
+      });
+    }
+  };
+  let wasLost = false;
+  link.state.watch(({ is }) => {
+    if (is === "open" && wasLost) void look();
+    wasLost ||= is === "lost";
+  });
+  link.watch("config", () => void look());
+  stop.state.watch(renew);
+  window.addEventListener("hashchange", () => (isOutdated && !isUnsaved() ? location.reload() : open()));
+}
+
+/** Fills the tabs, and returns what opens the page that the address names. */
+function route(host: HTMLElement, tabs: HTMLElement, robot: Robot): () => void {
   const wanted = robot.config.pages;
   const pages = allPages.filter((page) => (page.isFor?.(robot) ?? true) && (wanted.length === 0 || wanted.includes(page.name)));
   if (wanted.length > 0) pages.sort((a, b) => wanted.indexOf(a.name) - wanted.indexOf(b.name));
@@ -87,8 +130,8 @@ function route(host: HTMLElement, tabs: HTMLElement, robot: Robot): void {
     document.title = `${page.title} \u00b7 ${robot.config.robot}`;
     close = page.open(host, robot);
   };
-  window.addEventListener("hashchange", open);
   open();
+  return open;
 }
 
 function connection(link: Rosbridge, role: string): HTMLElement {

@@ -55,6 +55,7 @@ class FakeGateway:
         """Further addresses, with what is there."""
         self._others: str | None = None
         self.is_away = False  # takes no connections
+        self.is_locked = False  # knows nobody
         self.subscribed: dict[ServerConnection, set[str]] = {}
         self.velocity = (0.0, 0.0)
         self._server = serve(self._serve, "127.0.0.1", 0, process_request=self._respond)
@@ -134,6 +135,8 @@ class FakeGateway:
         path = request.path.partition("?")[0]
         if path == "/rosbridge":
             return self._response(HTTPStatus.SERVICE_UNAVAILABLE, "text/plain", b"away") if self.is_away else None
+        if path == "/console/config" and self.is_locked:
+            return self._response(HTTPStatus.UNAUTHORIZED, "application/json", b"{}")
         if path == "/console/config":
             return self._response(HTTPStatus.OK, "application/json", json.dumps(self.config).encode())
         if path in self.files:

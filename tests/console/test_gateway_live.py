@@ -644,6 +644,8 @@ def test_a_place_is_moved_in_the_file_of_the_robot_that_runs(robot: Robot) -> No
         assert (await browser.calls("/console/robot/apply", generation=found["generation"]))["success"]
         assert (await browser.calls("/console/robot/compare"))["answer"]["is_empty"]
         assert json.loads(get("/console/config")[1])["places"]["dock"]["x"] == 1.25
+        await browser.sends("subscribe", topic="/console/windows/config")
+        assert (await browser.next("publish"))["msg"]["answer"]["places"]["dock"]["x"] == 1.25
         assert (await browser.calls("/console/robot/revert", generation=found["generation"]))["success"]
         assert not (await browser.calls("/console/robot/apply", generation=99))["success"]
         built = (await browser.calls("/console/robot/look", subject="include", changes=[]))["answer"]

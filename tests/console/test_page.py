@@ -264,7 +264,6 @@ def test_a_lost_connection_is_said_and_comes_back_without_motion(
     expect(page.get_by_role("alert").filter(has_text="STOP has not arrived: not connected.")).to_be_visible()
     page.get_by_role("button", name="Release").click()
     gateway.is_away = False
-    page.get_by_role("button", name="Try now").click()
     expect(page.locator(".connection")).to_have_text("Connected")
     since = time.monotonic()
     expect(page.locator("battery-gauge").first).to_contain_text("78%")
@@ -293,6 +292,51 @@ def test_the_manifest_says_which_pages_there_are_and_in_which_order(
     links = open_page().get_by_label("Pages").get_by_role("link")
     expect(links).to_have_text(["Mission", "Drive"])
     expect(links.first).to_have_attribute("aria-current", "page")
+
+
+def test_an_open_page_follows_what_the_robot_says_about_itself(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    def changes(**config: Any) -> None:
+        gateway.config = {**gateway.config, **config}
+
+    page = open_page()
+    changes(drive={**gateway.config["drive"], "max_speed": 0.2})
+    gateway.drop()
+    expect(page.locator("#top-forward")).to_have_attribute("max", "0.2")
+    expect(page.locator(".connection")).to_have_text("Connected")
+    drive_by_keys(page, gateway)
+    changes(places={"dock": {"x": 1.0, "y": 0.0, "heading": 0.0}}, pages=["drive", "map"])
+    with page.expect_response("**/console/config"):
+        gateway.show("config", 1)  # as after `apply`, without a restart
+    expect(page.get_by_label("Driver")).to_contain_text("You are driving")
+    page.keyboard.up("Shift")
+    page.get_by_role("link", name="Map").click()
+    expect(page.get_by_label("Pages").get_by_role("link")).to_have_text(["Drive", "Map"])
+    expect(page.get_by_label("Places")).to_contain_text("1.00")
+    page.evaluate("addEventListener('beforeunload', event => event.preventDefault())")  # as an unsaved text does
+    page.evaluate("window.isKept = true")
+    changes(places={"dock": {"x": 2.0, "y": 0.0, "heading": 0.0}})
+    gateway.show("config", 2)
+    expect(page.get_by_label("Places")).to_contain_text("2.00")
+    assert page.evaluate("window.isKept")
+
+
+def test_whoever_is_not_known_any_more_logs_in_and_loses_nothing(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    page = open_page(name="")
+    page.fill("#name", "Ada")
+    gateway.is_locked = True
+    gateway.drop()
+    expect(page.get_by_role("alert")).to_contain_text("The robot does not know you any more")
+    gateway.is_locked = False
+    page.route("**/console/login", lambda route: route.fulfill(json={}))
+    page.fill("#token", "new")
+    page.keyboard.press("Enter")
+    expect(page.locator(".connection")).to_have_text("Connected")
+    expect(page.locator("#name")).to_have_value("Ada")
+    page.unroute("**/console/login")
 
 
 @pytest.mark.soak

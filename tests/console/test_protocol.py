@@ -362,6 +362,19 @@ def test_a_window_is_looked_through_as_often_as_the_most_curious_client_wants_an
     assert room.asked() == [Unwatch(window)]
 
 
+def test_a_window_shows_when_the_page_has_another_configuration() -> None:
+    room = Room()
+    room.bridge.show_config({"places": {}})
+    client = room.client()
+    (shown,) = client.does("subscribe", topic="/console/windows/config")
+    assert shown["msg"] == {"answer": {"places": {}}}
+    room.bridge.show_config({"places": {}})
+    assert client.gets() == []
+    room.bridge.show_config({"places": {"dock": {"x": 1.0}}})
+    assert client.gets()[0]["msg"] == {"answer": {"places": {"dock": {"x": 1.0}}}}
+    client.does("unsubscribe", topic="/console/windows/config")
+
+
 def test_what_reaches_nobody_is_not_wanted() -> None:
     room = Room()
     first, second = room.client(), room.client()

@@ -63,6 +63,8 @@ LEVELS = ("info", "warning", "error", "none")
 
 WINDOWS = "/console/windows/"
 DRIVE_WINDOW = f"{WINDOWS}drive"  # who holds the drive lease
+CONFIG_WINDOW = f"{WINDOWS}config"  # what the page shows of the robot
+_OWN_WINDOWS = (DRIVE_WINDOW, CONFIG_WINDOW)
 _DRIVES = "/console/drive"
 _QUERY = re.compile(r"(?P<about>\w+)/(?P<name>\w+)(?P<values>(/\w+/\w+)*)", re.ASCII)
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
@@ -546,6 +548,7 @@ class Bridge:
         self._old_statuses: dict[str, dict[object, tuple[int, str]]] = {}  # by name of an action, then of a goal
         self._clients_so_far = self._calls_so_far = 0
         self._requests: list[BusRequest] = []
+        self._config: Mapping[str, object] = {}
         self._now, self._stamp = 0.0, 0
 
     # What the socket does
@@ -647,6 +650,11 @@ class Bridge:
     def arrived(self, topic: str, message: Message, now: float, stamp: int = 0) -> None:
         """Pass a message that came at `stamp` [ns] on to the clients that listen."""
         self._pass_on(topic, _Shared(message, stamp=stamp), now)
+
+    def show_config(self, config: Mapping[str, object]) -> None:
+        """Let who follows it know what the page shows of the robot."""
+        self._config = config
+        self._show_own()
 
     def seen(self, window: str, answer: object, now: float, refusal: str = "") -> None:
         """Pass what the robot answers to a query on, or why it refuses, if that is another answer than before."""
@@ -862,7 +870,7 @@ class Bridge:
         is_window = topic.startswith(WINDOWS)
         is_old = target.old is not None
         message = None if is_window or is_old else self._message_on(topic, data)
-        if is_window and topic != DRIVE_WINDOW and not _QUERY.fullmatch(topic.removeprefix(WINDOWS)):
+        if is_window and topic not in _OWN_WINDOWS and not _QUERY.fullmatch(topic.removeprefix(WINDOWS)):
             raise BadFrameError(f"after '{WINDOWS}' come a subject, a query, and its fields with their values")
         if client.subscriptions >= MOST_SUBSCRIPTIONS:
             raise BadFrameError(f"a client has at most {MOST_SUBSCRIPTIONS} subscriptions")
@@ -871,7 +879,7 @@ class Bridge:
             if message is not None:
                 self._requests.append(Subscribe(topic, message))
                 listened.last = deque(maxlen=max(1, len(self._graph.publishers(topic))))
-            self._show_holder()
+            self._show_own()
             if is_old and topic.endswith("/status"):
                 listened.is_latched = True
                 self._show_old_statuses(topic.rpartition("/")[0])
@@ -1450,9 +1458,11 @@ class Bridge:
             fields = dict(zip(words[::2], words[1::2], strict=True))
             self._requests.append(Watch(topic, {"type": f"{query['about']}.{query['name']}", **fields}, period))
 
-    def _show_holder(self) -> None:
-        if DRIVE_WINDOW in self._listened:
-            self.seen(DRIVE_WINDOW, {"holder": self.lease.holder}, self._now)
+    def _show_own(self) -> None:
+        """Show what no query asks the robot for."""
+        for window, answer in zip(_OWN_WINDOWS, ({"holder": self.lease.holder}, self._config), strict=True):
+            if window in self._listened:
+                self.seen(window, answer, self._now)
 
     def _halt_if(self, has_ended: bool) -> None:
         """Publish rest, once, if a drive lease has ended."""
@@ -1485,7 +1495,7 @@ class Bridge:
         self.woken.add(client.number)
 
     def _done(self) -> list[BusRequest]:
-        self._show_holder()
+        self._show_own()
         requests, self._requests = self._requests, []
         return requests
 

@@ -221,7 +221,7 @@ class Gateway(Component[GatewayConfig]):
             self.server = GatewayThread(self.config)
 
     def reconfigure(self, old: GatewayConfig) -> None:
-        """Show other places to who opens the page from now on."""
+        """Show other places, also to who has the page open."""
         if self.server is not None:
             self.server.follow(self.config)
 
@@ -272,8 +272,9 @@ class GatewayThread:
     def follow(self, config: GatewayConfig) -> None:
         """Show what another configuration says; it differs in what is live."""
         self._config = config
-        if self._session is not None:
-            self._session.config = config
+        if self._session is not None and self._loop is not None:
+            with suppress(RuntimeError):  # it has ended by itself
+                self._loop.call_soon_threadsafe(self._session.follow, config)
 
     def start(self) -> None:
         """Begin to serve."""
@@ -472,6 +473,7 @@ class GatewaySession:
         guest.graph()  # a round trip, after which the tokens of all others are here, too
         guarded = {pattern: Role[role.upper()] for pattern, role in config.guard.items()}
         self._bridge = Bridge(self._graph, config.drive, guarded, self._role_of)
+        self._bridge.show_config(self._shown_config())
         self._bus = guest.bus()
         self._streams = Streams(lambda topic: self._graph.topics().get(topic, ""), self._subscribe_to_images)
         self._ends: dict[tuple[type[object], str], Any] = {}  # publishers, subscriptions and clients, by name
@@ -558,6 +560,12 @@ class GatewaySession:
             server_header=False,
         )
         await Quiet(settings).serve(sockets=[listener])
+
+    def follow(self, config: GatewayConfig) -> None:
+        """Show what another configuration says."""
+        self.config = config
+        self._bridge.show_config(self._shown_config())
+        self._pump()
 
     def close(self) -> None:
         """Stop who drives, and leave the bus."""
