@@ -40,7 +40,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/arms": Cost(code=13093, files=77, small=2, imports=1201),
     "domains/bases": Cost(code=2113, files=19, small=0, imports=193),
     "domains/body": Cost(code=3568, files=28, small=2, imports=369),
-    "domains/console": Cost(code=3674, files=22, small=2, imports=308),
+    "domains/console": Cost(code=3687, files=22, small=2, imports=308),
     "domains/devices": Cost(code=1966, files=23, small=0, imports=211),
     "domains/diagnostics": Cost(code=2361, files=24, small=4, imports=215),
     "domains/muxes": Cost(code=2093, files=14, small=1, imports=130),
@@ -48,7 +48,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/policies": Cost(code=856, files=9, small=0, imports=91),
     "domains/power": Cost(code=461, files=6, small=0, imports=37),
     "domains/programs": Cost(code=3909, files=30, small=1, imports=398),
-    "domains/servos": Cost(code=7961, files=52, small=2, imports=591),
+    "domains/servos": Cost(code=7971, files=52, small=2, imports=591),
     "domains/vision": Cost(code=2675, files=31, small=1, imports=360),
     "domains/worlds": Cost(code=4698, files=41, small=3, imports=569),
     "manifest": Cost(code=3542, files=26, small=1, imports=278),
@@ -62,7 +62,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 115967,
+    "lines of code": 115990,
     "files": 949,
     "files of 1 to 30 lines of code": 75,
     "lines of imports": 11383,
