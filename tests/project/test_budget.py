@@ -37,7 +37,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "commands": Cost(code=2584, files=26, small=2, imports=309),
     "compiler": Cost(code=7847, files=75, small=9, imports=937),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
-    "domains/arms": Cost(code=13093, files=77, small=2, imports=1201),
+    "domains/arms": Cost(code=13094, files=77, small=2, imports=1201),
     "domains/bases": Cost(code=2113, files=19, small=0, imports=193),
     "domains/body": Cost(code=3568, files=28, small=2, imports=369),
     "domains/console": Cost(code=3687, files=22, small=2, imports=308),
@@ -62,7 +62,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 115990,
+    "lines of code": 115991,
     "files": 949,
     "files of 1 to 30 lines of code": 75,
     "lines of imports": 11383,

@@ -12,7 +12,7 @@ const STALE = 2_000; // [ms] after which nobody knows where a joint is
 
 export const card: Card = {
   isFor: (component) => jointsOf(component).length > 0,
-  shows: (port) => (isOfJoint(port) && /_(enable|relax)$/.test(port.name)) || port.name === "joint_states",
+  shows: (port) => (isOfJoint(port) && /_(enable|relax)$/.test(port.name)) || /^joint_(states|commands)$/.test(port.name),
   open(body, component, robot) {
     const cells = new Map<string, { cell: HTMLElement; at: number }>();
     const says = h("p", { class: "says", role: "status" });

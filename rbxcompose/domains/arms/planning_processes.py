@@ -116,9 +116,10 @@ class PlanningProcess:
             self._warn(f"a process that plans for '{self._name}' {how}: there is one less until the arm starts again")
 
 
-def compile_elsewhere(config: ArmConfig, clock: Clock) -> None:
+def compile_elsewhere(config: ArmConfig, clock: Clock, info: Callable[[str], None]) -> None:
     """Fill empty caches of compiled code by another process: the memory of compiling, 100 MB, is given back with it."""
     if clock.is_real and is_installed() and is_empty():
+        info("compiles what plans for arms, which takes up to a minute the first time on a machine")
         process = PlanningProcess(config, lambda text: None, time.monotonic)
         process.wait()
         process.close()

@@ -139,7 +139,7 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
         """Build the model of the body, its shapes and the planner."""
         if (size := mesh_bytes(self.config)) > LARGE:
             self.info(f"reads {size / 1e6:.0f} MB of meshes; the first time on a machine takes longer")
-        compile_elsewhere(self.config, self.context.clock)
+        compile_elsewhere(self.config, self.context.clock, self.info)
         self.works = ArmWorks(self.config, lambda: self.now)
         self.works.helpers = self.helpers = planning_processes(self.config, self.context.clock, self.warn)
         for helper in self.helpers:
