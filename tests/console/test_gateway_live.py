@@ -35,6 +35,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from rbxcompose.commands.guest import Guest
 from rbxcompose.domains.console.components.gateway import MOST_CONNECTIONS
 from rbxcompose.domains.console.streams import MOST_STREAMS
+from rbxcompose.domains.console.topic_rates import SHORTEST
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.sdk.ports import Qos
 from tests.cli.live_robot import PATIENCE, Robot
@@ -129,6 +130,18 @@ def browse(what: Callable[[Browser], Awaitable[None]], path: str = "/rosbridge",
             await what(Browser(socket))
 
     asyncio.run(run())
+
+
+def test_messages_of_all_topics_are_counted_while_somebody_asks(robot: Robot) -> None:
+    async def count(page: Browser) -> None:
+        rates: dict[str, float] = {}
+        while "/odom" not in rates:
+            rates = (await page.calls("/console/rates"))["answer"]
+            await asyncio.sleep(SHORTEST)
+        assert 5 < rates["/odom"] < 200  # 50 Hz, on a machine that is not busy
+        assert rates["/robot_description"] == 0  # what is latched came before
+
+    browse(count)
 
 
 def test_a_service_that_is_served_again_with_another_type_is_called_with_that(robot: Robot) -> None:

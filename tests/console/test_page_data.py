@@ -34,7 +34,10 @@ def test_a_topic_shows_its_messages_and_a_number_is_plotted(
     open_page: Callable[..., Page], gateway: FakeGateway
 ) -> None:
     has_topics(gateway)
+    rates = {"/scan": 9.96, "/pose": 50.2}
+    gateway.answers["/console/rates"] = lambda _: {"success": True, "message": "", "answer": rates}
     page = open_page(page_name="data")
+    expect(page.get_by_role("button", name="/scan")).to_contain_text("10.0\u202fHz")
     page.get_by_label("Find a topic").fill("pos")
     expect(page.get_by_role("button", name="/scan")).to_be_hidden()
     page.get_by_role("button", name="/pose").click()

@@ -1,4 +1,4 @@
-/** Data: topics with their types, the rate of the chosen one, what it carries, plots of numbers, and publishing. */
+/** Data: topics with their types and rates, what they carry, plots of numbers, and publishing. */
 import type uPlot from "uplot";
 import { whyNot } from "../config";
 import { columns, numberAt, Rate, Series, shapeOf, valueAt, writable, type Path } from "../data";
@@ -46,6 +46,9 @@ class TopicsView {
   readonly #timers: ReturnType<typeof setInterval>[];
   readonly #unwatch: () => void;
   #topics = new Map<string, string>();
+  /** What says the type and the rate of each topic that is listed. */
+  readonly #abouts = new Map<string, HTMLElement>();
+  #rates: Message = {};
   readonly #choice: Chosen;
   #chosen: TopicView | null = null;
 
@@ -86,6 +89,9 @@ class TopicsView {
       this.#empty.hidden = found.size > 0;
       if (found.size === 0) setText(this.#empty.querySelector("p")!, "Nothing publishes or listens.");
       if (!isSame) this.#show();
+      const rates = await this.#robot.link.call("/console/rates");
+      this.#rates = isMessage(rates) && isMessage(rates.answer) ? rates.answer : {};
+      this.#tellRates();
     } catch (error) {
       setText(this.#empty.querySelector("p")!, (error as Error).message);
     }
@@ -93,10 +99,13 @@ class TopicsView {
 
   #show(): void {
     const wanted = this.#filter.value.trim().toLowerCase();
+    this.#abouts.clear();
     const rows = [...this.#topics].sort().filter(([topic, type]) => `${topic} ${type}`.toLowerCase().includes(wanted));
     this.#list.replaceChildren(
       ...rows.map(([topic, type]) => {
-        const button = h("button", { type: "button", class: "line" }, h("span", {}, topic), h("small", {}, type));
+        const about = h("small", {});
+        this.#abouts.set(topic, about);
+        const button = h("button", { type: "button", class: "line" }, h("span", {}, topic), about);
         button.setAttribute("aria-pressed", String(this.#chosen?.topic === topic));
         button.onclick = () => {
           this.#choose(topic, type);
@@ -105,6 +114,14 @@ class TopicsView {
         return h("li", {}, button);
       }),
     );
+    this.#tellRates();
+  }
+
+  #tellRates(): void {
+    for (const [topic, about] of this.#abouts) {
+      const rate = this.#rates[topic];
+      setText(about, [this.#topics.get(topic), typeof rate === "number" ? `${rate.toFixed(rate < 10 ? 1 : 0)}\u202fHz` : ""].filter(Boolean).join(" \u00b7 "));
+    }
   }
 
   #choose(topic: string, type: string): void {

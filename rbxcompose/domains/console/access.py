@@ -55,6 +55,7 @@ _SERVICES = {
     "/console/stop": Role.VIEW,  # whoever sees that something goes wrong
     "/console/ask": Role.VIEW,  # the request decides
     "/console/log": Role.VIEW,
+    "/console/rates": Role.VIEW,
     "/console/mission/aloud": Role.VIEW,  # of a text that nobody else sees
     "/console/mission/check": Role.VIEW,
     "/console/mission/edit": Role.VIEW,

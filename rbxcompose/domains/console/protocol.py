@@ -241,6 +241,13 @@ class EditMission:
 
 
 @dataclass(frozen=True, slots=True)
+class CountMessages:
+    """Count the messages of all topics, and pass the rates since the last time [Hz] to `Bridge.robot_answered`."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
 class TailLog:
     """Read the robot's log behind a place, and pass it to `Bridge.robot_answered`."""
 
@@ -291,6 +298,7 @@ BusRequest = (
     | AskRobot
     | SaveSettings
     | EditMission
+    | CountMessages
     | TailLog
     | ReadTested
     | Watch
@@ -1345,6 +1353,9 @@ class Bridge:
             raise WrongMessageError("'after' is a whole number: that of the last answer")
         self._requests.append(TailLog(number, after))
 
+    def _rates_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
+        self._requests.append(CountMessages(number))
+
     def _tested_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
         if not isinstance(mission := given.get("mission"), str):
             raise WrongMessageError("'mission' is the name of a mission")
@@ -1561,6 +1572,7 @@ _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str,
     "/console/ask": Bridge._ask_service,
     _DRIVES: Bridge._drive_service,
     "/console/log": Bridge._log_service,
+    "/console/rates": Bridge._rates_service,
     "/console/release": Bridge._release_service,
     "/console/save": Bridge._save_service,
     "/console/stop": Bridge._stop_service,

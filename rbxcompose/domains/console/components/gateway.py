@@ -57,6 +57,7 @@ from rbxcompose.domains.console.protocol import (
     Bridge,
     BusRequest,
     CancelGoal,
+    CountMessages,
     EditMission,
     GoalEnd,
     GoalFeedback,
@@ -78,6 +79,7 @@ from rbxcompose.domains.console.protocol import (
     Watch,
 )
 from rbxcompose.domains.console.streams import BOUNDARY, Streams, part
+from rbxcompose.domains.console.topic_rates import KEPT, TopicRates
 from rbxcompose.domains.console.video import IMAGES, Picture, list_page, viewer_page, wanted
 from rbxcompose.missions.view.tested import read_tested
 from rbxcompose.msgs.images import WrongPictureError
@@ -488,6 +490,8 @@ class GatewaySession:
         self._loop = asyncio.get_running_loop()
         self._pump_timer: asyncio.TimerHandle | None = None
         self._lease_timer: asyncio.TimerHandle | None = None
+        self._rates = TopicRates(partial(self._hear, Qos.STATE))
+        self._rates_timer: asyncio.TimerHandle | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._is_command: dict[str, bool] = dict.fromkeys((STOP["type"], RELEASE["type"]), True)
         self._is_command |= dict.fromkeys(("robot.RobotStatus", _DESCRIBE["type"]), False)
@@ -571,7 +575,7 @@ class GatewaySession:
         """Stop who drives, and leave the bus."""
         self._loop.remove_reader(self._guest.fileno())
         self._do(self._bridge.stop_driving(self._now, self._stamp))
-        for timer in (self._pump_timer, self._lease_timer):
+        for timer in (self._pump_timer, self._lease_timer, self._rates_timer):
             if timer is not None:
                 timer.cancel()
         for task in self._tasks:
@@ -581,6 +585,7 @@ class GatewaySession:
         self._trier.close()
         if self._foxglove is not None:
             self._foxglove.close()
+        self._rates.rest()
         self._graph.close()
 
     @property
@@ -924,6 +929,8 @@ class GatewaySession:
                 self._goals[number].cancel()
             case AskRobot():
                 self._begin(self._ask_robot(request))
+            case CountMessages(number):
+                self._loop.call_soon(self._count_messages, number)
             case TailLog():
                 self._begin(self._read_log(request))
             case ReadTested(number, mission):
@@ -985,8 +992,10 @@ class GatewaySession:
         offer()
 
     def _listen_raw(self, topic: str, take: Callable[[bytes], None]) -> Callable[[], None]:
-        """Pass the bytes of a topic on, in the thread that brings them."""
-        qos = Qos.LATCHED if self._graph.is_latched(topic) else Qos.STATE
+        """Pass the bytes of a topic on, in the thread that brings them, first those that are latched."""
+        return self._hear(Qos.LATCHED if self._graph.is_latched(topic) else Qos.STATE, topic, take)
+
+    def _hear(self, qos: Qos, topic: str, take: Callable[[bytes], None]) -> Callable[[], None]:
         key = self._graph.key(topic, self._guest.domain)
         end = self._guest.transport.subscribe(key, qos, lambda arrival: take(bytes(arrival.payload)))
         return end.close
@@ -1138,6 +1147,14 @@ class GatewaySession:
             if names := ", ".join(sorted(name.decode() for name in stopped)):
                 return f"the supervisor does not answer: stopped over the bus: {names}", ""
         return answer, refusal
+
+    def _count_messages(self, number: int) -> None:
+        """Answer with the rates since somebody asked last, and count on for a while."""
+        self._bridge.robot_answered(number, self._rates.look(self._graph.topics(), self._now))
+        if self._rates_timer is not None:
+            self._rates_timer.cancel()
+        self._rates_timer = self._loop.call_later(KEPT, self._rates.rest)
+        self._pump()
 
     async def _read_log(self, request: TailLog) -> None:
         answer = await asyncio.to_thread(tail, self._folder.path / LOG, request.after)
