@@ -40,7 +40,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/arms": Cost(code=13094, files=77, small=2, imports=1201),
     "domains/bases": Cost(code=2113, files=19, small=0, imports=193),
     "domains/body": Cost(code=3568, files=28, small=2, imports=369),
-    "domains/console": Cost(code=3743, files=23, small=2, imports=312),
+    "domains/console": Cost(code=3745, files=23, small=2, imports=312),
     "domains/devices": Cost(code=1966, files=23, small=0, imports=211),
     "domains/diagnostics": Cost(code=2361, files=24, small=4, imports=215),
     "domains/muxes": Cost(code=2093, files=14, small=1, imports=130),
@@ -62,7 +62,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 116047,
+    "lines of code": 116049,
     "files": 950,
     "files of 1 to 30 lines of code": 75,
     "lines of imports": 11387,

@@ -662,7 +662,7 @@ class Bridge:
     def show_config(self, config: Mapping[str, object]) -> None:
         """Let who follows it know what the page shows of the robot."""
         self._config = config
-        self._show_own()
+        self.seen(CONFIG_WINDOW, config, self._now)
 
     def seen(self, window: str, answer: object, now: float, refusal: str = "") -> None:
         """Pass what the robot answers to a query on, or why it refuses, if that is another answer than before."""
@@ -887,7 +887,9 @@ class Bridge:
             if message is not None:
                 self._requests.append(Subscribe(topic, message))
                 listened.last = deque(maxlen=max(1, len(self._graph.publishers(topic))))
-            self._show_own()
+            self._show_holder()
+            if topic == CONFIG_WINDOW:
+                self.seen(topic, self._config, self._now)
             if is_old and topic.endswith("/status"):
                 listened.is_latched = True
                 self._show_old_statuses(topic.rpartition("/")[0])
@@ -1469,11 +1471,9 @@ class Bridge:
             fields = dict(zip(words[::2], words[1::2], strict=True))
             self._requests.append(Watch(topic, {"type": f"{query['about']}.{query['name']}", **fields}, period))
 
-    def _show_own(self) -> None:
-        """Show what no query asks the robot for."""
-        for window, answer in zip(_OWN_WINDOWS, ({"holder": self.lease.holder}, self._config), strict=True):
-            if window in self._listened:
-                self.seen(window, answer, self._now)
+    def _show_holder(self) -> None:
+        if DRIVE_WINDOW in self._listened:
+            self.seen(DRIVE_WINDOW, {"holder": self.lease.holder}, self._now)
 
     def _halt_if(self, has_ended: bool) -> None:
         """Publish rest, once, if a drive lease has ended."""
@@ -1506,7 +1506,7 @@ class Bridge:
         self.woken.add(client.number)
 
     def _done(self) -> list[BusRequest]:
-        self._show_own()
+        self._show_holder()
         requests, self._requests = self._requests, []
         return requests
 

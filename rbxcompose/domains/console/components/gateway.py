@@ -884,19 +884,7 @@ class GatewaySession:
     def _carry_out(self, request: BusRequest) -> None:
         match request:
             case Subscribe(topic, message):
-                qos = Qos.LATCHED if self._graph.is_latched(topic) else Qos.STATE
-                end = self._bus.subscribe(
-                    NAME,
-                    topic,
-                    message,
-                    qos,
-                    lambda arrived: self._bridge.arrived(topic, arrived, self._now, self._stamp),
-                    max_rate=math.inf,
-                    limits=BULK,
-                    may_be_silent=True,
-                )
-                end.is_wanted = lambda: self._bridge.wants(topic, self._now)  # what comes too early is not decoded
-                self._ends[Subscribe, topic] = end
+                self._subscribe(topic, message)
             case Advertise(topic, message, is_latched):
                 qos = Qos.COMMAND if topic == self.config.drive_topic else Qos.LATCHED if is_latched else Qos.STATE
                 self._ends[Advertise, topic] = self._bus.publisher(NAME, topic, message, qos)
@@ -944,6 +932,20 @@ class GatewaySession:
                 self._watches[request.window] = self._begin(self._watch(request))
             case Unwatch(window):
                 self._stop_watching(window)
+
+    def _subscribe(self, topic: str, message: type[Message]) -> None:
+        end = self._bus.subscribe(
+            NAME,
+            topic,
+            message,
+            Qos.LATCHED if self._graph.is_latched(topic) else Qos.STATE,
+            lambda arrived: self._bridge.arrived(topic, arrived, self._now, self._stamp),
+            max_rate=math.inf,
+            limits=BULK,
+            may_be_silent=True,
+        )
+        end.is_wanted = lambda: self._bridge.wants(topic, self._now)  # what comes too early is not decoded
+        self._ends[Subscribe, topic] = end
 
     def _carry_out_further(self) -> None:
         """Do what something from the bus made necessary."""
