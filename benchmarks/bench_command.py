@@ -62,7 +62,7 @@ def rows() -> list[Row]:
             p99=checked.p99 * 1e3,
             peer=bare.median * 1e3,
             against="python -c pass",
-            most_ratio=20,
+            most_ratio=10,
         ),
         Row(
             name="`lsp`: start",

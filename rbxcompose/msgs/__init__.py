@@ -3,9 +3,17 @@
 Each package of `interfaces/` is a module here, such as `rbxcompose.msgs.geometry_msgs`, without a file of its own.
 """
 
-import sys
+from importlib import import_module
+from types import ModuleType
 
 from rbxcompose.msgs.registry import PACKAGES
 
-globals().update(PACKAGES)
-sys.modules.update({module.__name__: module for module in PACKAGES.values()})
+
+def __getattr__(name: str) -> ModuleType:
+    if name in PACKAGES:
+        return import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *PACKAGES})

@@ -9,10 +9,11 @@ classes; those of different texts exist side by side, also under the same name.
 """
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache, lru_cache
+from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from threading import current_thread, main_thread
 from types import ModuleType
@@ -173,11 +174,7 @@ def choose(texts: Mapping[str, str]) -> None:
     _here.set(types)
     if current_thread() is main_thread():
         _everywhere = types
-    for name in texts:
-        package = name.split("/")[0]
-        if package not in PACKAGES and package not in TAKEN:
-            PACKAGES[package] = module = _Package(package)
-            sys.modules[module.__name__] = module
+    PACKAGES.update({name.split("/")[0] for name in texts} - TAKEN)
 
 
 @contextmanager
@@ -215,8 +212,6 @@ class _Package(ModuleType):
 
     def __init__(self, package: str) -> None:
         super().__init__(f"{__package__}.{package}", f"ROS 2 interfaces of `{package}`.")
-        self.__package__ = __package__
-        self.__spec__ = ModuleSpec(self.__name__, None, origin=str(INTERFACES / package))
 
     def __getattr__(self, name: str) -> type[Any]:
         package = self.__name__.rpartition(".")[2]
@@ -232,7 +227,27 @@ class _Package(ModuleType):
         return sorted({*super().__dir__(), *STANDARD.interfaces(package), *chosen().interfaces(package)})
 
 
+class _Packages(MetaPathFinder, Loader):
+    """Imports a package of interfaces, which has no file."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        parent, _, package = fullname.rpartition(".")
+        if parent != __package__ or package not in PACKAGES:
+            return None
+        return ModuleSpec(fullname, self, origin=str(INTERFACES / package))
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        return _Package(spec.name.rpartition(".")[2])
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Do nothing: classes are made at first use."""
+
+
 SHIPPED = STANDARD.structures
 TAKEN = frozenset(path.stem for path in INTERFACES.parent.glob("*.py"))
 """Names that no package of interfaces can have: those of modules beside them."""
-PACKAGES = {path.name: _Package(path.name) for path in INTERFACES.iterdir()}
+PACKAGES = {path.name for path in INTERFACES.iterdir()}
+"""Packages of interfaces that can be imported."""
+sys.meta_path.append(_Packages())

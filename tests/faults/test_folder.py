@@ -33,7 +33,8 @@ def test_of_many_that_start_it_at_once_one_does(robot: Robot) -> None:
 def test_a_robot_whose_files_were_removed_is_found_and_restores_them(robot: Robot, removed: str) -> None:
     robot.up_detached()
     if removed == "*":
-        shutil.rmtree(robot.folder.path)
+        gone = robot.folder.path.rename(robot.folder.path.parents[1] / "gone")  # at once: the robot writes meanwhile
+        shutil.rmtree(gone)
     else:
         (robot.folder.path / removed).unlink()
     eventually(lambda: robot.has_logged("files of the running robot were removed; they are restored"))
