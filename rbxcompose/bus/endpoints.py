@@ -6,7 +6,7 @@ import re
 import socket
 from pathlib import Path
 
-from rbxcompose.base.addresses import require_possible
+from rbxcompose.base.config import require_possible
 
 LINK_LEASE = 2.0  # [s] of silence after which a link counts as lost
 LOOPBACK, _UNIX = "127.0.0.1", "unixsock-stream/"

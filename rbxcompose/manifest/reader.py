@@ -11,7 +11,7 @@ from rbxcompose.base.findings import Edit, Finding, Fix, Severity, Span, kind, o
 from rbxcompose.base.printable import FORBIDDEN, code_point
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.foreign_words import foreign_text
-from rbxcompose.manifest.slip_registry import NOT_YAML
+from rbxcompose.manifest.slips import NOT_YAML
 from rbxcompose.manifest.walk import CHARACTER, Walk
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE, compose
 
