@@ -17,9 +17,6 @@ from rbxcompose.msgs.fields import ArrayEntries, Measures, NoFieldError, NumberR
 from rbxcompose.msgs.types import Action, Message, Service
 from rbxcompose.sdk.bound import ActionCaller, ActionServer, Caller, Latest, Look, Sender
 
-_BETWEEN = re.compile(r"[/.:]+")  # the names in that of a type: `.` in Python, `::` in C++
-
-
 _FIND = {"msg": registry.message, "srv": registry.service, "action": registry.action}
 _WHAT = {"msg": "message", "srv": "service", "action": "action"}
 
@@ -29,7 +26,7 @@ def _known(kind: str, name: str) -> str:
         return _FIND[kind](name).TYPE
     except KeyError:
         known, what = tuple(registry.names(kind)), _WHAT[kind]
-        short = _BETWEEN.split(name)[-1]
+        short = re.split(r"[/.:]+", name)[-1]  # the names in that of a type: `.` in Python, `::` in C++
         near = nearest(short, {text.rpartition("/")[-1]: text for text in known})
         alike = tuple(text for text in known if near and text.rpartition("/")[-1] == near[0])
         if alike and short == name:
