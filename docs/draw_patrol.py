@@ -15,7 +15,7 @@ from pathlib import Path
 
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.msgs.nav_msgs import Odometry
-from rbxcompose.sdk.robot_events import MissionOver
+from rbxcompose.sdk.component import MissionOver
 from rbxcompose.testing.bench import Bench
 
 ROOT = Path(__file__).parents[1]

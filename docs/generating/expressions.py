@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from docs.generating.markdown import code, page, table
-from rbxcompose.base.expressions.functions import FUNCTIONS
 from rbxcompose.base.expressions.parser import LEVELS, LONGEST, OPERATORS, STEPS
-from rbxcompose.base.expressions.values import LONGEST_TEXT, MOST_ITEMS
+from rbxcompose.base.expressions.values import FUNCTIONS, LONGEST_TEXT, MOST_ITEMS
 from rbxcompose.base.units import DIMENSIONS, Dimension, example, needs_unit, units_of
 
 UNITS = """## Types and units

@@ -10,7 +10,7 @@ from docs.generating.sections import OVERLAY, PART
 from docs.generating.shapes import keys_table
 from rbxcompose.base.config import Config
 from rbxcompose.compiler.sections.components import components
-from rbxcompose.compiler.sections.profiles import profiles
+from rbxcompose.compiler.sections.composition import profiles
 from rbxcompose.manifest import section as files
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.registry import file_model, sections

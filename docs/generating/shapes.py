@@ -26,7 +26,7 @@ from rbxcompose.base.units import Dimension, format_number, format_quantity
 from rbxcompose.manifest.fields import DottedName, InterfaceName
 from rbxcompose.manifest.registry import naming
 from rbxcompose.manifest.section import RestartModel
-from rbxcompose.manifest.written import rounder_unit
+from rbxcompose.manifest.shapes import rounder_unit
 
 _NAMED: tuple[tuple[object, str], ...] = (
     (Name, "name"),

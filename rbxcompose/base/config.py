@@ -3,6 +3,7 @@
 import ast
 import inspect
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
@@ -387,3 +388,21 @@ class Restart(Config):
 
 DEFAULT = Restart()
 """The policy if a manifest gives none."""
+
+
+def require_possible(host: str) -> str:
+    """Return a name or an address of a machine as it is.
+
+    Raises:
+        ValueError: if it looks like an address and is none, such as 10.42.0.300.
+    """
+    if re.fullmatch(r"[0-9.]+|[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*", host):  # it can be no name
+        import ipaddress  # most robots name no machine
+
+        try:
+            ipaddress.ip_address(host)
+        except ValueError as error:
+            raise ValueError(
+                f"'{host}' is no address: it has four numbers from 0 to 255, such as 10.42.0.2, or is one of IPv6"
+            ) from error
+    return host

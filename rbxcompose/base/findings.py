@@ -1,23 +1,29 @@
-"""Findings: what the compiler reports about a manifest, as data with a place, and how it is worded for people."""
+"""Findings: what the compiler reports about a manifest, as data with a place, worded for people; rules find them.
+
+The subject of a rule depends on its family: the checks in `checks/` examine a robot, those in `missions/checks` a
+mission.
+"""
 
 from __future__ import annotations
 
 import difflib
 import heapq
+import inspect
 import re
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import field
+from dataclasses import field, replace
 from enum import StrEnum
 from functools import lru_cache, wraps
-from itertools import product
+from itertools import islice, product
 from typing import Generic, NamedTuple, ParamSpec, TypeVar, cast
 
 from rbxcompose.base.dataclass import dataclass
 
 P = ParamSpec("P")
+S = TypeVar("S")
 T = TypeVar("T")
 
 GUESSES = 4_000_000  # units of work, each about 0.1 us
@@ -502,3 +508,66 @@ def _is_slip(name: str, meant: str) -> bool:
 
 
 Sources = Mapping[str, str]  # text of every file that a span may refer to
+
+
+WIRING, NAMES, MISSIONS, OWN, ALL = "wiring", "names", "missions", "own file", "everything"
+"""What rules may take for known: all ports with their topics; the names of all components; all missions; the mission
+file that a finding is in; everything. The name of a section means its contents."""
+EVERYTHING = (ALL, WIRING, NAMES, MISSIONS, OWN)
+OUR_CODES = "RBX"  # how the codes of this project begin
+MOST_FOUND = 100  # findings of one rule about one subject: a thousand things make a million pairs
+
+
+@dataclass(frozen=True, slots=True)
+class Rule(FindingKind, Generic[S]):
+    """A kind of finding together with the function that finds it.
+
+    `closed` is what it takes for known, because it concludes something from what is not there; with an error in that,
+    it is silent. `None` stands for everything in warnings, for nothing in errors.
+    """
+
+    find: Callable[[S], Iterable[Finding]] = lambda subject: ()
+    closed: tuple[str, ...] | None = None
+
+    @property
+    def relies_on(self) -> tuple[str, ...]:
+        """Return what it takes for known."""
+        if self.closed is None:
+            return EVERYTHING if self.severity is Severity.WARNING else ()
+        return self.closed
+
+    def __call__(self, subject: S) -> Iterable[Finding]:
+        """Return what is wrong with `subject`: at most the first `MOST_FOUND` findings."""
+        found = list(islice(self.find(subject), MOST_FOUND + 1))
+        if len(found) > MOST_FOUND:
+            rest, last = f"there are more than these {MOST_FOUND} findings of {self.code}", found[MOST_FOUND - 1]
+            found[MOST_FOUND - 1 :] = [replace(last, help=clauses(last.help, rest))]
+        return found
+
+
+def declared(
+    find: Callable[[S], Iterable[Finding]],
+    code: str,
+    severity: Severity,
+    is_fixable: bool,
+    closed: tuple[str, ...] | None = None,
+) -> Rule[S]:
+    """Enter a rule under a code. The docstring of a rule of another package is its docs page.
+
+    Raises:
+        ValueError: if it has no docstring, or its code is taken.
+    """
+    if not find.__doc__:
+        raise ValueError(f"check {code} has no docstring, so it would have no docs page")
+    doc = "" if code.startswith(OUR_CODES) else inspect.cleandoc(find.__doc__)
+    origin = f"{find.__module__}.{find.__qualname__}"
+    made: Rule[S] = Rule(code, severity, is_fixable, doc, origin, find=find, closed=closed)
+    register_kind(made)
+    return made
+
+
+def belonging(
+    find: Callable[[S], Iterable[Finding]], kind: FindingKind, closed: tuple[str, ...] | None = None
+) -> Rule[S]:
+    """Return a rule for a kind of finding that is declared elsewhere, because not only rules find it."""
+    return Rule(kind.code, kind.severity, kind.is_fixable, kind.doc, kind.origin, find=find, closed=closed)

@@ -3,10 +3,9 @@
 import errno
 import os
 import re
-import socket
 from pathlib import Path
 
-from rbxcompose.base.addresses import require_possible
+from rbxcompose.base.config import require_possible
 
 LINK_LEASE = 2.0  # [s] of silence after which a link counts as lost
 LOOPBACK, _UNIX = "127.0.0.1", "unixsock-stream/"
@@ -47,6 +46,8 @@ def socket_of(endpoint: str) -> Path:
 
 def accepts(endpoint: str, patience: float) -> bool:
     """Return whether connections are accepted at an endpoint within `patience` [s]; UDP and QUIC cannot tell."""
+    import socket  # no check needs it
+
     protocol, _, place = re.split("[?#]", endpoint)[0].partition("/")
     host, _, port = place.rpartition(":")
     if protocol in ("udp", "quic"):

@@ -20,8 +20,7 @@ from rbxcompose.commands.console import NotDoneError, emit, refuse, write_report
 from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, SAID_NO, Guest, ReceivedMessage, wanted
 from rbxcompose.commands.interrupts import INTERRUPTED
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, key_span, value_span
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, key_span, plain_value, value_span
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.cdr import CdrError, decode
 from rbxcompose.msgs.plain import KeyPath, from_plain, to_plain

@@ -9,7 +9,7 @@ import importlib
 import keyword
 from typing import TYPE_CHECKING, Protocol, cast
 
-from rbxcompose.base.rooms import file_of, modules_of
+from rbxcompose.base.plugins import file_of, modules_of
 
 if TYPE_CHECKING:  # a verb that does not run costs no imports
     import argparse

@@ -4,11 +4,9 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from rbxcompose.base.findings import Finding, FindingKind, Report, Severity
-from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
+from rbxcompose.base.findings import OUR_CODES, Finding, FindingKind, Report, Rule, Severity, belonging, declared
+from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins, domain_of, package_of
 from rbxcompose.base.printable import plain
-from rbxcompose.base.rooms import domain_of, package_of
-from rbxcompose.base.rules import OUR_CODES, Rule, belonging, declared
 from rbxcompose.compiler.doubts import Doubts, doubts_of, half_read
 from rbxcompose.compiler.model.robot import NOTHING, Robot
 from rbxcompose.manifest.registry import PLUGINS as SECTIONS

@@ -7,23 +7,34 @@ from types import MappingProxyType
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, NeededFile, Related, Report, Severity, Span, kind, needed, one_compile
+from rbxcompose.base.findings import (
+    Finding,
+    NeededFile,
+    Related,
+    Report,
+    Rule,
+    Severity,
+    Span,
+    kind,
+    needed,
+    one_compile,
+)
 from rbxcompose.base.garbage_collection import paused_collection
-from rbxcompose.base.rules import Rule
 from rbxcompose.compiler.check_runner import findings_of, run_checks
 from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_file import load_robot
 from rbxcompose.compiler.doubts import with_removals
 from rbxcompose.compiler.model.build import build_robot, read_missions, with_missions
-from rbxcompose.compiler.model.robot import NOTHING, Outside, Robot
+from rbxcompose.compiler.model.flow import start_order
+from rbxcompose.compiler.model.robot import NOTHING, Outside, Robot, RobotComponent
 from rbxcompose.compiler.model.skills import names_of_skills, skills_of
-from rbxcompose.compiler.plan.build import build_plan
-from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.compiler.plan.model import BusPlan, Instance, Plan, Wire
 from rbxcompose.manifest.files import PROFILE
 from rbxcompose.manifest.reader import ParsedText, Texts
 from rbxcompose.manifest.tree import LEAST_STEPS, PROFILE_STEPS, STEP_BYTES, STEP_VALUES
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.msgs import registry
+from rbxcompose.sdk.capabilities import RunsMissions
 
 NOT_TRIED = kind("RBX7003", Severity.WARNING)
 
@@ -199,3 +210,39 @@ def _report_profile(profile: Span, tried: Compilation, out: Compilation, above: 
         else:
             related = (*finding.related, Related(profile, "with this profile"))
             out.report.add(replace(finding, related=related, fix=None))
+
+
+def build_plan(robot: Robot) -> Plan:
+    """Return the plan for `up`; the robot must have no errors."""
+    manifest = robot.manifest
+    missions = (component.name for component, _ in robot.declared(RunsMissions))
+    last = [name for name in missions if name not in robot.written]  # starts when everything else is active
+    order = start_order(
+        {name: component.starts_after for name, component in robot.components.items() if name not in last}
+    )
+    bus = manifest.bus
+    return Plan(
+        robot=manifest.name,
+        file=str(manifest.path),
+        instances=tuple(_instance(robot.components[name]) for name in (*order, *last)),
+        bus=BusPlan(bus.domain, bus.namespace or "", bus.port, bus.wire, bus.router, bus.clock, bus.access, bus.links),
+        start=manifest.start,
+        is_simulated=manifest.is_simulated,
+        messages=dict(manifest.messages),
+    )
+
+
+def _instance(component: RobotComponent) -> Instance:
+    wires = tuple(Wire(end.name, end.port.kind, end.topic, end.type_name) for end in component.ends)
+    after, restart = component.starts_after, component.restart
+    return Instance(
+        component.name,
+        component.type_name,
+        component.config,
+        component.process,
+        after,
+        wires,
+        restart,
+        component.log,
+        component.bounds,
+    )

@@ -10,11 +10,10 @@ from dataclasses import field
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Related, Severity, Span, kind
-from rbxcompose.base.rules import ALL, MISSIONS, NAMES, OWN, WIRING
+from rbxcompose.base.findings import ALL, MISSIONS, NAMES, OWN, WIRING, Finding, Related, Severity, Span, kind
 from rbxcompose.compiler.composition.overlay import NOTHING_TO_CHANGE
 from rbxcompose.compiler.composition.robot_manifest import History, RobotManifest
-from rbxcompose.compiler.sections.include import include
+from rbxcompose.compiler.sections.composition import include
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.registry import section_named, sections_in_use

@@ -7,14 +7,19 @@ not unknown because there is a mistake in its text.
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from itertools import pairwise
 from keyword import iskeyword
 from pathlib import Path
+from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Related, Span, kind
 from rbxcompose.base.printable import plain
+from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.files import folder_named, resolve, shown_name
+from rbxcompose.manifest.reader import read_source
+from rbxcompose.manifest.section import Reading
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import KINDS, DefinitionError, FieldShape, Structure, code_of, interface_names, parse
 from rbxcompose.msgs.packages import short
@@ -217,3 +222,47 @@ def _content(structures: tuple[Structure, ...]) -> object:
         ([(each.name, each.type) for each in part.fields], {each.name: each.value for each in part.constants})
         for part in structures
     ]
+
+
+def texts_in(folders: Mapping[str, str], reading: Reading[Any]) -> Mapping[str, str]:
+    """Return the texts of the types in the folders that the section `msgs` names, and report what is wrong."""
+    report, documents = reading.report, reading.contents.documents
+    written: dict[str, TypeText] = {}
+    packages: dict[str, tuple[Path, Span]] = {}
+    for name, folder_name in folders.items():
+        span = reading.value("msgs", name, "folder")
+        writer = documents.writer(span, reading.contents.file)
+        folder = folder_named(folder_name, writer, span)
+        if not isinstance(folder, Path):
+            report.add(folder)
+            continue
+        found = packages_in(folder)
+        if not found:
+            message = f"'{folder_name}' has no messages, services or actions"
+            report.add(NO_PACKAGE.at(span, message, help="they are files such as 'PACKAGE/msg/NAME.msg'"))
+        for package in found:
+            first, place = packages.setdefault(package.name, (package, span))
+            if first != package:
+                words = f"there are two packages '{package.name}': '{shown_name(first)}' and '{shown_name(package)}'"
+                report.add(NO_PACKAGE.at(span, words, related=[Related(place, "the first one")]))
+            elif words := wrong_package(package.name):
+                report.add(NO_PACKAGE.at(span, words, help="rename the folder"))
+            else:
+                written |= _texts(package, writer, span, documents)
+    examination = Examination(written)
+    report.extend(examination.findings)
+    return examination.texts
+
+
+def _texts(package: Path, writer: Path, span: Span, documents: Documents) -> dict[str, TypeText]:
+    found = {}
+    for name, path in files_in(package):
+        file = resolve(str(path), writer, span)
+        if isinstance(file, Finding):  # a link to elsewhere
+            documents.report.add(file)
+            continue
+        shown = shown_name(file)
+        text, findings = read_source(file, shown, documents.sources, LARGEST, "a type of messages")
+        documents.report.extend(replace(finding, span=finding.span or span) for finding in findings)
+        found[name] = TypeText(shown, NOTHING[name.split("/")[1]] if text is None else text)
+    return found

@@ -12,8 +12,7 @@ from typing import Any, TypeVar
 
 from rbxcompose.base.config import Config
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Report
-from rbxcompose.base.rules import Rule
+from rbxcompose.base.findings import Finding, Report, Rule
 from rbxcompose.compiler.check_runner import findings_of, is_foreign, run_checks
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
 from rbxcompose.missions.analysis.examined import Examined

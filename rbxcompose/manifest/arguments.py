@@ -14,7 +14,7 @@ from rbxcompose.base.findings import DID_YOU_MEAN, Finding, FindingKind, Related
 from rbxcompose.base.printable import plain
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.foreign_words import TYPES as FOREIGN_TYPES
-from rbxcompose.manifest.scalars import describe
+from rbxcompose.manifest.tree import describe
 from rbxcompose.manifest.validate import (
     MISSING_KEY,
     NOT_A_CHOICE,

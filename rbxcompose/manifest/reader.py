@@ -11,14 +11,13 @@ from rbxcompose.base.findings import Edit, Finding, Fix, Severity, Span, kind, o
 from rbxcompose.base.printable import FORBIDDEN, code_point
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.foreign_words import foreign_text
-from rbxcompose.manifest.slip_registry import NOT_YAML
+from rbxcompose.manifest.slips import NOT_YAML
 from rbxcompose.manifest.walk import CHARACTER, Walk
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE, compose
 
 PASSWORD = kind("RBX1321", Severity.WARNING)
 
 _WITH_PASSWORD = re.compile(r"[A-Za-z][A-Za-z0-9+.-]{0,20}://[^\s/:@]{0,60}:(?P<password>[^\s/@]{1,200})@")
-_HIDDEN = re.compile(r"\*+|\$.*|<.*>")  # what stands for a password is none
 
 
 def passwords(text: str, root: tree.TreeNode) -> Iterator[Finding]:
@@ -32,7 +31,7 @@ def passwords(text: str, root: tree.TreeNode) -> Iterator[Finding]:
 
 def _within(scalar: tree.ScalarNode) -> Iterator[Finding]:
     for found in _WITH_PASSWORD.finditer(scalar.text):
-        if not _HIDDEN.fullmatch(found["password"]):
+        if not re.fullmatch(r"\*+|\$.*|<.*>", found["password"]):  # what stands for a password is none
             yield PASSWORD.at(
                 tree.part_span(scalar, *found.span("password")),
                 "this address contains a password, which everybody sees who sees this file",

@@ -1,4 +1,7 @@
-"""The sections of the manifest: each is one file in `sections/`, declared by one decorator, found by its name."""
+"""The sections of the manifest: each is declared by one decorator in a file of `sections/`.
+
+In a domain, that file has the name of the section; those that belong to no domain stand together by subject.
+"""
 
 import inspect
 import textwrap
@@ -10,8 +13,7 @@ from typing import Any, ParamSpec, TypeVar
 from pydantic import Field, create_model
 
 from rbxcompose.base.findings import Finding
-from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
-from rbxcompose.base.rooms import domain_of, package_of
+from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins, domain_of, package_of
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT, Declaration, Reading, Section
 from rbxcompose.manifest.tree import MappingNode
@@ -96,6 +98,7 @@ def _of_kind(kind: str) -> list[Section[Any, Any]]:
 def section_named(name: object) -> Section[Any, Any] | None:
     """Return the section of this name, or None."""
     _problems()
+    _load_common()
     if name in PLUGINS.shipped:
         _load_domain(domain_of(PLUGINS.shipped[str(name)]))
     return _SECTIONS.get(str(name))
@@ -114,6 +117,12 @@ def _load_domain(domain: str) -> None:
     for name, module in PLUGINS.shipped.items():
         if domain_of(module) == domain:
             PLUGINS.load(name)
+
+
+def _is_ours(name: str) -> bool:
+    """Return whether a section of this name is one of rbxcompose."""
+    _load_domain("")
+    return name in PLUGINS.shipped or (name in _SECTIONS and _SECTIONS[name].read.__module__.startswith("rbxcompose."))
 
 
 def naming(kind: str) -> Iterator[Section[Any, Any]]:
@@ -138,11 +147,13 @@ def _problems() -> tuple[str, ...]:
 
 
 def _problem(name: str) -> str:
+    if _is_ours(name):
+        return PLUGINS.left_out(name)
     try:
-        PLUGINS.load(name)
+        PLUGINS.load_foreign(name)
     except BrokenPluginError as error:
         return str(error)
-    return PLUGINS.overshadowed(name)
+    return ""
 
 
 FILES = {

@@ -21,8 +21,6 @@ from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Report, Span, neares
 from rbxcompose.base.printable import plain
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.fields import ComponentName, TopicName
-from rbxcompose.manifest.salvage import salvaged
-from rbxcompose.manifest.scalars import is_empty
 from rbxcompose.manifest.shapes import below, keys_at, kinds_of, with_references
 from rbxcompose.manifest.tree import (
     Entry,
@@ -32,10 +30,20 @@ from rbxcompose.manifest.tree import (
     SequenceNode,
     TreeNode,
     at,
+    is_empty,
     key_span,
     value_span,
 )
-from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY, WRONG_TYPE, is_broken, is_valid, label_of, validate
+from rbxcompose.manifest.validate import (
+    MISSING_KEY,
+    UNKNOWN_KEY,
+    WRONG_TYPE,
+    is_broken,
+    is_valid,
+    label_of,
+    salvaged,
+    validate,
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
-"""What a model accepts at a place below it: keys, quantities, names of something."""
+"""What a model accepts at a place below it: keys, quantities, names of something; and values as people write them."""
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from typing import Annotated, Any, get_args, get_origin
@@ -8,7 +9,17 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel
 
 from rbxcompose.base.config import Dimensioned, Refers
-from rbxcompose.base.units import Dimension
+from rbxcompose.base.units import (
+    UNITS,
+    Dimension,
+    Unit,
+    UnitError,
+    format_number,
+    format_quantity,
+    to_si,
+    units_of,
+    written_unit,
+)
 from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
 
 
@@ -137,3 +148,91 @@ def _types_at(model: Any, path: KeyPath) -> list[Any]:
     for key in path:
         found = [inner for item in found for inner in below(item, key)]
     return found
+
+
+_LAST_DIGITS = 1e-12  # of a number, which a conversion between units may lose
+
+
+def is_nearly(value: float, other: float) -> bool:
+    """Return whether two numbers are the same but for their last digits."""
+    return math.isclose(value, other, rel_tol=_LAST_DIGITS)
+
+
+def rounder_unit(value: float, dimension: Dimension, wanted: str | None = None) -> str | None:
+    """Return the unit for a value: the wanted or usual one, unless only another needs no more than six digits.
+
+    So 3 rad/s^2 is not 171.887 deg/s^2. None if the dimension has no units.
+    """
+    units = units_of(dimension)
+    usual = written_unit(format_quantity(value, dimension))
+    if usual is None:
+        return None
+    first = wanted if wanted in units else usual
+
+    def is_round(unit: Unit) -> bool:
+        return is_nearly(unit.to_si(float(format_number(unit.from_si(value)))), value)
+
+    return next((name for name in dict.fromkeys((first, usual, *units)) if is_round(UNITS[name])), first)
+
+
+def exact(value: float, dimension: Dimension) -> str:
+    """Return a quantity in its usual or rounder unit, with as many digits as its value needs."""
+    first = rounder_unit(value, dimension)
+    units = [unit for unit in UNITS.values() if unit.dimension == dimension]
+    units.sort(key=lambda unit: (unit.name != first, unit.name))
+    texts = [f"{digits} {unit.name}" for unit in units for digits in _digits(unit.from_si(value))] or [repr(value)]
+    found = next((text for text in texts if _read(text, dimension) == value), None)
+    # Some ratios have no text in percent that is exact to the last bit; a product is.
+    return found or f"${{{value!r} * {format_quantity(1.0, dimension)}}}"
+
+
+def _digits(number: float) -> Iterator[str]:
+    """Yield ways to write a number, the shortest first."""
+    yield f"{number:.6g}"
+    yield f"{number:.15g}"
+    for near in (number, math.nextafter(number, math.inf), math.nextafter(number, -math.inf)):
+        yield repr(near)
+
+
+def _read(text: str, dimension: Dimension) -> float:
+    try:
+        return to_si(text, dimension)
+    except UnitError:
+        return math.inf
+
+
+def as_written(config: BaseModel) -> dict[str, Any]:
+    """Return the fields of a configuration that are set, quantities as texts."""
+    types = field_types(type(config))
+    found = {name: _written(getattr(config, name), hint) for name, hint in types.items()}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def _written(value: Any, hint: Any) -> Any:
+    match value:
+        case BaseModel():
+            return as_written(value)
+        case Mapping():
+            return {key: _item(entry, hint, key) for key, entry in value.items()}
+        case list() | tuple():
+            return [_item(one, hint, index) for index, one in enumerate(value)]
+        case int() | float() if not isinstance(value, bool):
+            marks = (mark.dimension for mark in alternatives(hint) if isinstance(mark, Dimensioned))
+            return next((_quantity(value, dimension) for dimension in marks), value)
+    return value
+
+
+def _item(value: Any, hint: Any, key: str | int) -> Any:
+    return next((_written(value, inner) for inner in below(hint, key)), value)
+
+
+def _quantity(value: float, dimension: Dimension) -> str:
+    unit = _unit_of(dimension)
+    return f"{unit.from_si(value)!r} {unit.name}"
+
+
+def _unit_of(dimension: Dimension) -> Unit:
+    """Return the unit in which the number is nearest to that in SI."""
+    return min(
+        (unit for unit in UNITS.values() if unit.dimension == dimension), key=lambda one: abs(one.times / one.per - 1)
+    )

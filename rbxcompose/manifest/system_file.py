@@ -5,8 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from rbxcompose.base.addresses import require_possible
-from rbxcompose.base.config import BitRate, Config, Frequency, Name, Time
+from rbxcompose.base.config import BitRate, Config, Frequency, Name, Time, require_possible
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.fields import FileName
 

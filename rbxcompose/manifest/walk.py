@@ -15,8 +15,8 @@ from rbxcompose.base.findings import Finding, Related, Severity, Span, kind, rep
 from rbxcompose.base.printable import FORBIDDEN, code_point, plain
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.foreign_words import help_for_tag
-from rbxcompose.manifest.scalars import number_trouble
-from rbxcompose.manifest.slip_registry import QUOTE_HELP, QUOTES_NEEDED
+from rbxcompose.manifest.slips import QUOTE_HELP, QUOTES_NEEDED
+from rbxcompose.manifest.tree import number_trouble
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 
 TWICE = kind("RBX1104")

@@ -2,11 +2,10 @@
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.evaluate import evaluate, holds
-from rbxcompose.base.expressions.text import Template
+from rbxcompose.base.expressions.text import Template, condition_in_words
 from rbxcompose.base.expressions.tree import Expression, Number
 from rbxcompose.base.expressions.types import UNKNOWN, Type, TypeKind
 from rbxcompose.base.expressions.values import NotArrivedError, Value
-from rbxcompose.base.expressions.words import condition_in_words
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.facts import is_simple, is_sure, takes_time
 from rbxcompose.missions.engine.events import Logged, Reported, SkillEnded, SkillStarted, Transition

@@ -8,8 +8,8 @@ from typing import Any, get_args
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import Family
 from rbxcompose.runtime.folder import ChosenLayers, ClockOffset
+from rbxcompose.sdk.component import ComponentNoted, MissionOver, RobotHeld
 from rbxcompose.sdk.parameters import ChangeRefusal, WantedChange
-from rbxcompose.sdk.robot_events import ComponentNoted, MissionOver, RobotHeld
 
 
 @dataclass(frozen=True, slots=True)

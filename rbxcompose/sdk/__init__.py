@@ -45,14 +45,14 @@ from rbxcompose.sdk.capabilities import (
     Warns,
     WritesFrame,
 )
-from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.messages import MessageName
+from rbxcompose.sdk.component import Component, ComponentNoted, MissionOver, MissionWaits, RobotHeld
 from rbxcompose.sdk.ports import (
     Calls,
     CallsAction,
     In,
     Looks,
     MessageLimits,
+    MessageName,
     Out,
     Port,
     Qos,
@@ -61,7 +61,6 @@ from rbxcompose.sdk.ports import (
     ServesTopic,
 )
 from rbxcompose.sdk.registry import component
-from rbxcompose.sdk.robot_events import ComponentNoted, MissionOver, MissionWaits, RobotHeld
 from rbxcompose.sdk.skills import Activity, skill
 from rbxcompose.sdk.updater import CompositeTask, FrequencyTask, StampTask, TaskStatus, heartbeat
 

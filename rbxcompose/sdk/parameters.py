@@ -18,7 +18,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.types import COUNT, FLAG, TEXT, Type, choice_of, quantity_of
 from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.units import NUMBER, RATIO, UNITS, Dimension, Quantity, UnitError, format_number, format_quantity
-from rbxcompose.manifest.written import is_nearly, rounder_unit
+from rbxcompose.manifest.shapes import is_nearly, rounder_unit
 from rbxcompose.msgs import rcl_interfaces
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.rbxcompose_parameters import NodeChange

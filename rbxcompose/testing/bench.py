@@ -18,11 +18,10 @@ from rbxcompose.msgs.types import Message
 from rbxcompose.runtime.log import Record
 from rbxcompose.runtime.process_group.host import Host, Notice
 from rbxcompose.runtime.process_group.parameters import Deciders
-from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.component import Component, MissionOver
 from rbxcompose.sdk.parameters import RobotRules, changed, to_message
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.sdk.registry import component_type
-from rbxcompose.sdk.robot_events import MissionOver
 
 M = TypeVar("M", bound=Message)
 OWNER = "bench"

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from rbxcompose.base.config import Config, Place
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.functions import FUNCTIONS
+from rbxcompose.base.expressions.values import FUNCTIONS
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.plugins import BrokenPluginError
 from rbxcompose.commands.new_files import ANSWER, NAME, AnswerError, class_name, read_name, read_place, render

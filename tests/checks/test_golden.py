@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.base.rooms import domain_of, package_of
+from rbxcompose.base.plugins import domain_of, package_of
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.compiler.check_runner import EVERY_ROBOT, PLUGINS, all_checks
 from rbxcompose.compiler.compile import compile_robot

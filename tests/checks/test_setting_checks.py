@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.base.config import Config
-from rbxcompose.base.findings import Finding, Report
-from rbxcompose.base.rules import Rule
+from rbxcompose.base.findings import Finding, Report, Rule
 from rbxcompose.compiler import setting_checks
 from rbxcompose.compiler.check_runner import findings_of, run_checks
 from rbxcompose.compiler.model.robot import Robot

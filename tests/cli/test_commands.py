@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.base.levels import Level
-from rbxcompose.base.rooms import file_of
+from rbxcompose.base.plugins import file_of
 from rbxcompose.commands import main as command
 from rbxcompose.commands import verbs
 from rbxcompose.runtime.folder import STATE, ComponentState, RobotFolder, RobotState, StopState

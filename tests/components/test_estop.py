@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rbxcompose.compiler.plan.model import Instance
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.std_msgs import Bool, Float64
-from rbxcompose.sdk.robot_events import RobotHeld
+from rbxcompose.sdk.component import RobotHeld
 from rbxcompose.testing import Bench, check_text, instance
 
 PRESSED = "'estop' is pressed"

@@ -12,7 +12,7 @@ from rbxcompose.base.requests import Command
 from rbxcompose.missions.components.mission import Mission, MissionConfig
 from rbxcompose.missions.execution.requests import PauseMission, ResumeMission
 from rbxcompose.sdk import Ended, Outcome, Refused
-from rbxcompose.sdk.robot_events import MissionOver, MissionWaits
+from rbxcompose.sdk.component import MissionOver, MissionWaits
 from tests.executive.fake_robot import Robot
 
 PATROL = """

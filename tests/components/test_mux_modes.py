@@ -24,8 +24,8 @@ from rbxcompose.domains.muxes.requests import (
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.std_msgs import Bool, Float64, String
 from rbxcompose.msgs.topic_tools_interfaces import MuxAdd, MuxDelete, MuxList, MuxSelect
+from rbxcompose.sdk.component import ComponentNoted
 from rbxcompose.sdk.ports import Qos
-from rbxcompose.sdk.robot_events import ComponentNoted
 from rbxcompose.testing import Bench, check_text, instance
 from tests.loops import for_all
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.domains.servos.bus_config import ControllerSetup
 from rbxcompose.domains.servos.controllers.gripper import NEEDED, OPTIONAL, GripperConfig, GripperController, model_of
-from rbxcompose.manifest.written import as_written
+from rbxcompose.manifest.shapes import as_written
 from rbxcompose.msgs.control_msgs import GripperCommand, GripperCommandMessage
 from rbxcompose.msgs.rbxcompose_msgs import Grip
 from rbxcompose.msgs.sensor_msgs import JointState

@@ -9,7 +9,7 @@ import pytest
 from rbxcompose.base.findings import Span
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.msgs.sensor_msgs import JointState
-from rbxcompose.sdk.robot_events import MissionOver
+from rbxcompose.sdk.component import MissionOver
 from rbxcompose.testing import Bench
 from rbxcompose.testing.manifests import Checked, check_text
 from tests.conftest import ROOT

@@ -6,8 +6,8 @@ import re
 
 from docs.generating.robot import models_below
 from rbxcompose.base.config import Config
-from rbxcompose.base.expressions.functions import FUNCTIONS
 from rbxcompose.base.expressions.types import TYPES
+from rbxcompose.base.expressions.values import FUNCTIONS
 from rbxcompose.base.units import UNITS
 from rbxcompose.manifest.registry import FILES, file_model, sections
 from rbxcompose.manifest.section import ComponentOptions

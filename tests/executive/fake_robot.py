@@ -30,9 +30,8 @@ from rbxcompose.msgs.rbxcompose_msgs import MoveArm, Recharge
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.sdk import Activity, Ended, Outcome, Place, skill
 from rbxcompose.sdk.bound import Reply
-from rbxcompose.sdk.component import BusAddress
+from rbxcompose.sdk.component import BusAddress, MissionOver, RobotEvent
 from rbxcompose.sdk.ports import In
-from rbxcompose.sdk.robot_events import MissionOver, RobotEvent
 from rbxcompose.sdk.updater import DiagnosticTask
 
 

@@ -11,7 +11,7 @@ from rbxcompose.missions.execution.requests import PauseMission, ResumeMission, 
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.sdk import Component, Config, ServesAction, component
-from rbxcompose.sdk.robot_events import MissionOver
+from rbxcompose.sdk.component import MissionOver
 from rbxcompose.testing import Bench
 from tests.executive.fake_robot import Robot
 

@@ -16,7 +16,7 @@ from rbxcompose.missions.execution.requests import (
     ShowPicture,
 )
 from rbxcompose.sdk import Outcome, Refused
-from rbxcompose.sdk.robot_events import MissionOver
+from rbxcompose.sdk.component import MissionOver
 from tests.executive.fake_robot import Robot
 from tests.loops import for_all
 

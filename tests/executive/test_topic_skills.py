@@ -10,7 +10,7 @@ import pytest
 
 from rbxcompose.missions.execution.requests import CancelMission, PauseMission, ResumeMission
 from rbxcompose.msgs.std_msgs import Float64
-from rbxcompose.sdk.robot_events import MissionOver
+from rbxcompose.sdk.component import MissionOver
 from rbxcompose.testing import Bench, check_text
 from tests.executive.toy_gripper import GripEnd, Gripper
 

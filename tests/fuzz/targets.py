@@ -6,9 +6,9 @@ import contextlib
 from collections.abc import Callable
 
 from rbxcompose.base.findings import Report
-from rbxcompose.base.formats import renderer
 from rbxcompose.bus.names import AttachmentError, decode_attachment
 from rbxcompose.bus.tokens import parse_token
+from rbxcompose.commands.formats import renderer
 from rbxcompose.compiler.plan.dump import PlanTextError, dump, load
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.msgs.cdr import HEADER, CdrError, decode

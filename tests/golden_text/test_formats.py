@@ -20,7 +20,7 @@ from rbxcompose.base.findings import (
     Span,
     replacement,
 )
-from rbxcompose.base.formats import PLUGINS, format_names, renderer
+from rbxcompose.commands.formats import PLUGINS, format_names, renderer
 
 KIND = FindingKind("RBX0001", Severity.WARNING, doc="A title of {braces}.\n\nThe first part.\n\nBad: this\n")
 SOURCES = {"robots/a b/robot.yaml": 'name: "on"\n', "--set": "a.b=1"}

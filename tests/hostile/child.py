@@ -15,8 +15,8 @@ import sys
 import time
 from pathlib import Path
 
-from rbxcompose.base.formats import renderer
 from rbxcompose.commands.finding_pages import all_kinds
+from rbxcompose.commands.formats import renderer
 from rbxcompose.compiler.compile import compile_robot
 
 MEMORY = 200_000_000  # bytes of address space beyond what the process has at its start

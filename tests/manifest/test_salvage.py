@@ -10,8 +10,8 @@ from rbxcompose.domains.diagnostics.settings import AnalyzerModel
 from rbxcompose.domains.muxes.sections.muxes import MuxModel
 from rbxcompose.domains.power.components.battery_sim import BatterySimConfig
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.salvage import salvaged
 from rbxcompose.manifest.section import ComponentOptions
+from rbxcompose.manifest.validate import salvaged
 
 M = TypeVar("M")
 

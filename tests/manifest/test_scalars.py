@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.findings import Span
-from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import ScalarNode
+from rbxcompose.manifest.tree import ScalarNode, plain_value
 from tests.loops import for_all
 
 HERE = Span("f", 1, 1, 1, 2)

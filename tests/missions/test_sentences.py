@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.expressions.parser import parse
-from rbxcompose.base.expressions.words import condition_in_words, in_words
+from rbxcompose.base.expressions.text import condition_in_words, in_words
 from rbxcompose.base.findings import Report
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.modifiers.registry import modifiers

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rbxcompose.base.findings import Severity, Span
-from rbxcompose.base.formats import format_names, renderer
+from rbxcompose.commands.formats import format_names, renderer
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.plan.dump import dump, load
 from tests.conftest import ROOT

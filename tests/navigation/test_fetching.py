@@ -13,7 +13,7 @@ from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.worlds.components.physics import PhysicsSim
 from rbxcompose.domains.worlds.physics.engine import PhysicsWorld
 from rbxcompose.msgs.sensor_msgs import JointState
-from rbxcompose.sdk.robot_events import MissionOver
+from rbxcompose.sdk.component import MissionOver
 from rbxcompose.testing import Bench
 from tests.conftest import ROOT
 

@@ -18,8 +18,8 @@ from rbxcompose.msgs.geometry_msgs import PoseWithCovariance, PoseWithCovariance
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.std_msgs import Header, String
 from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.sdk.component import MissionOver
 from rbxcompose.sdk.ports import Qos
-from rbxcompose.sdk.robot_events import MissionOver
 from rbxcompose.testing import Bench, instance
 from tests.conftest import ROOT
 

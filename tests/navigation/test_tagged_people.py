@@ -24,8 +24,8 @@ from rbxcompose.msgs.vision_msgs import (
     ObjectHypothesis,
     ObjectHypothesisWithPose,
 )
+from rbxcompose.sdk.component import MissionOver
 from rbxcompose.sdk.ports import Qos
-from rbxcompose.sdk.robot_events import MissionOver
 from rbxcompose.testing import Bench
 from tests.conftest import ROOT
 from tests.navigation.test_sensors import SIMULATORS, skip_without_pictures

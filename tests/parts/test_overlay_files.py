@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from rbxcompose.base.findings import Report
 from rbxcompose.base.units import ANGLE, LENGTH, RATIO, SPEED, TIME, Dimension, to_si
 from rbxcompose.commands.main import main
-from rbxcompose.compiler.composition.dump import dump_robot, exact
+from rbxcompose.compiler.composition.dump import dump_robot
 from rbxcompose.manifest.fill import Names, fill
+from rbxcompose.manifest.shapes import exact
 from rbxcompose.manifest.tree import NOWHERE, Entry, MappingNode, ScalarNode
 from tests.parts.project import BATTERY, Project
 

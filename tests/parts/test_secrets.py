@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.base.config import Secret
-from rbxcompose.base.formats import format_names
+from rbxcompose.commands.formats import format_names
 from rbxcompose.commands.main import main
 from rbxcompose.compiler.composition.dump import dump_robot
 from rbxcompose.msgs.std_msgs import String

@@ -15,8 +15,8 @@ from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.msgs.std_srvs import SetBool
+from rbxcompose.sdk.component import MissionOver
 from rbxcompose.sdk.ports import Qos
-from rbxcompose.sdk.robot_events import MissionOver
 from rbxcompose.testing import Bench
 from tests.commands import command
 from tests.conftest import ROOT

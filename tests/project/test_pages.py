@@ -9,8 +9,7 @@ import pytest
 from docs import generate
 from docs.generating.families import next_code
 from rbxcompose.base.expressions.types import TYPES
-from rbxcompose.base.findings import KINDS, kind
-from rbxcompose.base.rules import OUR_CODES
+from rbxcompose.base.findings import KINDS, OUR_CODES, kind
 from rbxcompose.commands.finding_pages import FAMILIES, all_kinds, declared, family_of, page_folder
 from rbxcompose.compiler.check_runner import all_checks
 from rbxcompose.manifest.registry import sections

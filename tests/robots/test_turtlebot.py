@@ -12,7 +12,7 @@ from rbxcompose.base.geometry import Pose2
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.missions.execution.requests import ResumeMission
-from rbxcompose.sdk.robot_events import MissionOver
+from rbxcompose.sdk.component import MissionOver
 from rbxcompose.testing.bench import Bench, Ran, run_robot
 
 ROBOT = "robots/turtlebot/robot.yaml"

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import MESSAGES, Channel
-from rbxcompose.sdk.robot_events import MissionOver
+from rbxcompose.sdk.component import MissionOver
 
 NAMES = st.lists(st.text(), max_size=4)
 SOME: st.SearchStrategy[say.ChannelMessage] = st.one_of(

@@ -15,7 +15,7 @@ from rbxcompose.missions.execution.requests import RunMission
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.supervision.members import Phase
-from rbxcompose.sdk.robot_events import MissionOver, RobotHeld
+from rbxcompose.sdk.component import MissionOver, RobotHeld
 from tests.runtime.stage import ENDPOINT, Stage, placed, robot
 
 # The beginning

@@ -13,7 +13,7 @@ from rbxcompose.runtime.supervision.changes import changes
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.runtime.supervision.other_hosts import SILENT
-from rbxcompose.sdk.robot_events import MissionOver
+from rbxcompose.sdk.component import MissionOver
 from tests.runtime.stage import Stage, robot
 
 BASE = ("base",)

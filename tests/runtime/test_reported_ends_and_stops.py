@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from rbxcompose.base.levels import Level
 from rbxcompose.runtime import channel as say
-from rbxcompose.sdk.robot_events import RobotHeld
+from rbxcompose.sdk.component import RobotHeld
 from tests.runtime.stage import Stage
 
 

@@ -30,7 +30,7 @@ from rbxcompose.runtime.supervision.judge import Judge
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
 from rbxcompose.runtime.supervision.supervisor import SettingLine
 from rbxcompose.sdk import Component, Config, component
-from rbxcompose.sdk.robot_events import RobotHeld
+from rbxcompose.sdk.component import RobotHeld
 from rbxcompose.testing.bench import Bench, instance
 from tests.loops import for_all
 from tests.missions.simulated import program_of

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from rbxcompose.runtime.channel import HostReport, StopMark
 from rbxcompose.runtime.supervision.members import Member
 from rbxcompose.runtime.supervision.stop_latch import StopLatch
-from rbxcompose.sdk.robot_events import RobotHeld
+from rbxcompose.sdk.component import RobotHeld
 from tests.runtime.stage import Stage
 
 HOSTS = ("robot", "desk", "cloud")

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.base.expressions.functions import FUNCTIONS
+from rbxcompose.base.expressions.values import FUNCTIONS
 from rbxcompose.commands.new_files import AnswerError
 from rbxcompose.compiler.composition.robot_file import RESERVED
 from rbxcompose.manifest.registry import robot_keys

@@ -22,7 +22,7 @@ from rbxcompose.runtime.recording.tape import Tape
 from rbxcompose.runtime.recording.topics import Recorded
 from rbxcompose.runtime.supervision.conductor import Conductor
 from rbxcompose.runtime.supervision.members import Phase
-from rbxcompose.sdk.robot_events import MissionWaits
+from rbxcompose.sdk.component import MissionWaits
 from rbxcompose.testing.safety import ROBOT, ObservedEvent, Ordered, events_of, laws_of
 from tests.simulated_faults.network import Network, Weather
 

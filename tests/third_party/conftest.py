@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from rbxcompose.base.findings import KINDS
-from rbxcompose.base.rules import OUR_CODES
+from rbxcompose.base.findings import KINDS, OUR_CODES
 
 collect_ignore = ["rbx_lamp"]
 

@@ -8,7 +8,7 @@ import pytest
 
 from rbxcompose.domains.worlds.components.physics import PhysicsSim
 from rbxcompose.msgs.rbxcompose_msgs import SceneObjects
-from rbxcompose.sdk.robot_events import MissionOver
+from rbxcompose.sdk.component import MissionOver
 from rbxcompose.testing import Bench
 from tests.shipped import ROOT, compiled
 

@@ -8,7 +8,6 @@ from typing import Protocol
 from rbxcompose.base import units
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions import tree
-from rbxcompose.base.expressions.functions import FUNCTIONS
 from rbxcompose.base.expressions.types import (
     COUNT,
     FLAG,
@@ -25,6 +24,7 @@ from rbxcompose.base.expressions.types import (
     quantity_of,
     wider,
 )
+from rbxcompose.base.expressions.values import FUNCTIONS
 from rbxcompose.base.findings import DID_YOU_MEAN, clauses, suggest, surely_meant
 
 

@@ -8,8 +8,8 @@ from operator import add, ge, gt, le, lt, mul, sub, truediv
 from typing import TypeAlias
 
 from rbxcompose.base.expressions import tree as syntax
-from rbxcompose.base.expressions.functions import FUNCTIONS, items
 from rbxcompose.base.expressions.values import (
+    FUNCTIONS,
     LONGEST_TEXT,
     MOST_IN_ALL,
     MOST_ITEMS,
@@ -22,6 +22,7 @@ from rbxcompose.base.expressions.values import (
     is_named_pose,
     is_number,
     is_same,
+    items,
 )
 from rbxcompose.base.units import MOST, format_number
 

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions import tree as syntax
-from rbxcompose.base.expressions.functions import FOREIGN, FUNCTIONS
+from rbxcompose.base.expressions.values import FOREIGN, FUNCTIONS
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.units import NUMBER_TEXT, UNITS, Quantity, UnitError, quantity, unit_help
 

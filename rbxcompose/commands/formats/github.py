@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 from rbxcompose.base.findings import Finding, Report, Sources, Span
 from rbxcompose.base.fixes import COMMAND_LINE
-from rbxcompose.base.formats import output_format
 from rbxcompose.base.printable import plain
+from rbxcompose.commands.formats import output_format
 
 _IN_TEXT = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A"})
 _IN_PROPERTY = {**_IN_TEXT, **str.maketrans({":": "%3A", ",": "%2C"})}

@@ -4,7 +4,7 @@ import json
 
 from rbxcompose.base.findings import Finding, Fix, Report, Sources, Span
 from rbxcompose.base.fixes import exact
-from rbxcompose.base.formats import output_format
+from rbxcompose.commands.formats import output_format
 
 
 @output_format("json")

@@ -8,8 +8,8 @@ from urllib.parse import quote
 import rbxcompose
 from rbxcompose.base.findings import KINDS, Finding, Fix, Related, Report, Sources, Span
 from rbxcompose.base.fixes import COMMAND_LINE, exact
-from rbxcompose.base.formats import output_format
 from rbxcompose.commands.finding_pages import page_of
+from rbxcompose.commands.formats import output_format
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 ROOT = "%SRCROOT%"

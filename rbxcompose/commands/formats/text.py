@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 from rbxcompose.base.findings import Finding, Related, Report, Severity, Sources, Span
 from rbxcompose.base.fixes import safe_fixes
-from rbxcompose.base.formats import output_format
 from rbxcompose.base.printable import columns, plain
+from rbxcompose.commands.formats import output_format
 
 MOST_SHOWN = 20
 _LINE_CELLS = 160  # of a source line; of a longer one only the surroundings of the caret are shown

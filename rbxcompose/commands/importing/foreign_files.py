@@ -16,8 +16,16 @@ from rbxcompose.commands.new_files import LONGEST_NAME, name_like
 from rbxcompose.manifest import validate
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.reader import read_source, read_text
-from rbxcompose.manifest.scalars import number_trouble, plain_value
-from rbxcompose.manifest.tree import KEY, Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import (
+    KEY,
+    Entry,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+    number_trouble,
+    plain_value,
+)
 from rbxcompose.manifest.walk import TAG
 
 PYTHON_OBJECT = kind("RBX2292", Severity.WARNING)

@@ -10,7 +10,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Span
 from rbxcompose.base.printable import escaped, plain
 from rbxcompose.base.units import UNITS, format_quantity, to_si
-from rbxcompose.compiler.composition.dump import exact
+from rbxcompose.manifest.shapes import exact
 
 WIDEST = 110  # columns before the comments of a section; a longer line has its own a little further to the right
 _WORD = re.compile(r"[A-Za-z_/][\w./-]*", re.ASCII)

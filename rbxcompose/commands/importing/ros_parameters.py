@@ -10,8 +10,7 @@ from rbxcompose.base.printable import FORBIDDEN
 from rbxcompose.base.units import MOST
 from rbxcompose.commands.importing.foreign_files import FLAGS, OCTAL, ForeignFile, Given
 from rbxcompose.commands.importing.manifest_text import flag, flow_list, key, number, word
-from rbxcompose.manifest.scalars import number_trouble, plain_value
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, number_trouble, plain_value
 
 ParameterData = bool | int | float | str | list[bool | int | float | str]
 _LONGEST = 10_000  # items of a list, as a manifest has them

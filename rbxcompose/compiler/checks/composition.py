@@ -4,8 +4,7 @@ from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from typing import Any
 
-from rbxcompose.base.findings import Finding, Related, Severity, suggest
-from rbxcompose.base.rules import NAMES, WIRING
+from rbxcompose.base.findings import NAMES, WIRING, Finding, Related, Severity, suggest
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_manifest import About, Claim, HistoryStep, IncludedPart

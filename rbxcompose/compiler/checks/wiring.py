@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from rbxcompose.base.findings import Finding, Related, Severity, suggest
-from rbxcompose.base.rules import NAMES, WIRING
+from rbxcompose.base.findings import NAMES, WIRING, Finding, Related, Severity, suggest
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.composition.robot_manifest import IncludedPart
 from rbxcompose.compiler.model.build import MISSION

@@ -1,7 +1,6 @@
 """A composed robot as YAML that reads back as the same robot."""
 
 import json
-import math
 import os
 import re
 from collections.abc import Callable, Iterator
@@ -10,16 +9,24 @@ from pathlib import Path
 
 from rbxcompose.base.config import FILE, Secret
 from rbxcompose.base.printable import FORBIDDEN, escaped
-from rbxcompose.base.units import UNITS, Dimension, Quantity, UnitError, format_quantity, to_si
+from rbxcompose.base.units import Quantity
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
-from rbxcompose.compiler.sections.args import args
+from rbxcompose.compiler.sections.composition import args
 from rbxcompose.manifest.files import PREFIX, library_root, project_of, resolve
 from rbxcompose.manifest.registry import section_named, sections_in_use
-from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.section import ROBOT
-from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.shapes import exact
+from rbxcompose.manifest.tree import (
+    BROKEN,
+    Entry,
+    KeyPath,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+    plain_value,
+)
 from rbxcompose.manifest.validate import to_plain
-from rbxcompose.manifest.written import rounder_unit
 
 Note = Callable[[KeyPath, TreeNode], str]
 
@@ -121,29 +128,3 @@ def _text(text: str, plain: bool) -> str:
     if plain and (not text or (_PLAIN.fullmatch(text) and not FORBIDDEN.search(text))):
         return text
     return escaped(json.dumps(text, ensure_ascii=False))
-
-
-def exact(value: float, dimension: Dimension) -> str:
-    """Return a quantity in its usual or rounder unit, with as many digits as its value needs."""
-    first = rounder_unit(value, dimension)
-    units = [unit for unit in UNITS.values() if unit.dimension == dimension]
-    units.sort(key=lambda unit: (unit.name != first, unit.name))
-    texts = [f"{digits} {unit.name}" for unit in units for digits in _digits(unit.from_si(value))] or [repr(value)]
-    found = next((text for text in texts if _read(text, dimension) == value), None)
-    # Some ratios have no text in percent that is exact to the last bit; a product is.
-    return found or f"${{{value!r} * {format_quantity(1.0, dimension)}}}"
-
-
-def _digits(number: float) -> Iterator[str]:
-    """Yield ways to write a number, the shortest first."""
-    yield f"{number:.6g}"
-    yield f"{number:.15g}"
-    for near in (number, math.nextafter(number, math.inf), math.nextafter(number, -math.inf)):
-        yield repr(near)
-
-
-def _read(text: str, dimension: Dimension) -> float:
-    try:
-        return to_si(text, dimension)
-    except UnitError:
-        return math.inf

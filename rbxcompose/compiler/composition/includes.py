@@ -12,11 +12,8 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Related, Span, kind
 from rbxcompose.compiler.composition.overlay import settled
 from rbxcompose.compiler.composition.robot_manifest import About, Claim, IncludedPart, Inclusion, Inclusions
-from rbxcompose.compiler.sections.args import args
-from rbxcompose.compiler.sections.include import Include, include
-from rbxcompose.compiler.sections.msgs import foresee
-from rbxcompose.compiler.sections.needs import needs
-from rbxcompose.compiler.sections.provides import provides
+from rbxcompose.compiler.sections.bus import foresee
+from rbxcompose.compiler.sections.composition import Include, args, include, needs, provides
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.files import resolve, shown_name

@@ -11,8 +11,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.compiler.composition.includes import PartInstance, Parts
 from rbxcompose.compiler.composition.overlay import NOTHING_TO_CHANGE, SET, compose, is_removal, join, settled
 from rbxcompose.compiler.composition.robot_manifest import ROBOT_LAYER, History, HistoryStep
-from rbxcompose.compiler.sections.include import include
-from rbxcompose.compiler.sections.profiles import profiles
+from rbxcompose.compiler.sections.composition import include, profiles
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.files import PROFILE, find, shown_name
 from rbxcompose.manifest.reader import read_text

@@ -10,8 +10,16 @@ from operator import is_
 from rbxcompose.base.findings import Related, Report, Span, correction, kind, suggest
 from rbxcompose.compiler.composition.robot_manifest import History, HistoryStep
 from rbxcompose.manifest.registry import section_named
-from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import (
+    BROKEN,
+    Entry,
+    KeyPath,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+    plain_value,
+)
 from rbxcompose.manifest.validate import WRONG_TYPE, label_of
 from rbxcompose.manifest.walk import REMOVE
 

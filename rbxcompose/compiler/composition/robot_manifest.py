@@ -9,14 +9,10 @@ from pathlib import Path
 from rbxcompose.base.config import Bound, Place
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Related, Span
-from rbxcompose.compiler.sections.bus import BusModel, bus
-from rbxcompose.compiler.sections.components import ComponentEntry, components
-from rbxcompose.compiler.sections.missions import MissionEntry, missions
-from rbxcompose.compiler.sections.msgs import msgs
-from rbxcompose.compiler.sections.places import places
-from rbxcompose.compiler.sections.process import process
-from rbxcompose.compiler.sections.start import start
-from rbxcompose.compiler.sections.values import ValueModel, values
+from rbxcompose.compiler.sections.bus import BusModel, bus, msgs
+from rbxcompose.compiler.sections.components import ComponentEntry, components, process
+from rbxcompose.compiler.sections.missions import MissionEntry, missions, start
+from rbxcompose.compiler.sections.values import ValueModel, places, values
 from rbxcompose.manifest.arguments import DeclaredArgument, at_its_argument, size_of
 from rbxcompose.manifest.section import Contents
 from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, TreeNode, at

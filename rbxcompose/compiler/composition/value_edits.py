@@ -14,9 +14,8 @@ from rbxcompose.base.units import UNITS, Dimension, example, format_number, need
 from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_manifest import HistoryStep, RobotManifest, argument_of
 from rbxcompose.manifest.files import PARTS, library_root
-from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
-from rbxcompose.manifest.written import is_nearly, rounder_unit
+from rbxcompose.manifest.shapes import is_nearly, rounder_unit
+from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at, plain_value
 
 _SECTION_AND_NAME = 2
 _FLOW_SIGNS = frozenset(",[]{}")

@@ -23,8 +23,7 @@ from rbxcompose.compiler.model.robot import (
     resolve,
 )
 from rbxcompose.compiler.model.skills import names_of_skills, services_of, skills_of, topics_of
-from rbxcompose.compiler.model.triggers import findings_about, triggers_of
-from rbxcompose.compiler.model.values import value_of
+from rbxcompose.compiler.model.values import findings_about, triggers_of, value_of
 from rbxcompose.compiler.sections.missions import missions
 from rbxcompose.manifest.registry import sections_in_use
 from rbxcompose.manifest.section import ROBOT, Contents, WantedComponent

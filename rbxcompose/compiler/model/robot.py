@@ -8,13 +8,11 @@ from typing import Any, TypeVar
 from rbxcompose.base.config import COMPONENT, DEFAULT, PLACE, Bound, Config, Place, Restart
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.types import UNKNOWN, Type
-from rbxcompose.base.findings import Span
+from rbxcompose.base.findings import NAMES, WIRING, Span
 from rbxcompose.base.levels import Level
-from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.doubts import doubts_of
-from rbxcompose.compiler.sections.places import unknown_place
-from rbxcompose.compiler.sections.values import values
+from rbxcompose.compiler.sections.values import unknown_place, values
 from rbxcompose.manifest.fill import OpenNames
 from rbxcompose.manifest.registry import naming_in_use, sections_in_use
 from rbxcompose.manifest.tree import KeyPath, ScalarNode, all_nodes, at, key_span, value_span

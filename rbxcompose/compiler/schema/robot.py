@@ -9,7 +9,7 @@ from rbxcompose.compiler.schema.overlays import SECTION, WHOLE, laid_over, or_re
 from rbxcompose.compiler.schema.scalars import DEFINITIONS, SHARED, Schema, quantities
 from rbxcompose.compiler.schema.settle import opened, schemas_of
 from rbxcompose.compiler.sections.components import components
-from rbxcompose.compiler.sections.profiles import profiles
+from rbxcompose.compiler.sections.composition import profiles
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.registry import file_model
 from rbxcompose.manifest.registry import sections as all_sections

@@ -7,7 +7,7 @@ from pydantic import TypeAdapter
 
 from rbxcompose.base.units import DIMENSIONS, format_quantity
 from rbxcompose.compiler.schema.scalars import DEFINITIONS, DIMENSION, OR_NULL, Schema, or_filled, quantities, quantity
-from rbxcompose.manifest.written import rounder_unit
+from rbxcompose.manifest.shapes import rounder_unit
 
 _SIDE: Literal["validation"] = "validation"
 _NOTHING: tuple[Any, ...] = (None, {}, [], "")

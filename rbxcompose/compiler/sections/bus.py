@@ -1,14 +1,20 @@
-"""The section `bus`: how messages travel."""
+"""Sections about messages: how they travel, and types of them of the robot's own."""
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
 from rbxcompose.base.config import Config
+from rbxcompose.base.findings import Report
 from rbxcompose.bus.endpoints import endpoint
-from rbxcompose.manifest.fields import TopicName
+from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.fields import FileName, TopicName
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import OVERLAY, ROBOT, Reading
+from rbxcompose.manifest.section import OVERLAY, ROBOT, Contents, Reading, Short
+from rbxcompose.manifest.tree import MappingNode
+from rbxcompose.msgs import registry
 
 
 class BusModel(Config):
@@ -51,3 +57,37 @@ def bus(reading: Reading[BusModel]) -> BusModel:
           port: 7447
     """
     return reading.whole() or BusModel()
+
+
+FOLDER = "folder of messages"
+
+
+class MessageFolder(Config):
+    """A folder with types of messages, services and actions."""
+
+    folder: FileName
+    """A ROS package: its name is that of the package, and its files are below `msg/`, `srv/` and `action/`. Or a folder
+    with such packages."""
+
+
+@section("msgs", MessageFolder, order=25, names=FOLDER, entry="folder", short=Short("folder"))
+def msgs(reading: Reading[MessageFolder]) -> Mapping[str, str]:
+    """Folders with message types of the robot's own, by any name; their texts are those of ROS 2.
+
+    Example:
+        msgs:
+          own: msgs                       # a folder beside this file
+    """
+    folders = {name: read.folder for name, read in reading.entries().items()}
+    if not folders:
+        return {}
+    from rbxcompose.compiler.message_texts import texts_in  # few robots have such types
+
+    return texts_in(folders, reading)
+
+
+def foresee(root: MappingNode, file: Path) -> None:
+    """Let names also mean the types of a file that is not composed yet: components that it names may import them."""
+    if msgs.name in root:
+        own = Contents(root, file, Documents(Report(), {})).of(msgs)
+        registry.choose({**registry.chosen().texts, **own})

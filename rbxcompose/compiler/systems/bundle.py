@@ -15,7 +15,7 @@ from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import NeededFile, kind
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.manifest.files import PREFIX, project_of, shown_name
-from rbxcompose.manifest.secrets import FOLDER
+from rbxcompose.manifest.fill import SECRETS_FOLDER
 
 NOT_EXPORTED = kind("RBX6115")
 LARGEST = 512 * 1024 * 1024  # [B] of all files
@@ -111,7 +111,8 @@ def _files(path: Path, root: Path) -> Iterator[tuple[str, Path]]:
     for file in inside or [path]:
         below, real = file.relative_to(path), file.resolve()
         is_hidden = any(part.startswith(".") or part == CACHE for part in below.parts)
-        if real.is_file() and real.is_relative_to(root) and not real.is_relative_to(root / FOLDER) and not is_hidden:
+        is_secret = real.is_relative_to(root / SECRETS_FOLDER)
+        if real.is_file() and real.is_relative_to(root) and not is_secret and not is_hidden:
             yield ("" if file == path else f"/{below.as_posix()}"), real
 
 

@@ -7,14 +7,13 @@ from collections.abc import Collection, Iterator, Mapping
 from itertools import product
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Related, Severity, Span, suggest
+from rbxcompose.base.findings import DID_YOU_MEAN, MISSIONS, NAMES, WIRING, Finding, Related, Severity, Span, suggest
 from rbxcompose.base.geometry import Transform3, Vector3, conjugate, rotate
 from rbxcompose.base.printable import plain
-from rbxcompose.base.rules import MISSIONS, NAMES, WIRING
 from rbxcompose.base.units import LENGTH, format_quantity
 from rbxcompose.compiler.check_runner import check
-from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import Robot, RobotMission
+from rbxcompose.compiler.model.skills import constants
 from rbxcompose.domains.arms.motion.grasps import least_width, reach_of, solid_of, widths_of
 from rbxcompose.domains.arms.motion.scene import PlacedObject, settled
 from rbxcompose.domains.arms.section_models import SpotModel

@@ -6,14 +6,13 @@ import math
 from collections.abc import Iterator, Mapping
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, FindingKind, Related, Severity
+from rbxcompose.base.findings import NAMES, WIRING, Finding, FindingKind, Related, Severity
 from rbxcompose.base.geometry import Vector3, rotate
-from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.base.units import ANGULAR_SPEED, LENGTH, SPEED, TIME, Dimension, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import OTHER_TYPE, Drive, MessageFlow, is_written, period_of, setting_span
-from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent
+from rbxcompose.compiler.model.skills import constants
 from rbxcompose.domains.bases.safety import lead_of, speed_within
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.sections.body import body

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Related, Severity, Span, suggest
-from rbxcompose.base.rules import NAMES, WIRING
+from rbxcompose.base.findings import NAMES, WIRING, Finding, Related, Severity, Span, suggest
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import is_written, setting_span
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent

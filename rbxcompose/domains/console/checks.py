@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from rbxcompose.base.findings import Finding, suggest
-from rbxcompose.base.rules import WIRING
+from rbxcompose.base.findings import WIRING, Finding, suggest
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.sdk.capabilities import ServesPage

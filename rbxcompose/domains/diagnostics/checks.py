@@ -6,8 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 from rbxcompose.base.config import ANALYZER
-from rbxcompose.base.findings import Finding, Related, Severity
-from rbxcompose.base.rules import NAMES
+from rbxcompose.base.findings import NAMES, Finding, Related, Severity
 from rbxcompose.base.units import FREQUENCY, TIME, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.checks.composition import dropped, taken_out

@@ -5,8 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from itertools import groupby
 
-from rbxcompose.base.findings import Finding, Related, Severity, clauses, correction, suggest, surely_meant
-from rbxcompose.base.rules import NAMES, WIRING
+from rbxcompose.base.findings import (
+    NAMES,
+    WIRING,
+    Finding,
+    Related,
+    Severity,
+    clauses,
+    correction,
+    suggest,
+    surely_meant,
+)
 from rbxcompose.base.units import TIME, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.checks.wiring import is_command

@@ -6,9 +6,8 @@ import math
 from collections.abc import Iterator
 
 from rbxcompose.base.config import Place
-from rbxcompose.base.findings import Finding, Severity, Span
+from rbxcompose.base.findings import NAMES, WIRING, Finding, Severity, Span
 from rbxcompose.base.geometry import Pose2, wrap_angle
-from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.base.units import FREQUENCY, LENGTH, TIME, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.robot import Robot, RobotComponent

@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 from rbxcompose.base.config import Config, JointName, Time
 from rbxcompose.manifest.fields import FieldPath, TopicName
 from rbxcompose.msgs.fields import NoFieldError, field_type
-from rbxcompose.sdk.messages import MessageName
+from rbxcompose.sdk.ports import MessageName
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 OF_JOINTS = ("position", "velocity", "effort")

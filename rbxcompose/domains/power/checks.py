@@ -6,15 +6,14 @@ from collections.abc import Callable, Iterator
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.tree import Comparison, Junction, Variable
-from rbxcompose.base.findings import Finding, Related, Severity
-from rbxcompose.base.rules import MISSIONS, OWN, WIRING
+from rbxcompose.base.findings import MISSIONS, OWN, WIRING, Finding, Related, Severity
 from rbxcompose.base.units import LENGTH, RATIO, TIME, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.checks.missions import bounds_of, implies
-from rbxcompose.compiler.checks.places import far_places
+from rbxcompose.compiler.checks.values import far_places
 from rbxcompose.compiler.model.flow import OTHER_TYPE, is_written, setting_span
-from rbxcompose.compiler.model.mission_facts import batteries, blamed, constants, is_served, navigator_of, ways_of
 from rbxcompose.compiler.model.robot import Robot, RobotComponent, RobotMission
+from rbxcompose.compiler.model.skills import batteries, blamed, constants, is_served, navigator_of, ways_of
 from rbxcompose.missions.analysis.bounds import truth
 from rbxcompose.missions.analysis.facts import Constants, goal_place, number_in
 from rbxcompose.missions.analysis.travel_times import Ways, distance, too_short

@@ -23,8 +23,18 @@ from rbxcompose.base.config import (
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.capabilities import Capability, CommandsMotion, Drains, Drives, Setting, WritesFrame
-from rbxcompose.sdk.messages import ActionName, MessageName, ServiceName
-from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Serves, ServesAction
+from rbxcompose.sdk.ports import (
+    ActionName,
+    Calls,
+    CallsAction,
+    In,
+    MessageName,
+    Out,
+    Port,
+    Serves,
+    ServesAction,
+    ServiceName,
+)
 
 QosName = Literal["command", "state", "latched", "event", "bulk"]
 _LARGE = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/PointCloud2")

@@ -9,8 +9,7 @@ from typing import Any
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.tree import Expression, ExpressionError, ExpressionNode, Minus, Variable
 from rbxcompose.base.expressions.types import Type
-from rbxcompose.base.findings import Finding, Related, Severity, Span
-from rbxcompose.base.rules import NAMES, WIRING
+from rbxcompose.base.findings import NAMES, WIRING, Finding, Related, Severity, Span
 from rbxcompose.base.units import (
     ANGLE,
     ANGULAR_SPEED,
@@ -25,8 +24,8 @@ from rbxcompose.base.units import (
 )
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import setting_span
-from rbxcompose.compiler.model.mission_facts import constants, is_served
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotMission
+from rbxcompose.compiler.model.skills import constants, is_served
 from rbxcompose.domains.body.model import BodyJoint
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.servos.bus import DYNAMIXEL, FACTORY_DELAY

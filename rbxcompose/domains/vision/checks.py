@@ -8,8 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rbxcompose.base.findings import Finding, Severity, Span
-from rbxcompose.base.rules import WIRING
+from rbxcompose.base.findings import WIRING, Finding, Severity, Span
 from rbxcompose.base.units import LENGTH, TIME, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.robot import Robot, RobotComponent

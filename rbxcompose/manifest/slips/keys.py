@@ -4,14 +4,12 @@ from dataclasses import replace
 
 from rbxcompose.base.findings import DID_YOU_MEAN, replacement
 from rbxcompose.base.printable import plain
-from rbxcompose.base.slips import Repair
 from rbxcompose.manifest.foreign_words import CURES, FOREIGN
 from rbxcompose.manifest.registry import sections
-from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.section import ROBOT, misplaced
 from rbxcompose.manifest.shapes import keys_at
-from rbxcompose.manifest.slip_registry import RefusedValue, value_slip
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
+from rbxcompose.manifest.slips import RefusedValue, Repair, value_slip
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, plain_value
 
 
 @value_slip("extra_forbidden")

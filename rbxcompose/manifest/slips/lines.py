@@ -4,17 +4,17 @@ import re
 from dataclasses import replace
 
 from rbxcompose.base.findings import Edit, Finding, Fix, Related, replacement
-from rbxcompose.base.slips import Repair
-from rbxcompose.manifest import slip_registry
+from rbxcompose.manifest import slips
 from rbxcompose.manifest.documents import KINDS
+from rbxcompose.manifest.slips import Repair
 from rbxcompose.manifest.slips.lists import missing_dash
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 
 KEY, VERSION = "rbx", "1"
 
 
-@slip_registry.value_slip("missing")
-def first_line(place: slip_registry.RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
+@slips.value_slip("missing")
+def first_line(place: slips.RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise it; there is a fix if it is a file of ours, and its first key is known and begins its line."""
     if place.path != (KEY,) or not isinstance(node, MappingNode):
         return None
@@ -36,16 +36,14 @@ _COMMENTS = ("//", "/*", "<!--")
 _MARKS = ("<<<<<<< ", ">>>>>>> ")
 
 
-@slip_registry.text_slip(slip_registry.ANY)
-def foreign_lines(trouble: slip_registry.Trouble) -> Finding | None:
+@slips.text_slip(slips.ANY)
+def foreign_lines(trouble: slips.Trouble) -> Finding | None:
     """Recognise a comment at the error or just above it, and marks of git anywhere in the text."""
     marked = [number for number, line in enumerate(trouble.lines) if line.startswith(_MARKS)]
     if len(marked) > 1:
         message = "git has left a merge here for you to decide"
         help_text = f"keep one of the two versions, and remove the lines with '{'<' * 7}', '{'=' * 7}' and '{'>' * 7}'"
-        return slip_registry.NOT_YAML.at(
-            trouble.span(marked[0], 0, len(trouble.lines[marked[0]])), message, help=help_text
-        )
+        return slips.NOT_YAML.at(trouble.span(marked[0], 0, len(trouble.lines[marked[0]])), message, help=help_text)
     near = (trouble.line, trouble.opening.line - 1, next(trouble.above(trouble.line), 0))
     for number in near:
         line = trouble.lines[number] if number < len(trouble.lines) else ""
@@ -57,7 +55,7 @@ def foreign_lines(trouble: slip_registry.Trouble) -> Finding | None:
             if text.startswith(_COMMENTS[0]):
                 edit = Edit(span, text, f"#{text.removeprefix(_COMMENTS[0])}")
                 fix = Fix((edit,), True, "'//' -> '#'")
-            return slip_registry.NOT_YAML.at(
+            return slips.NOT_YAML.at(
                 span, "this is not how a comment begins in YAML", help="begin it with '#'", fix=fix
             )
     return None
@@ -72,8 +70,8 @@ _PAIRS = re.compile(rf",\s++(?={_KEY}: )")
 _DEEPER = 2
 
 
-@slip_registry.text_slip(slip_registry.COLON)
-def key_in_line(trouble: slip_registry.Trouble) -> Finding | None:
+@slips.text_slip(slips.COLON)
+def key_in_line(trouble: slips.Trouble) -> Finding | None:
     """Recognise two keys on one line.
 
     A text for people may begin with a word and a colon; and if the value contains quotes, its meaning is unclear.
@@ -87,49 +85,47 @@ def key_in_line(trouble: slip_registry.Trouble) -> Finding | None:
     where = "a line of its own" if len(pairs) == 1 else "lines of their own"
     help_text = f"put {what} on {where} below '{outer}:', further right"
     below, start = trouble.next_line(trouble.line), len(found["before"])
-    goes_on = slip_registry.indent(below) > start
+    goes_on = slips.indent(below) > start
     if not goes_on:
         help_text += "; a text needs quotes"
-    column = slip_registry.indent(below) if goes_on else start + _DEEPER
+    column = slips.indent(below) if goes_on else start + _DEEPER
     place = trouble.span(trouble.line, start + len(outer), found.end("inner"))
     text = ":" + "".join(f"\n{' ' * column}{pair}" for pair in pairs)
     edit = Edit(place, found[0][start + len(outer) :], text)
     # Only if more keys follow below it, it cannot be text.
     fix = Fix((edit,), goes_on and bool(_KEY_LINE.match(below)), f"'{outer}: {inner}' on {len(pairs) + 1} lines")
     message = f"two keys are on one line: '{outer}' and '{pairs[0].partition(':')[0]}'"
-    return slip_registry.NOT_YAML.at(place._replace(column=found.start("inner") + 1), message, help=help_text, fix=fix)
+    return slips.NOT_YAML.at(place._replace(column=found.start("inner") + 1), message, help=help_text, fix=fix)
 
 
 _TIGHT = re.compile(r"[a-z][a-z0-9_]*:(?!//)(?=\S)")
 
 
-@slip_registry.text_slip(slip_registry.COLON, slip_registry.NO_COLON, after=(key_in_line, missing_dash))
-def tight_colon(trouble: slip_registry.Trouble) -> Finding | None:
+@slips.text_slip(slips.COLON, slips.NO_COLON, after=(key_in_line, missing_dash))
+def tight_colon(trouble: slips.Trouble) -> Finding | None:
     """Recognise a key that was read as text: in the line above, or where the parser expected a colon."""
-    if trouble.value_column and slip_registry.COLON in trouble.problem:
+    if trouble.value_column and slips.COLON in trouble.problem:
         return None
-    is_above = slip_registry.COLON in trouble.problem
+    is_above = slips.COLON in trouble.problem
     line = trouble.line - 1 if is_above else trouble.opening.line - 1
     text = trouble.lines[line] if line >= 0 else ""
-    column = slip_registry.behind_dashes(text) if is_above else trouble.opening.column - 1
+    column = slips.behind_dashes(text) if is_above else trouble.opening.column - 1
     found = _TIGHT.match(text, column)
     if found is None:
         return None
     span, message = trouble.span(line, column, found.end()), "a space is missing after this colon"
-    return slip_registry.NOT_YAML.at(
-        span, message, help="write 'key: value'", fix=replacement(span, found[0], f"{found[0]} ")
-    )
+    return slips.NOT_YAML.at(span, message, help="write 'key: value'", fix=replacement(span, found[0], f"{found[0]} "))
 
 
 _STEP = re.compile(r"(?P<before> *+(- ++)*)(?P<word>[a-z][a-z0-9_]*)(?P<value> ++[^\s:#][^:#]*)?")
 
 
-@slip_registry.text_slip(slip_registry.COLON, after=(tight_colon,))
-def step_without_colon(trouble: slip_registry.Trouble) -> Finding | None:
+@slips.text_slip(slips.COLON, after=(tight_colon,))
+def step_without_colon(trouble: slips.Trouble) -> Finding | None:
     """Recognise a word, perhaps with a value, directly above a line indented below it."""
     line = trouble.line - 1
     step = _STEP.fullmatch(trouble.lines[line].rstrip(" ")) if line >= 0 and not trouble.value_column else None
-    if not step or slip_registry.indent(trouble.line_text) < len(step["before"]):
+    if not step or slips.indent(trouble.line_text) < len(step["before"]):
         return None
     word, value = step["word"], (step["value"] or "").strip()
     span = trouble.span(line, step.start("word"), step.end("word"))
@@ -137,18 +133,18 @@ def step_without_colon(trouble: slip_registry.Trouble) -> Finding | None:
     message = "a step with settings below it needs a colon"
     help_text = f"write '{word}: {value}'" if value else f"write '{word}:'"
     below = (Related(trouble.here, "this is below it"),)
-    return slip_registry.NOT_YAML.at(span, message, label="put a colon here", help=help_text, related=below, fix=fix)
+    return slips.NOT_YAML.at(span, message, label="put a colon here", help=help_text, related=below, fix=fix)
 
 
 _TOO_FAR_LEFT_KEY_LINE = re.compile(r" *+(- ++)*[a-z][a-z0-9_]*:( |$)")
 _FULL_LINE = re.compile(r" *+[a-z][a-z0-9_]*: ++[^\s#].*")
 
 
-@slip_registry.text_slip(slip_registry.COLON, slip_registry.NO_KEY, slip_registry.NO_DASH, after=(step_without_colon,))
-def too_far_left(trouble: slip_registry.Trouble) -> Finding | None:
+@slips.text_slip(slips.COLON, slips.NO_KEY, slips.NO_DASH, after=(step_without_colon,))
+def too_far_left(trouble: slips.Trouble) -> Finding | None:
     """Recognise it by the line below it: that of the error, or the next one."""
-    if (slip_registry.COLON in trouble.problem and trouble.value_column) or (
-        slip_registry.NO_KEY in trouble.problem and trouble.is_behind_quote
+    if (slips.COLON in trouble.problem and trouble.value_column) or (
+        slips.NO_KEY in trouble.problem and trouble.is_behind_quote
     ):
         return None
     lines = trouble.lines
@@ -157,20 +153,18 @@ def too_far_left(trouble: slip_registry.Trouble) -> Finding | None:
     return next((finding for finding in found if finding), None)
 
 
-def _outlier(trouble: slip_registry.Trouble, line: int) -> Finding | None:
+def _outlier(trouble: slips.Trouble, line: int) -> Finding | None:
     """Return the finding about the line above one that is in the column of the line before that."""
     lines = trouble.lines
     above = next(trouble.above(line), None)
     before = next(trouble.above(above), None) if above is not None else None
     if above is None or before is None or not _FULL_LINE.fullmatch(lines[above]):
         return None
-    start, column = slip_registry.indent(lines[above]), slip_registry.indent(lines[line])
-    if not (start < column == slip_registry.behind_dashes(lines[before]) and _TOO_FAR_LEFT_KEY_LINE.match(lines[line])):
+    start, column = slips.indent(lines[above]), slips.indent(lines[line])
+    if not (start < column == slips.behind_dashes(lines[before]) and _TOO_FAR_LEFT_KEY_LINE.match(lines[line])):
         return None
     key = lines[above].strip().partition(":")[0]
     beside = lines[before].lstrip(" -").partition(":")[0].strip()
     how_far = f"{column - start} {'column' if column - start == 1 else 'columns'}"
     help_text = f"move it {how_far} to the right, into the column of '{beside}'"
-    return slip_registry.NOT_YAML.at(
-        trouble.span(above, start, start + len(key)), f"'{key}' is too far left", help=help_text
-    )
+    return slips.NOT_YAML.at(trouble.span(above, start, start + len(key)), f"'{key}' is too far left", help=help_text)

@@ -5,12 +5,11 @@ from dataclasses import replace
 
 from rbxcompose.base.findings import Edit, Finding, Fix, replacement
 from rbxcompose.base.printable import plain
-from rbxcompose.base.slips import Repair
 from rbxcompose.base.units import UnitError, parse_quantity
-from rbxcompose.manifest import slip_registry
-from rbxcompose.manifest.scalars import plain_value
+from rbxcompose.manifest import slips
 from rbxcompose.manifest.section import entry_of, help_with_names, name_of
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.slips import Repair
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, plain_value
 
 _ITEM = re.compile(r"\s*+([A-Za-z0-9_.$+-]++(?: [A-Za-z0-9_.%/]++)?)\s*+")  # a word, a name, a number with its unit
 
@@ -40,8 +39,8 @@ def bracketed(node: ScalarNode) -> tuple[str, Fix]:
     return f"a list needs brackets: write '{meant}'", replacement(node.span, node.text, meant)
 
 
-@slip_registry.value_slip("dict_type")
-def list_of_named(place: slip_registry.RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
+@slips.value_slip("dict_type")
+def list_of_named(place: slips.RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise a list whose items tell how they are called, by `name` or by the file that they name."""
     if not isinstance(node, SequenceNode) or not node.items or not all(map(name_of, node.items)):
         return None
@@ -49,8 +48,8 @@ def list_of_named(place: slip_registry.RefusedValue, node: TreeNode) -> Repair[T
     return Repair(MappingNode(entries, node.span), (replace(place.finding, help=help_with_names(node)),))
 
 
-@slip_registry.value_slip("dict_type")
-def names_without_entries(place: slip_registry.RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
+@slips.value_slip("dict_type")
+def names_without_entries(place: slips.RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise words; they count only where an entry may be empty."""
     items = node.items if isinstance(node, SequenceNode) else ()
     names = [item for item in items if isinstance(item, ScalarNode) and isinstance(plain_value(item), str)]
@@ -65,8 +64,8 @@ def names_without_entries(place: slip_registry.RefusedValue, node: TreeNode) -> 
 _BARE = re.compile(r"(?P<indent> *+)(?P<word>[a-z][a-z0-9_]*)(?P<value>(?: ++[^\s:#]++){1,2})? *")
 
 
-@slip_registry.text_slip(slip_registry.NO_COLON)
-def missing_dash(trouble: slip_registry.Trouble) -> Finding | None:
+@slips.text_slip(slips.NO_COLON)
+def missing_dash(trouble: slips.Trouble) -> Finding | None:
     """Recognise one to three words in the column of the dashes around them."""
     line = trouble.opening.line - 1
     text = trouble.lines[line]
@@ -76,23 +75,23 @@ def missing_dash(trouble: slip_registry.Trouble) -> Finding | None:
     word, value = found["word"], (found["value"] or "").strip()
     span = trouble.span(line, len(found["indent"]), len(text.rstrip()))
     meant = f"- {word}: {value}" if value else f"- {word}"
-    goes_on = slip_registry.indent(trouble.next_line(line)) > len(found["indent"])
+    goes_on = slips.indent(trouble.next_line(line)) > len(found["indent"])
     fix = None if value or goes_on else replacement(span, word, meant)
-    return slip_registry.NOT_YAML.at(span, "a dash is missing before this step", help=f"write '{meant}'", fix=fix)
+    return slips.NOT_YAML.at(span, "a dash is missing before this step", help=f"write '{meant}'", fix=fix)
 
 
-def _is_in_list(trouble: slip_registry.Trouble, line: int, column: int) -> bool:
+def _is_in_list(trouble: slips.Trouble, line: int, column: int) -> bool:
     """Return whether the nearest line above that is not indented deeper is a list item in this column."""
     above = (trouble.lines[number] for number in trouble.above(line))
-    nearest = next((text for text in above if slip_registry.indent(text) <= column), "")
-    return slip_registry.indent(nearest) == column and nearest.lstrip().startswith("- ")
+    nearest = next((text for text in above if slips.indent(text) <= column), "")
+    return slips.indent(nearest) == column and nearest.lstrip().startswith("- ")
 
 
 _TIGHT = re.compile(r"( *)-([a-z][a-z0-9_]*)(?=: |:? *$)")
 
 
-@slip_registry.text_slip(slip_registry.ANY)
-def tight_dashes(trouble: slip_registry.Trouble) -> Finding | None:
+@slips.text_slip(slips.ANY)
+def tight_dashes(trouble: slips.Trouble) -> Finding | None:
     """Recognise them in the column where the parser failed."""
     near = {line for line in (trouble.line, trouble.opening.line - 1) if line < len(trouble.lines)}
     indents = {len(found[1]) for line in near if (found := _TIGHT.match(trouble.lines[line]))}
@@ -106,25 +105,25 @@ def tight_dashes(trouble: slip_registry.Trouble) -> Finding | None:
     first = edits[0]
     fix = Fix(tuple(edits), True, f"'{first.old}' -> '{first.text}'")
     message = "a space is missing after this dash"
-    return slip_registry.NOT_YAML.at(first.span, message, help=f"write '{first.text}'", fix=fix)
+    return slips.NOT_YAML.at(first.span, message, help=f"write '{first.text}'", fix=fix)
 
 
-def _siblings(trouble: slip_registry.Trouble, column: int) -> list[int]:
+def _siblings(trouble: slips.Trouble, column: int) -> list[int]:
     """Return the lines around the error that begin in a column, up to any line that begins before it."""
     first = last = min(trouble.line, len(trouble.lines) - 1)
     while first > 0 and not _leaves(trouble.lines[first - 1], column):
         first -= 1
     while last + 1 < len(trouble.lines) and not _leaves(trouble.lines[last + 1], column):
         last += 1
-    return [line for line in range(first, last + 1) if slip_registry.indent(trouble.lines[line]) == column]
+    return [line for line in range(first, last + 1) if slips.indent(trouble.lines[line]) == column]
 
 
 def _leaves(line: str, column: int) -> bool:
-    return bool(line.strip()) and slip_registry.indent(line) < column
+    return bool(line.strip()) and slips.indent(line) < column
 
 
-@slip_registry.value_slip("list_type", "tuple_type")
-def range_of_one(place: slip_registry.RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
+@slips.value_slip("list_type", "tuple_type")
+def range_of_one(place: slips.RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise a quantity; it counts only where a list of two is accepted, and one alone is not."""
     if not isinstance(node, ScalarNode):
         return None
@@ -140,8 +139,8 @@ def range_of_one(place: slip_registry.RefusedValue, node: TreeNode) -> Repair[Tr
     return Repair(SequenceNode(items, node.span), (replace(place.finding, help=help_text, fix=None),))
 
 
-@slip_registry.value_slip("list_type", "tuple_type")
-def list_without_brackets(place: slip_registry.RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
+@slips.value_slip("list_type", "tuple_type")
+def list_without_brackets(place: slips.RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise one or several items where a list is required."""
     found = without_brackets(node)
     if not found or not isinstance(node, ScalarNode):

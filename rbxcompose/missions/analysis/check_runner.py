@@ -5,8 +5,7 @@ import pkgutil
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 
-from rbxcompose.base.findings import Finding, FindingKind, Severity
-from rbxcompose.base.rules import Rule, belonging, declared
+from rbxcompose.base.findings import Finding, FindingKind, Rule, Severity, belonging, declared
 from rbxcompose.missions import checks as package
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.program import Program, RobotNames

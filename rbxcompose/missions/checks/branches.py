@@ -6,8 +6,7 @@ from itertools import combinations
 from rbxcompose.base.expressions.check import check
 from rbxcompose.base.expressions.tree import Expression, Flag, Number, Text, Word, walk
 from rbxcompose.base.expressions.types import Type, TypeKind
-from rbxcompose.base.findings import Finding, Related, Severity, Span
-from rbxcompose.base.rules import OWN
+from rbxcompose.base.findings import OWN, Finding, Related, Severity, Span
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined, claims_below
 from rbxcompose.missions.language.asked import Asked, inner_span

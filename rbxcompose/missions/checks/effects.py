@@ -5,8 +5,7 @@ from itertools import pairwise
 
 from rbxcompose.base.expressions.tree import Junction, Not
 from rbxcompose.base.expressions.types import FLAG
-from rbxcompose.base.findings import Finding, Related, Severity, Span
-from rbxcompose.base.rules import OWN
+from rbxcompose.base.findings import OWN, Finding, Related, Severity, Span
 from rbxcompose.base.units import TIME, format_quantity
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.bounds import truth

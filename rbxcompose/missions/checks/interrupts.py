@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from rbxcompose.base.findings import Finding, Related, Severity
-from rbxcompose.base.rules import OWN
+from rbxcompose.base.findings import OWN, Finding, Related, Severity
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.program import END

@@ -7,8 +7,7 @@ from rbxcompose.base.expressions.check import check
 from rbxcompose.base.expressions.tree import Expression, ExpressionNode, FieldAccess, Text, Variable, Word
 from rbxcompose.base.expressions.types import Type, TypeKind
 from rbxcompose.base.expressions.values import Value
-from rbxcompose.base.findings import Finding, Related, Severity, clauses, suggest
-from rbxcompose.base.rules import OWN
+from rbxcompose.base.findings import OWN, Finding, Related, Severity, clauses, suggest
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.effects import replaced

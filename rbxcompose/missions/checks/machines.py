@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Severity, replacement
-from rbxcompose.base.rules import OWN
+from rbxcompose.base.findings import DID_YOU_MEAN, OWN, Finding, Severity, replacement
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined, leading_to, reached, transitions
 from rbxcompose.missions.language.keys import OUTCOMES

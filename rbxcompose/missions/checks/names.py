@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from rbxcompose.base import findings
 from rbxcompose.base.config import MISSION
+from rbxcompose.base.findings import NAMES, WIRING
 from rbxcompose.base.printable import plain
-from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.effects import assignments, called, published

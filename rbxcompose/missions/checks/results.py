@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 
 from rbxcompose.base.expressions.types import UNKNOWN, accepts, map_of
-from rbxcompose.base.findings import Finding, Related, Severity
-from rbxcompose.base.rules import OWN
+from rbxcompose.base.findings import OWN, Finding, Related, Severity
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.effects import written
 from rbxcompose.missions.analysis.examined import Examined

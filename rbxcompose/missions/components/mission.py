@@ -39,7 +39,7 @@ from rbxcompose.sdk import (
     answers,
     component,
 )
-from rbxcompose.sdk.robot_events import MissionOver, MissionWaits
+from rbxcompose.sdk.component import MissionOver, MissionWaits
 
 if TYPE_CHECKING:  # a check needs no engine: it is imported when the component is configured
     from rbxcompose.missions.engine.interventions import Intervention

@@ -19,8 +19,7 @@ from rbxcompose.base.expressions.types import (
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import DID_YOU_MEAN, Finding, FindingKind, surely_meant
 from rbxcompose.base.units import NUMBER, Quantity, UnitError, parse_quantity, to_si
-from rbxcompose.manifest.scalars import describe, plain_value
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode, describe, plain_value
 from rbxcompose.missions import codes
 from rbxcompose.missions.analysis.scope_types import View
 from rbxcompose.missions.language.asked import expression_of, inner_span

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Report
-from rbxcompose.base.slips import repaired
+from rbxcompose.manifest.slips import repaired
 from rbxcompose.manifest.tree import Key, MappingNode, ScalarNode, TreeNode, with_children
 from rbxcompose.missions.language import grammar
 from rbxcompose.missions.language.fields import Declared

@@ -10,8 +10,7 @@ from rbxcompose.base.expressions.tree import Expression, ExpressionError, Number
 from rbxcompose.base.expressions.types import COUNT, FLAG, TEXT, UNKNOWN, Type, quantity_of
 from rbxcompose.base.findings import Finding, Fix, Span, surely_meant
 from rbxcompose.base.units import NUMBER, TIME
-from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, plain_value
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.asked import Asked, expression_of, inner_span
 from rbxcompose.missions.language.grammar import is_reported

@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from rbxcompose.base.expressions.text import Template
+from rbxcompose.base.expressions.text import Template, condition_in_words, in_words, plain_name
 from rbxcompose.base.expressions.tree import Expression, ExpressionError, Number
 from rbxcompose.base.expressions.types import FLAG, TEXT, UNKNOWN, Type
-from rbxcompose.base.expressions.words import condition_in_words, in_words, plain_name
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.language.asked import Assignment, expression_of
 from rbxcompose.missions.program.answers import Deeds

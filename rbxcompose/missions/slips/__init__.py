@@ -5,7 +5,7 @@ Each is a function of a `GrammarPlace` and the node there, under `@slip(PLACES)`
 
 from collections.abc import Callable
 
-from rbxcompose.base.slips import Repair, Slips
+from rbxcompose.manifest.slips import Repair, Slips
 from rbxcompose.manifest.tree import TreeNode
 from rbxcompose.missions.language.grammar import GrammarPlace
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from rbxcompose.base.findings import Edit, Finding, Fix, nearest
-from rbxcompose.base.slips import Repair
+from rbxcompose.manifest.slips import Repair
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, placeholder

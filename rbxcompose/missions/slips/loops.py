@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from rbxcompose.base.findings import Finding
 from rbxcompose.base.printable import plain
-from rbxcompose.base.slips import Repair
+from rbxcompose.manifest.slips import Repair
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.asked import inner_span

@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
 from rbxcompose.base.findings import Edit, Finding, Fix, nearest
-from rbxcompose.base.slips import Repair
+from rbxcompose.manifest.slips import Repair
 from rbxcompose.manifest.tree import Entry, Key, MappingNode, ScalarNode, TreeNode, all_nodes, children, with_children
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, placeholder

@@ -4,10 +4,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from rbxcompose.base.findings import DID_YOU_MEAN, Edit, Finding, Fix, nearest, replacement
-from rbxcompose.base.slips import Repair
 from rbxcompose.base.units import UnitError, parse_quantity
-from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
+from rbxcompose.manifest.slips import Repair
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, plain_value
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, without_word
 from rbxcompose.missions.slips import slip

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 
 from rbxcompose.base.findings import DID_YOU_MEAN, Edit, Finding, Fix, nearest, replacement
-from rbxcompose.base.slips import Repair
+from rbxcompose.manifest.slips import Repair
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, placeholder, without_word

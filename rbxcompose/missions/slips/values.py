@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from rbxcompose.base.findings import Edit, Fix, replacement
-from rbxcompose.base.slips import Repair
+from rbxcompose.manifest.slips import Repair
 from rbxcompose.manifest.slips.lists import bracketed, without_brackets
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from calendar import monthrange, timegm
 from collections.abc import Callable, Iterator, Mapping
-from datetime import date, datetime, time, timedelta
+from datetime import UTC, date, datetime, time, timedelta
 
 from rbxcompose.base.dataclass import dataclass
 
@@ -54,6 +53,8 @@ class Schedule:
     @property
     def comes(self) -> bool:
         """Return whether there is such a day in any year."""
+        from calendar import monthrange  # with locales, which few robots need
+
         longest = max(monthrange(_LEAP_YEAR, month)[1] for month in self.months)
         return self.days is None or self.weekdays is not None or min(self.days) <= longest
 
@@ -98,7 +99,7 @@ class Schedule:
 
 def instant_of(moment: datetime, local: Local) -> float:
     """Return the first instant at which a wall clock shows `moment` or, if it leaves that out, more."""
-    as_utc = timegm(moment.timetuple())
+    as_utc = _seconds(moment)
     shifts = [_shift(as_utc + days * _DAY, local) for days in (-1, 1)]  # clocks are set once within this time at most
     early, late = as_utc - max(shifts), as_utc - min(shifts)
     for instant in (early, late):
@@ -112,7 +113,12 @@ def instant_of(moment: datetime, local: Local) -> float:
 
 def _shift(instant: int, local: Local) -> int:
     """Return by how much a wall clock is ahead of UTC [s]."""
-    return timegm(local(instant).timetuple()) - instant
+    return _seconds(local(instant)) - instant
+
+
+def _seconds(moment: datetime) -> int:
+    """Return the instant at which a clock of UTC shows what a wall clock does, in whole seconds."""
+    return int(moment.replace(microsecond=0, tzinfo=UTC).timestamp())
 
 
 def daily(text: str, weekdays: tuple[str, ...] = ()) -> Schedule:

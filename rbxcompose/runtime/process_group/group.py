@@ -43,9 +43,9 @@ from rbxcompose.runtime.process_group.parameters import Deciders
 from rbxcompose.runtime.processes import give_back_free_memory
 from rbxcompose.runtime.recording.tape import PLAN, Tape
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
+from rbxcompose.sdk.component import MissionOver, MissionWaits
 from rbxcompose.sdk.parameters import RobotRules
 from rbxcompose.sdk.ports import Qos
-from rbxcompose.sdk.robot_events import MissionOver, MissionWaits
 
 if TYPE_CHECKING:
     from rbxcompose.runtime.recording.files import Recorder

@@ -23,10 +23,9 @@ from rbxcompose.runtime.process_group.live_ports import Frames
 from rbxcompose.runtime.process_group.parameters import NOBODY_ELSE, Deciders, Parameters
 from rbxcompose.runtime.process_group.worker import Post, Worker
 from rbxcompose.sdk.capabilities import RunsMissions
-from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.component import Component, RobotEvent
 from rbxcompose.sdk.ports import Looks, Qos
 from rbxcompose.sdk.registry import component_type, declared
-from rbxcompose.sdk.robot_events import RobotEvent
 
 TOPIC = "/rosout"
 _LEVELS = {Level.OK: Log.INFO, Level.WARN: Log.WARN, Level.ERROR: Log.ERROR, Level.STALE: Log.WARN}

@@ -28,10 +28,9 @@ from rbxcompose.runtime.faults import explain
 from rbxcompose.runtime.process_group.live_ports import Frames, bind, subscribe
 from rbxcompose.runtime.process_group.worker import ACTIVATE, CONFIGURE, HandedOver, Worker, handed_over
 from rbxcompose.sdk.bound import Window
-from rbxcompose.sdk.component import BusAddress, Component
+from rbxcompose.sdk.component import BusAddress, Component, MissionOver, RobotEvent, RobotHeld
 from rbxcompose.sdk.ports import In, Port, Qos, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
-from rbxcompose.sdk.robot_events import MissionOver, RobotEvent, RobotHeld
 from rbxcompose.sdk.updater import DiagnosticTask
 
 ROUNDING = 1e-9  # of a period

@@ -15,9 +15,8 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Command, Query
 from rbxcompose.sdk.bound import Window
-from rbxcompose.sdk.component import BusAddress, Context
+from rbxcompose.sdk.component import BusAddress, Context, RobotEvent
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, ServesAction
-from rbxcompose.sdk.robot_events import RobotEvent
 from rbxcompose.sdk.updater import DiagnosticTask
 
 LONG = 1.0  # [s] in one call, after which diagnostics report it

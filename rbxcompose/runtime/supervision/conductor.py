@@ -29,8 +29,8 @@ from rbxcompose.runtime.supervision.shutdown import END_BOUND, Closing, rest_tim
 from rbxcompose.runtime.supervision.silence import LOOK, Silence
 from rbxcompose.runtime.supervision.stop_latch import StopLatch
 from rbxcompose.sdk.capabilities import RunsMissions
+from rbxcompose.sdk.component import ComponentNoted, MissionOver, RobotHeld
 from rbxcompose.sdk.registry import component_type, declared
-from rbxcompose.sdk.robot_events import ComponentNoted, MissionOver, RobotHeld
 
 FINE, MISSION_FAILED, ROBOT_FAILED, INTERRUPTED = 0, 3, 4, 130
 

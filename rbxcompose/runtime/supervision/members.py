@@ -12,9 +12,9 @@ from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.channel import HostReport, Repeated
 from rbxcompose.runtime.faults import RestartPolicy
 from rbxcompose.runtime.processes import KILLED
+from rbxcompose.sdk.component import ComponentNoted
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Qos, Serves, ServesAction
 from rbxcompose.sdk.registry import component_type
-from rbxcompose.sdk.robot_events import ComponentNoted
 
 
 class ConductorEffects(Protocol):

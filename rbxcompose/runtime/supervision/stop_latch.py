@@ -11,7 +11,7 @@ from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.channel import HostReport, SharedStop, StopMark
 from rbxcompose.runtime.folder import StopState
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member
-from rbxcompose.sdk.robot_events import RobotHeld
+from rbxcompose.sdk.component import RobotHeld
 
 
 class StopLatch:

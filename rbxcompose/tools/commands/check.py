@@ -18,9 +18,9 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
 from rbxcompose.base.findings import Finding, Fix, Report, Sources, nearest
 from rbxcompose.base.fixes import apply, safe_fixes
-from rbxcompose.base.formats import format_names, renderer
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, emit, good, has_colour, misused
+from rbxcompose.commands.formats import format_names, renderer
 from rbxcompose.commands.options import add_unsaved_option, unsaved_of
 from rbxcompose.commands.targets import Targets, add_layer_options, compiled, projects_of, targets
 from rbxcompose.compiler.compile import Compilation

@@ -17,8 +17,8 @@ from rbxcompose.commands import new_files
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.interrupts import INTERRUPTED
 from rbxcompose.compiler.compile import Compilation, compile_robot
-from rbxcompose.compiler.model.mission_facts import navigator_of, top_speed
 from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.compiler.model.skills import navigator_of, top_speed
 from rbxcompose.manifest.files import PREFIX, find, project_of, shown_name
 from rbxcompose.manifest.tree import FILE_BYTES
 from rbxcompose.tools import scaffold

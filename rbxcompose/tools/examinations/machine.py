@@ -10,7 +10,7 @@ from rbxcompose.base.findings import Finding, Severity, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.targets import missing_extras
 from rbxcompose.manifest.files import project_of, shown_name
-from rbxcompose.manifest.secrets import FOLDER
+from rbxcompose.manifest.fill import SECRETS_FOLDER
 from rbxcompose.sdk.capabilities import NeedsExtra
 from rbxcompose.tools.doctor import HostFacts, RunningRobot, examination
 
@@ -97,7 +97,7 @@ def permissions(facts: HostFacts) -> Iterator[str | Finding]:
 
 def _secret_folders(facts: HostFacts) -> list[Path]:
     files = (Path(robot.manifest.root.span.file) for robot in facts.robots)
-    return list(dict.fromkeys(project_of(file) / FOLDER for file in files))
+    return list(dict.fromkeys(project_of(file) / SECRETS_FOLDER for file in files))
 
 
 def _open_to_others(paths: list[Path], mode: str) -> Iterator[Finding]:

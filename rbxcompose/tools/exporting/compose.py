@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from rbxcompose.manifest.secrets import VARIABLE
+from rbxcompose.manifest.fill import VARIABLE
 from rbxcompose.tools.exporting import exported_share
 
 PROJECT = "/robot"  # the folder of the manifests in the image

@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from rbxcompose.compiler.systems.bundle import BundledFile
-from rbxcompose.manifest.secrets import VARIABLE
+from rbxcompose.manifest.fill import VARIABLE
 from rbxcompose.tools.exporting.compose import PROJECT
 from rbxcompose.tools.exporting.exported_share import (
     CERTIFICATES,

@@ -13,9 +13,8 @@ from rbxcompose.commands.importing import ros_parameters
 from rbxcompose.commands.importing.foreign_files import ForeignFile, FreeNames, Given
 from rbxcompose.commands.importing.importer import CLOCK, DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM, importer
 from rbxcompose.commands.importing.manifest_text import Row, header, place, quantity, row, section
-from rbxcompose.compiler.composition.dump import exact
 from rbxcompose.compiler.composition.robot_file import is_own_name
-from rbxcompose.manifest.shapes import alternatives, field_types
+from rbxcompose.manifest.shapes import alternatives, exact, field_types
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.sdk.registry import component_type, usable_names
 

@@ -10,7 +10,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.bus.names import ActionNames, data_key, resolve
 from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, RobotMission
-from rbxcompose.compiler.model.triggers import triggers_of
+from rbxcompose.compiler.model.values import triggers_of
 from rbxcompose.compiler.plan.model import BusPlan
 from rbxcompose.domains.muxes.sections.muxes import muxes
 from rbxcompose.missions.analysis.effects import sent_by

@@ -5,12 +5,11 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Span
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import Quantity
-from rbxcompose.compiler.composition.dump import exact
 from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_manifest import ROBOT_LAYER, RobotManifest
 from rbxcompose.manifest.arguments import show
-from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.shapes import exact
+from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, plain_value
 
 LONGEST = 60  # characters of a text shown beside a value
 

@@ -7,7 +7,7 @@ from rbxcompose.compiler.composition.layers import in_section
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.schema.guide import Guide
-from rbxcompose.compiler.sections.include import include
+from rbxcompose.compiler.sections.composition import include
 from rbxcompose.manifest.registry import naming, robot_keys
 from rbxcompose.manifest.section import SetScope
 from rbxcompose.manifest.tree import KeyPath, MappingNode, SequenceNode, TreeNode, at

@@ -11,7 +11,7 @@ from rbxcompose.base.expressions.types import UNKNOWN
 from rbxcompose.base.findings import Span
 from rbxcompose.base.units import Quantity, format_quantity
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.compiler.sections.args import args
+from rbxcompose.compiler.sections.composition import args
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.files import resolve, shown_name

@@ -17,11 +17,8 @@ from rbxcompose.base.expressions.tree import ExpressionError, Reference
 from rbxcompose.base.expressions.types import TypeKind
 from rbxcompose.base.findings import Report
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.compiler.sections.args import args
-from rbxcompose.compiler.sections.include import PART_ARGUMENT, include
+from rbxcompose.compiler.sections.composition import PART_ARGUMENT, args, include, profiles, provides
 from rbxcompose.compiler.sections.missions import INPUT, missions
-from rbxcompose.compiler.sections.profiles import profiles
-from rbxcompose.compiler.sections.provides import provides
 from rbxcompose.manifest.registry import section_named
 from rbxcompose.manifest.section import Section
 from rbxcompose.manifest.test_file import STEP_KEYS

@@ -6,10 +6,8 @@ from pathlib import Path
 from rbxcompose.base.config import COMPONENT, PORT, PREFIXED, PUBLISHED, RUNNING, SERVICE, VALUE
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.compiler.sections.args import args
-from rbxcompose.compiler.sections.include import PART_ARGUMENT, include
+from rbxcompose.compiler.sections.composition import PART_ARGUMENT, args, include, profiles
 from rbxcompose.compiler.sections.missions import INPUT
-from rbxcompose.compiler.sections.profiles import profiles
 from rbxcompose.manifest.files import resolve
 from rbxcompose.manifest.reader import read_file
 from rbxcompose.manifest.registry import naming, section_named

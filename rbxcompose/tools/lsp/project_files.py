@@ -11,9 +11,8 @@ from functools import cached_property
 from pathlib import Path
 
 from rbxcompose.base.config import COMPONENT, JOINT, LINK, PORT, PREFIXED, RUNNING
-from rbxcompose.compiler.sections.include import include
+from rbxcompose.compiler.sections.composition import include, profiles
 from rbxcompose.compiler.sections.missions import missions
-from rbxcompose.compiler.sections.profiles import profiles
 from rbxcompose.manifest.files import ROBOT_FILE, project_of, resolve
 from rbxcompose.manifest.registry import naming, section_named, sections
 from rbxcompose.manifest.tree import NOWHERE, MappingNode, ScalarNode, TreeNode, at

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rbxcompose.base.findings import Report
-from rbxcompose.base.slips import Repair, Slips, repaired
+from rbxcompose.manifest.slips import Repair, Slips, repaired
 
 Find = Callable[[str, str], Repair[str] | None]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.base.findings import Report
-from rbxcompose.base.slips import Repair
 from rbxcompose.commands.formats.text import render_text
+from rbxcompose.manifest.slips import Repair
 from rbxcompose.manifest.tree import TreeNode
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.language.reader import read_program

@@ -10,8 +10,7 @@ from rbxcompose.base.config import AngularSpeed, Config, Speed
 from rbxcompose.compiler.model.robot import PortEnd, RobotComponent, resolve
 from rbxcompose.compiler.model.values import value_of
 from rbxcompose.compiler.sections.bus import bus
-from rbxcompose.compiler.sections.places import places
-from rbxcompose.compiler.sections.values import values
+from rbxcompose.compiler.sections.values import places, values
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.console.checks import PICTURES
 from rbxcompose.manifest.fields import TopicName

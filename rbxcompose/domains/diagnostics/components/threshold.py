@@ -12,8 +12,7 @@ from rbxcompose.base.levels import Level
 from rbxcompose.domains.diagnostics.limits import LimitCore, Limits
 from rbxcompose.msgs import registry
 from rbxcompose.sdk import Capability, Component, Config, In, Live, MessageName, Port, Setting, Time, Warns, component
-from rbxcompose.sdk.messages import number_field
-from rbxcompose.sdk.ports import BULK
+from rbxcompose.sdk.ports import BULK, number_field
 
 
 class ThresholdConfig(Config):

@@ -21,8 +21,7 @@ from rbxcompose.domains.programs.launch_files.substitutions import (
     UnknownValueError,
     read_launch_text,
 )
-from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import DEPTH, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import DEPTH, MappingNode, ScalarNode, SequenceNode, TreeNode, plain_value
 from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of
 
 NOT_KNOWN = kind("RBX2254")

@@ -22,9 +22,9 @@ from rbxcompose.domains.servos.sections.joints import JointModel, effort_of, hel
 from rbxcompose.domains.servos.sections.safety import safety
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, SetScope, WantedComponent, Wiring
+from rbxcompose.manifest.shapes import as_written
 from rbxcompose.manifest.tree import KeyPath, at
 from rbxcompose.manifest.validate import MISSING_KEY, not_a_choice
-from rbxcompose.manifest.written import as_written
 
 WATCHED = 4  # cycles that may be late before servos stop by themselves
 BusTypeName = Annotated[str, WithJsonSchema({"type": "string", "enum": bus_type_names()})]
