@@ -11,9 +11,11 @@ from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Pose2, Transform3, Velocity2, rotate
 from rbxcompose.base.levels import Level
 from rbxcompose.base.units import LENGTH, TIME
+from rbxcompose.domains.bases.driving import commands_motion
 from rbxcompose.domains.vision.docking import OVER, Docking, DockingSettings, DockingState
 from rbxcompose.domains.vision.tag_watcher import SQUARE, TagWatcher, TagWatcherConfig, WatchedTag
-from rbxcompose.msgs import geometry_msgs as geometry
+from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.msgs.poses import twist_message
 from rbxcompose.msgs.rbxcompose_msgs import DockAt
 
 SILENCE = 1.0  # [s] without anything from the camera, after which it stands
@@ -55,7 +57,7 @@ class TagDocking(TagWatcher[TagDockingConfig]):
 
     rate = 20.0
     steps_for_goals = True
-    cmd_vel = sdk.Out(geometry.Twist, "cmd_vel", qos="command")
+    cmd_vel = sdk.Out(Twist, "cmd_vel", qos="command")
     dock = sdk.ServesAction(
         DockAt, "dock_at", claims="base", outcomes=ENDS, measures={"distance": LENGTH, "patience": TIME}
     )
@@ -63,8 +65,7 @@ class TagDocking(TagWatcher[TagDockingConfig]):
     @classmethod
     def capabilities(cls, config: TagDockingConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it drives."""
-        speed, turn_rate = sdk.Setting(config.speed, "speed"), sdk.Setting(config.turn_rate, "turn_rate")
-        return (sdk.CommandsMotion("cmd_vel", speed, turn_rate),)
+        return (commands_motion(config),)
 
     def configure(self) -> None:
         """Dock at nothing yet."""
@@ -162,5 +163,4 @@ class TagDocking(TagWatcher[TagDockingConfig]):
 
     def drive(self, velocity: Velocity2) -> None:
         """Publish a velocity."""
-        linear, angular = geometry.Vector3(x=velocity.linear), geometry.Vector3(z=velocity.angular)
-        self.cmd_vel(geometry.Twist(linear=linear, angular=angular))
+        self.cmd_vel(twist_message(velocity))

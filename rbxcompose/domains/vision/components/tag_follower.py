@@ -11,9 +11,11 @@ from rbxcompose import sdk
 from rbxcompose.base.geometry import Vector3, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.base.units import LENGTH, TIME
+from rbxcompose.domains.bases.driving import commands_motion
 from rbxcompose.domains.vision.tag_pursuit import Following, FollowingSettings
 from rbxcompose.domains.vision.tag_watcher import TagWatcher, TagWatcherConfig, WatchedTag
-from rbxcompose.msgs import geometry_msgs as geometry
+from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.msgs.poses import twist_message
 from rbxcompose.msgs.rbxcompose_msgs import FollowTag
 
 LOST, NOT_SEEN = "lost", "not_seen"
@@ -66,7 +68,7 @@ class TagFollower(TagWatcher[TagFollowerConfig]):
     """
 
     rate = 20.0
-    cmd_vel = sdk.Out(geometry.Twist, "cmd_vel", qos="command")
+    cmd_vel = sdk.Out(Twist, "cmd_vel", qos="command")
     follow = sdk.ServesAction(
         FollowTag,
         "follow_tag",
@@ -78,8 +80,7 @@ class TagFollower(TagWatcher[TagFollowerConfig]):
     @classmethod
     def capabilities(cls, config: TagFollowerConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it drives."""
-        speed, turn_rate = sdk.Setting(config.speed, "speed"), sdk.Setting(config.turn_rate, "turn_rate")
-        return (sdk.CommandsMotion("cmd_vel", speed, turn_rate),)
+        return (commands_motion(config),)
 
     def configure(self) -> None:
         """Follow nothing yet."""
@@ -201,5 +202,4 @@ class TagFollower(TagWatcher[TagFollowerConfig]):
 
     def send(self, velocity: Velocity2) -> None:
         """Publish a velocity."""
-        linear, angular = geometry.Vector3(x=velocity.linear), geometry.Vector3(z=velocity.angular)
-        self.cmd_vel(geometry.Twist(linear=linear, angular=angular))
+        self.cmd_vel(twist_message(velocity))
