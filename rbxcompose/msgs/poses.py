@@ -1,9 +1,9 @@
-"""Poses and transforms in messages."""
+"""Poses, transforms and velocities in messages."""
 
 from __future__ import annotations
 
-from rbxcompose.base.geometry import Transform3
-from rbxcompose.msgs.geometry_msgs import Point, Pose, Quaternion, Transform, Vector3
+from rbxcompose.base.geometry import Transform3, Velocity2
+from rbxcompose.msgs.geometry_msgs import Point, Pose, Quaternion, Transform, Twist, Vector3
 
 
 def pose_of(message: Pose) -> Transform3:
@@ -26,3 +26,8 @@ def transform_of(message: Transform) -> Transform3:
 def transform_message(pose: Transform3) -> Transform:
     """Return a transform as a message."""
     return Transform(Vector3(*pose.translation), Quaternion(*pose.rotation))
+
+
+def twist_message(velocity: Velocity2) -> Twist:
+    """Return the velocity of a base as a message."""
+    return Twist(linear=Vector3(x=velocity.linear), angular=Vector3(z=velocity.angular))

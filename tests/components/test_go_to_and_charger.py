@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rbxcompose.base.config import Place
 from rbxcompose.base.geometry import Pose2, quaternion_from_yaw
 from rbxcompose.bus.services import ServedRequest
-from rbxcompose.domains.bases.components.go_to import pose_of
+from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.rbxcompose_msgs import Recharge, SetBatteryLevel
@@ -69,9 +69,9 @@ def test_it_drives_to_a_pose_and_turns_to_its_heading() -> None:
     assert first.distance_remaining > last.distance_remaining
     assert (first.current_pose.header.frame_id, last.current_pose.header.frame_id) == ("map", "map")
     assert to_nanoseconds(first.current_pose.header.stamp) < to_nanoseconds(last.current_pose.header.stamp)
-    assert pose_of(first.current_pose).distance(Pose2()) < 0.05
-    assert pose_of(last.current_pose).distance(driver.pose()) < 0.05
-    assert pose_of(last.current_pose).heading == pytest.approx(math.pi / 2, abs=math.radians(6))
+    assert pose_in(first.current_pose.pose).distance(Pose2()) < 0.05
+    assert pose_in(last.current_pose.pose).distance(driver.pose()) < 0.05
+    assert pose_in(last.current_pose.pose).heading == pytest.approx(math.pi / 2, abs=math.radians(6))
     assert to_seconds(first.navigation_time) < 0.1
     took = to_seconds(last.navigation_time)
     assert 0.7 * took < to_seconds(first.estimated_time_remaining) < 1.1 * took

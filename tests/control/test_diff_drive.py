@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rbxcompose.base.geometry import AT_REST, Velocity2
 from rbxcompose.domains.bases.wheels import BaseLimits, TwistLimiter, WheelDrive, WheelGeometry, WheelSpeeds
 
-GEOMETRY = WheelGeometry.of_radius(0.04, 0.26)
+GEOMETRY = WheelGeometry(0.26, 0.04)
 LIMITS = BaseLimits()
 SMOOTH = BaseLimits(jerk=5.0, turn_jerk=20.0)
 SPEEDS, RATES = st.floats(-0.9, 0.9), st.floats(-3.0, 3.0)
@@ -21,7 +21,7 @@ EVEN = [LIMITS, SMOOTH]
 
 @given(VELOCITIES)
 def test_the_velocity_of_the_wheels_of_a_velocity_is_that_velocity(velocity: Velocity2) -> None:
-    for geometry in (GEOMETRY, WheelGeometry.of_ticks(4100, 0.26)):
+    for geometry in (GEOMETRY, WheelGeometry(0.26, 1 / 4100)):
         back = geometry.velocity(geometry.wheels(velocity))
         assert (back.linear, back.angular) == pytest.approx((velocity.linear, velocity.angular), abs=1e-9)
 
@@ -147,9 +147,9 @@ def test_a_command_that_is_scaled_down_is_counted() -> None:
 
 def test_what_cannot_be_is_refused() -> None:
     with pytest.raises(ValueError, match=r"must be positive and finite, not 0\.0"):
-        WheelGeometry.of_radius(0.0, 0.26)
+        WheelGeometry(0.26, 0.0)
     with pytest.raises(ValueError, match="positive and finite"):
-        WheelGeometry.of_ticks(0.0, 0.26)
+        WheelGeometry(0.26, math.inf)
     with pytest.raises(ValueError, match="above 0"):
         BaseLimits(jerk=0.0)
     with pytest.raises(ValueError, match="a step must be positive"):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rbxcompose.base.geometry import Pose2, Velocity2, wrap_angle
 from rbxcompose.domains.bases.wheels import OdometryPolicy, WheelGeometry, WheelOdometry
 
-GEOMETRY = WheelGeometry.of_radius(0.04, 0.26)
+GEOMETRY = WheelGeometry(0.26, 0.04)
 POLICY = OdometryPolicy()
 VELOCITIES = st.builds(Velocity2, st.floats(-1.0, 1.0), st.floats(-3.0, 3.0))
 
@@ -58,7 +58,7 @@ def test_arcs_are_followed_exactly(legs: list[tuple[Velocity2, float]]) -> None:
 
 @pytest.mark.parametrize("speed", [0.4, -0.4])
 def test_counts_of_encoders_that_start_again_at_zero_lose_nothing(speed: float) -> None:
-    odometry = WheelOdometry(WheelGeometry.of_ticks(4100, 0.26, counts=4096), POLICY)
+    odometry = WheelOdometry(WheelGeometry(0.26, 1 / 4100, counts=4096), POLICY)
     true = drive(odometry, [(Velocity2(speed, speed), 0.1)] * 100, offset=2048.0)
     assert odometry.pose.distance(true) < 5e-3  # ticks of 0.24 mm turn the base by 0.5 mrad
     assert abs(wrap_angle(odometry.pose.heading - true.heading)) < 2e-3

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import AT_REST, Pose2, wrap_angle
+from rbxcompose.domains.bases.components.diff_drive_sim import DiffDriveCore, DiffDriveSimConfig
 from rbxcompose.domains.bases.driving import GoToCore, GoToSettings
-from rbxcompose.domains.bases.twins import DiffDriveCore, DiffDriveSettings
 
 SETTINGS = GoToSettings()
 LENGTHS = st.one_of(st.floats(-0.1, 0.1), st.floats(-3, 3))
@@ -31,7 +31,7 @@ class Drive:
 
 
 def drive(start: Pose2, goal: Pose2, *, dt: float = 0.05, limit: float = 60.0) -> Drive:
-    base, core = DiffDriveCore(DiffDriveSettings(), start), GoToCore(SETTINGS)
+    base, core = DiffDriveCore(DiffDriveSimConfig(), start), GoToCore(SETTINGS)
     core.start(goal)
     now, done = 0.0, False
     while not done and now < limit:

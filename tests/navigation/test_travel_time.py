@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Pose2, wrap_angle
+from rbxcompose.domains.bases.components.diff_drive_sim import DiffDriveSimConfig
 from rbxcompose.domains.bases.driving import least_time
-from rbxcompose.domains.bases.twins import DiffDriveSettings
 from tests.navigation.test_go_to import SETTINGS, drive
 
 ANGLES = st.floats(-math.pi, math.pi)
-BASE = DiffDriveSettings()
+BASE = DiffDriveSimConfig()
 
 
 def least(start: Pose2, goal: Pose2) -> float:

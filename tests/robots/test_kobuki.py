@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2, wrap_angle
 from rbxcompose.base.levels import Level
 from rbxcompose.compiler.plan.model import Plan
-from rbxcompose.domains.bases.components.diff_drive_sim import DiffDriveSim
-from rbxcompose.domains.bases.safety import SafetyCore, SafetyPhase, SafetySettings, lead_of, speed_within
-from rbxcompose.domains.bases.twins import DiffDriveCore, DiffDriveSettings
+from rbxcompose.domains.bases.components.diff_drive_sim import DiffDriveCore, DiffDriveSim, DiffDriveSimConfig
+from rbxcompose.domains.bases.components.safety_controller import SafetyControllerConfig
+from rbxcompose.domains.bases.safety import SafetyCore, SafetyPhase, lead_of, speed_within
 from rbxcompose.domains.worlds.ground import WorldHole
 from rbxcompose.domains.worlds.world import SimulatedWorld
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
@@ -160,9 +160,9 @@ def test_a_base_that_check_does_not_warn_of_stops_before_any_edge(
     cliffs, wheels = [(x, y), (x, -y)], [(0.0, 0.115), (0.0, -0.115)]
     speed = min(speed_within(lead_of(cliffs, 0.23), acceleration), 1.0)
     assume(speed > 0.05)
-    base = DiffDriveCore(DiffDriveSettings(max_speed=1.0, acceleration=acceleration), Pose2(begin, 0.0, heading))
+    base = DiffDriveCore(DiffDriveSimConfig(max_speed=1.0, acceleration=acceleration), Pose2(begin, 0.0, heading))
     world = SimulatedWorld(holes=(WorldHole("edge", ((1.5, -9), (9, -9), (9, 9), (1.5, 9))),))
-    safety, late = SafetyCore(SafetySettings(), ["cliff"], []), deque([False])
+    safety, late = SafetyCore(SafetyControllerConfig(evades=["cliff"], holds=[])), deque([False])
     now = 0.0
     while safety.phase is SafetyPhase.WATCH or base.velocity.linear > 0:
         now += 0.02

@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2, wrap_angle
-from rbxcompose.domains.bases.twins import DiffDriveCore, DiffDriveSettings
+from rbxcompose.domains.bases.components.diff_drive_sim import DiffDriveCore, DiffDriveSimConfig
 
-SETTINGS = DiffDriveSettings()
-NEVER_TIMES_OUT = DiffDriveSettings(command_timeout=1e6)
+SETTINGS = DiffDriveSimConfig()
+NEVER_TIMES_OUT = DiffDriveSimConfig(command_timeout=1e6)
 DT = 0.02
 SPEEDS = st.floats(-SETTINGS.max_speed, SETTINGS.max_speed)
 RATES = st.floats(-SETTINGS.max_turn_rate, SETTINGS.max_turn_rate)
@@ -20,7 +20,7 @@ VELOCITIES = st.builds(Velocity2, SPEEDS, RATES)
 DIVISIONS = st.lists(st.floats(0.001, 0.5), min_size=1, max_size=10)
 
 
-def base_at(velocity: Velocity2, settings: DiffDriveSettings = SETTINGS) -> DiffDriveCore:
+def base_at(velocity: Velocity2, settings: DiffDriveSimConfig = SETTINGS) -> DiffDriveCore:
     """Return a base at the origin that drives at `velocity` and has been told to keep it."""
     base = DiffDriveCore(settings)
     base.velocity = velocity

@@ -9,15 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import AT_REST, Velocity2
-from rbxcompose.domains.bases.safety import REACTION, SafetyCore, SafetyPhase, SafetySettings, lead_of, speed_within
+from rbxcompose.domains.bases.components.safety_controller import SafetyControllerConfig
+from rbxcompose.domains.bases.safety import REACTION, SafetyCore, SafetyPhase, lead_of, speed_within
 
 DT = 0.05  # [s]
 SETTINGS = st.builds(
-    SafetySettings,
+    SafetyControllerConfig,
     pause=st.floats(0.0, 0.5),
     back_time=st.floats(0.0, 1.0),
     longest=st.floats(0.1, 3.0),
-    turn=st.floats(0.0, math.pi),
+    turn=st.floats(0.0, math.pi).map("{!r} rad".format),
     settle=st.floats(0.0, 1.0),
 )
 AHEAD = st.floats(-math.pi / 2 + 0.01, math.pi / 2 - 0.01)
@@ -28,8 +29,8 @@ FELT = st.lists(st.lists(AHEAD, max_size=2), min_size=1, max_size=120)
 class Felt:
     """A core that hears all its sensors at each step."""
 
-    def __init__(self, settings: SafetySettings | None = None) -> None:
-        self.core = SafetyCore(settings or SafetySettings(), ["bumper", "cliff"], ["wheel_drop"])
+    def __init__(self, settings: SafetyControllerConfig | None = None) -> None:
+        self.core = SafetyCore(settings or SafetyControllerConfig())
         self.now = 0.0
 
     def step(self, *angles: float, dropped: bool = False, silent: str = "") -> Velocity2 | None:
@@ -52,7 +53,7 @@ class Felt:
 
 @given(SETTINGS, FELT)
 def test_it_never_drives_towards_what_it_feels_and_never_backs_off_for_too_long(
-    settings: SafetySettings, felt: list[list[float]]
+    settings: SafetyControllerConfig, felt: list[list[float]]
 ) -> None:
     robot, backing = Felt(settings), 0.0
     for angles in felt:
@@ -67,7 +68,7 @@ def test_it_never_drives_towards_what_it_feels_and_never_backs_off_for_too_long(
 
 @given(SETTINGS, FELT)
 def test_it_always_lets_others_command_again_when_nothing_is_felt_any_more(
-    settings: SafetySettings, felt: list[list[float]]
+    settings: SafetyControllerConfig, felt: list[list[float]]
 ) -> None:
     robot = Felt(settings)
     for angles in felt:
@@ -78,7 +79,9 @@ def test_it_always_lets_others_command_again_when_nothing_is_felt_any_more(
 
 
 @given(SETTINGS, AHEAD.filter(lambda angle: abs(math.sin(angle)) > 0.11))
-def test_it_stops_first_then_backs_off_then_turns_to_the_other_side(settings: SafetySettings, angle: float) -> None:
+def test_it_stops_first_then_backs_off_then_turns_to_the_other_side(
+    settings: SafetyControllerConfig, angle: float
+) -> None:
     robot = Felt(settings)
     robot.step()
     found = [robot.step(angle), *robot.until_over()]
@@ -92,7 +95,7 @@ def test_it_stops_first_then_backs_off_then_turns_to_the_other_side(settings: Sa
 
 @given(SETTINGS, FELT, st.sampled_from(("bumper", "cliff", "wheel_drop")))
 def test_it_stands_while_a_sensor_is_silent_or_a_wheel_hangs(
-    settings: SafetySettings, felt: list[list[float]], kind: str
+    settings: SafetyControllerConfig, felt: list[list[float]], kind: str
 ) -> None:
     robot = Felt(settings)
     assert robot.core.command(0.0) == AT_REST  # none was heard yet
@@ -107,7 +110,7 @@ def test_it_stands_while_a_sensor_is_silent_or_a_wheel_hangs(
 
 
 def test_what_it_cannot_get_away_from_ends_in_a_stand_until_somebody_helps() -> None:
-    robot = Felt(SafetySettings(longest=1.0))
+    robot = Felt(SafetyControllerConfig(longest=1.0))
     found = [robot.step(0.0) for _ in range(100)]
     assert found[-1] == AT_REST
     assert robot.core.phase is SafetyPhase.STUCK
@@ -116,7 +119,7 @@ def test_what_it_cannot_get_away_from_ends_in_a_stand_until_somebody_helps() -> 
 
 
 def test_a_robot_that_is_touched_from_behind_drives_forwards_and_one_from_both_ends_stands() -> None:
-    robot = Felt(SafetySettings(pause=0.0))
+    robot = Felt(SafetyControllerConfig(pause=0.0))
     assert robot.step(math.pi) == Velocity2(0.1)
     assert robot.step(math.pi, 0.0) == AT_REST
     assert robot.step(0.3) == Velocity2(-0.1)
@@ -149,6 +152,6 @@ def test_a_base_at_the_speed_for_a_way_just_needs_that_way(way: float, accelerat
 
 
 def test_it_backs_off_as_long_as_it_feels_something_even_without_more_time() -> None:
-    robot = Felt(SafetySettings(pause=0.0, back_time=0.0, turn=0.0))
+    robot = Felt(SafetyControllerConfig(pause=0.0, back_time=0.0, turn="0 rad"))
     assert [robot.step(0.0) for _ in range(10)] == [Velocity2(-0.1)] * 10
     assert robot.step() is None

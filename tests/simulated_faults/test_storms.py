@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.compiler.plan.model import Plan
-from rbxcompose.domains.bases.twins import DiffDriveCore
+from rbxcompose.domains.bases.components.diff_drive_sim import DiffDriveCore
 from rbxcompose.runtime.recording.files import RecordingWriter
 from rbxcompose.runtime.recording.reader import RecordingReader
 from rbxcompose.runtime.recording.topics import Recorded

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Velocity2
 from rbxcompose.compiler.systems.cut_link import CYCLES, stops_after_cut
-from rbxcompose.domains.bases.twins import DiffDriveCore, DiffDriveSettings
+from rbxcompose.domains.bases.components.diff_drive_sim import DiffDriveCore, DiffDriveSimConfig
 from tests.systems.test_shares import ROBOT, SHARES, spread
 
 CYCLE = 0.02  # [s]
@@ -38,11 +38,11 @@ def test_the_base_stands_still_within_it_whatever_the_last_command_was(
     linear: float, angular: float, phase: float
 ) -> None:
     (bound,) = stops_after_cut(ROBOT)
-    settings = {name: getattr(BASE, name) for name in DiffDriveSettings.__annotations__}
-    core, now = DiffDriveCore(DiffDriveSettings(**settings)), 0.0
+    assert isinstance(BASE, DiffDriveSimConfig)
+    core, now = DiffDriveCore(BASE), 0.0
     while now < 2.0:
         now += CYCLE
-        core.command(Velocity2(linear * settings["max_speed"], angular * settings["max_turn_rate"]), now - phase)
+        core.command(Velocity2(linear * BASE.max_speed, angular * BASE.max_turn_rate), now - phase)
         core.step(now, CYCLE)
     last = now - phase
     while not core.at_rest:

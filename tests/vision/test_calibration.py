@@ -12,9 +12,16 @@ import pytest
 
 from rbxcompose.base.geometry import Transform3, multiply, quaternion_about
 from rbxcompose.commands.main import main
-from rbxcompose.domains.vision.calibration import CalibrationError, CalibrationViews, Chessboard, TagSheet
-from rbxcompose.domains.vision.camera_file import CameraFile, CameraFileError
-from rbxcompose.domains.vision.tag_sheets import MARGIN, PAPERS, tag_places
+from rbxcompose.domains.vision.calibration import (
+    CalibrationError,
+    CalibrationViews,
+    CameraFileError,
+    Chessboard,
+    TagSheet,
+    calibration_text,
+    read_calibration,
+)
+from rbxcompose.domains.vision.commands.tags import MARGIN, PAPERS, tag_places
 from rbxcompose.domains.worlds.optics import Intrinsics
 from rbxcompose.domains.worlds.physics.solids import rotation_matrix
 from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, tag_picture, with_margin
@@ -148,10 +155,10 @@ def test_the_command_writes_a_file_that_cameras_read(tmp_path: Path, capsys: pyt
     said = capsys.readouterr()
     assert "text.png is left out: it is no picture" in said.err
     assert "corners are off by 0." in said.out
-    read = CameraFile.read(out)
+    read = read_calibration(out)
     assert (read.width, read.height) == (640, 480)
     assert read.fx == pytest.approx(TRUTH.fx, rel=0.005)
-    assert CameraFile.read(out).text == out.read_text()
+    assert calibration_text(read_calibration(out)) == out.read_text()
 
 
 @pytest.mark.parametrize(
@@ -170,7 +177,7 @@ def test_what_cannot_be_measured_is_told(
     assert said in capsys.readouterr().err
 
 
-GOOD = CameraFile(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, -0.2, 0.0, 0.0, 0.0))
+GOOD = Intrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, -0.2, 0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -186,13 +193,13 @@ GOOD = CameraFile(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, -0.2, 0.0, 0.0, 0.
 )
 def test_a_file_that_is_no_calibration_says_why(tmp_path: Path, old: str, new: str, why: str) -> None:
     path = tmp_path / "camera.yaml"
-    path.write_text(GOOD.text)
-    assert CameraFile.read(path) == GOOD
-    path.write_text(GOOD.text.replace(old, new, 1))
+    path.write_text(calibration_text(GOOD))
+    assert read_calibration(path) == GOOD
+    path.write_text(calibration_text(GOOD).replace(old, new, 1))
     with pytest.raises(CameraFileError, match=why):
-        CameraFile.read(path)
+        read_calibration(path)
     with pytest.raises(CameraFileError, match="cannot be read"):
-        CameraFile.read(tmp_path / "nowhere.yaml")
+        read_calibration(tmp_path / "nowhere.yaml")
 
 
 def test_margins_of_pages_are_as_printed() -> None:

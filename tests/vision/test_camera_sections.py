@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.domains.vision.camera_file import CameraFile
+from rbxcompose.domains.vision.calibration import calibration_text
 from rbxcompose.domains.vision.components.usb_camera import UsbCameraConfig
 from rbxcompose.domains.worlds.components.camera_sim import CameraSimConfig
+from rbxcompose.domains.worlds.optics import Intrinsics
 from rbxcompose.msgs.vision_msgs import Detection3DArray
 from rbxcompose.testing import Bench
 from tests.loops import for_all
@@ -27,14 +28,14 @@ name: room
 objects: {crate: {box: [20 cm, 20 cm, 20 cm], at: {x: 1 m}, tags: {back: {number: 7, size: 16 cm}}}}
 """
 RATIONAL = (-0.1, 0.02, 0.0, 0.0, 0.0, 0.05, 0.01, 0.002)
-LENS = CameraFile(320, 240, 300.0, 310.0, 170.0, 110.0, RATIONAL, "rational_polynomial")
-STRONG = CameraFile(320, 240, 200.0, 200.0, 159.5, 119.5, (-0.9, 0.0, 0.0, 0.0, 0.0))
+LENS = Intrinsics(320, 240, 300.0, 310.0, 170.0, 110.0, RATIONAL)
+STRONG = Intrinsics(320, 240, 200.0, 200.0, 159.5, 119.5, (-0.9, 0.0, 0.0, 0.0, 0.0))
 
 
 def project(folder: Path) -> Project:
     (folder / "room.yaml").write_text(WORLD)
-    (folder / "front.yaml").write_text(LENS.text)
-    (folder / "strong.yaml").write_text(STRONG.text)
+    (folder / "front.yaml").write_text(calibration_text(LENS))
+    (folder / "strong.yaml").write_text(calibration_text(STRONG))
     return Project(folder)
 
 
@@ -54,7 +55,7 @@ def test_a_calibrated_camera_has_its_lens_in_the_simulation(tmp_path: Path) -> N
     assert checked.compilation.plan is not None, checked.text
     (config,) = (one.config for one in checked.compilation.plan.instances if one.type == "camera_sim")
     assert isinstance(config, CameraSimConfig)
-    assert config.intrinsics == LENS.intrinsics
+    assert config.intrinsics == LENS
 
 
 def test_without_a_world_it_is_the_real_one_with_the_same_topics(tmp_path: Path) -> None:

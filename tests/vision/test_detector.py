@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.vision.detection import (
+from rbxcompose.domains.vision.components.detector import (
     AnswerForm,
     Letterbox,
     Network,

@@ -12,8 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Pose2, yaw_of
-from rbxcompose.domains.vision.tabletop import NothingFlatError, Tabletop, TabletopSettings, TabletopThing, find_things
-from rbxcompose.domains.vision.thing_names import SteadyLook, ThingNames
+from rbxcompose.domains.vision.tabletop import (
+    NothingFlatError,
+    SteadyLook,
+    Tabletop,
+    TabletopSettings,
+    TabletopThing,
+    ThingNames,
+    find_things,
+)
 from rbxcompose.domains.worlds.optics import Intrinsics
 from rbxcompose.domains.worlds.shapes import WorldBox, WorldShape
 from tests.vision.tables import TABLE, TOP, box, cloud, cylinder, eye

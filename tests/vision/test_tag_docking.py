@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2, wrap_angle
-from rbxcompose.domains.vision.docking import OVER, Docking, DockingSettings, DockingState, DockPlace
+from rbxcompose.domains.vision.components.tag_docking import OVER, Docking, DockingState, DockPlace, TagDockingConfig
 from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav_msgs import Odometry
@@ -37,7 +37,7 @@ class Simulated:
         away, beside = self.random.uniform(0.5, 3.0), self.random.uniform(-1.0, 1.0)
         start = Pose2(away * math.cos(beside), away * math.sin(beside), self.random.uniform(-3, 3))
         self.at = self.odometry = self.tag.compose(start)
-        self.docking, self.velocity, self.time = Docking(DockingSettings(), 0.0), AT_REST, 0.0
+        self.docking, self.velocity, self.time = Docking(TagDockingConfig(), 0.0), AT_REST, 0.0
 
     def look(self) -> None:
         seen = self.at.inverse().compose(self.tag)

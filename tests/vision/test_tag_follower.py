@@ -13,7 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.vision.tag_pursuit import ASIDE, Following, FollowingSettings, wanted
+from rbxcompose.domains.vision.components.tag_follower import (
+    ASIDE,
+    TURN_ACCELERATION,
+    Following,
+    TagFollowerConfig,
+    wanted,
+)
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseWithCovariance, Twist
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.rbxcompose_msgs import FollowTag
@@ -33,14 +39,14 @@ from tests.navigation.test_robot import Room
 from tests.navigation.test_sensors import SELDOM_PHYSICS, skip_without_pictures
 from tests.parts.project import Project
 
-SETTINGS = FollowingSettings()
+SETTINGS = TagFollowerConfig()
 DT = 0.05
 AWAY, BEARINGS = st.floats(0.05, 8), st.floats(-math.pi, math.pi)
 
 
 @given(AWAY, BEARINGS)
 def test_it_drives_towards_its_distance_within_its_limits_and_turns_to_the_tag(distance: float, bearing: float) -> None:
-    velocity = wanted(SETTINGS, distance, bearing)
+    velocity = wanted(SETTINGS, SETTINGS.distance, distance, bearing)
     assert -SETTINGS.back_speed <= velocity.linear <= SETTINGS.speed
     assert abs(velocity.angular) <= SETTINGS.turn_rate
     assert velocity.linear * (distance - SETTINGS.distance) >= 0
@@ -56,9 +62,9 @@ def test_its_accelerations_are_limited_and_without_a_tag_it_comes_to_rest(
     following = Following()
     for distance, bearing in seen:
         last = following.velocity
-        now = following.towards(SETTINGS, distance, bearing, dt)
+        now = following.towards(SETTINGS, SETTINGS.distance, distance, bearing, dt)
         assert abs(now.linear - last.linear) <= SETTINGS.acceleration * dt + 1e-9
-        assert abs(now.angular - last.angular) <= SETTINGS.turn_acceleration * dt + 1e-9
+        assert abs(now.angular - last.angular) <= TURN_ACCELERATION * dt + 1e-9
     last = following.velocity
     for _ in range(math.ceil(2.0 / dt)):
         now = following.without(dt)
@@ -73,7 +79,7 @@ def test_it_comes_to_its_distance_and_faces_the_tag(x: float, y: float) -> None:
     for _ in range(600):
         dx, dy = x - at[0], y - at[1]
         bearing = math.remainder(math.atan2(dy, dx) - at[2], math.tau)
-        velocity = following.towards(SETTINGS, math.hypot(dx, dy), bearing, DT)
+        velocity = following.towards(SETTINGS, SETTINGS.distance, math.hypot(dx, dy), bearing, DT)
         at += DT * np.array((velocity.linear * math.cos(at[2]), velocity.linear * math.sin(at[2]), velocity.angular))
     assert abs(math.hypot(x - at[0], y - at[1]) - SETTINGS.distance) <= SETTINGS.tolerance + 0.03
     assert abs(math.remainder(math.atan2(y - at[1], x - at[0]) - at[2], math.tau)) <= SETTINGS.bearing + 0.03

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rbxcompose.commands.main import main
-from rbxcompose.domains.vision.tag_sheets import DPI, INCH
+from rbxcompose.domains.vision.commands.tags import DPI, INCH
 from rbxcompose.domains.vision.tags import TagFinder
 
 pytest.importorskip("cv2", reason="OpenCV is not installed")

@@ -26,6 +26,12 @@ def drives(config: Any, commands: str, odometry: str, **more: sdk.Setting[float]
     return sdk.Drives(commands, odometry, drops_above=sdk.Setting(ABSURD), **limits, **more)
 
 
+def commands_motion(config: Any, speed: str = "speed", *, protects: bool = False) -> sdk.CommandsMotion:
+    """Return that a component sends velocities at `cmd_vel`, up to a setting and its `turn_rate`."""
+    limits = sdk.Setting(getattr(config, speed), speed), sdk.Setting(config.turn_rate, "turn_rate")
+    return sdk.CommandsMotion("cmd_vel", *limits, protects)
+
+
 @dataclass(frozen=True, slots=True)
 class GoToSettings:
     """How to drive; all above zero."""

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from enum import Enum, auto
+from typing import TYPE_CHECKING
 
-from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import AT_REST, Velocity2
+
+if TYPE_CHECKING:
+    from rbxcompose.domains.bases.components.safety_controller import SafetyControllerConfig
 
 NEVER = -math.inf
 ASIDE = 0.1  # sine above which a switch is at one side of the robot, and not ahead of it
@@ -36,28 +39,6 @@ def speed_within(way: float, acceleration: float) -> float:
     return acceleration * (math.sqrt(REACTION**2 + 2.0 * max(way, 0.0) / acceleration) - REACTION)
 
 
-@dataclass(frozen=True, slots=True)
-class SafetySettings:
-    """How a robot backs off; times in s, none below zero."""
-
-    pause: float = 0.2
-    """It stands so long before it backs off."""
-    back_speed: float = 0.1
-    """[m/s]; with 0 it stands until nothing is felt any more."""
-    back_time: float = 1.0
-    """How long it goes on after nothing is felt any more."""
-    longest: float = 3.0
-    """It backs off so long at most, whatever is felt."""
-    turn: float = math.radians(60)
-    """Then it turns away by so much [rad]; 0 does not turn."""
-    turn_rate: float = math.radians(45)
-    """[rad/s], above zero."""
-    settle: float = 1.0
-    """It stands still so long after all wheels have ground again."""
-    silence: float = 0.5
-    """It stands still if a sensor was not heard for so long."""
-
-
 class SafetyPhase(Enum):
     """What it does about what it feels."""
 
@@ -82,11 +63,11 @@ class SafetyCore:
     `settings` may be replaced at any time. All times are robot time [s].
     """
 
-    def __init__(self, settings: SafetySettings, evades: Collection[str], holds: Collection[str]) -> None:
+    def __init__(self, settings: SafetyControllerConfig) -> None:
         self.settings = settings
-        self.evades, self.holds = tuple(evades), tuple(holds)
+        self.evades, self.holds = tuple(settings.evades), tuple(settings.holds)
         self.phase = SafetyPhase.WATCH
-        self._on: dict[str, Mapping[str, float]] = {kind: {} for kind in (*evades, *holds)}
+        self._on: dict[str, Mapping[str, float]] = {kind: {} for kind in (*self.evades, *self.holds)}
         self._heard = dict.fromkeys(self._on, NEVER)
         self._since = self._until = NEVER  # when the phase began, and when it ends if nothing is felt
         self._held_until = NEVER

@@ -10,10 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
+from rbxcompose.base.geometry import AT_REST, Pose2, Transform3, Velocity2
 from rbxcompose.domains.bases.driving import ABSURD
+from rbxcompose.msgs import geometry_msgs as geometry
+from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.poses import transform_message, twist_message
+from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.msgs.tf2_msgs import TFMessage
 
 ROUNDING = 1e-12  # a smaller difference of velocities counts as none [m/s, rad/s]
+UNKNOWN = 1e6  # variance of what wheels cannot measure: height, roll, pitch
+PLANAR = (0, 1, 5)  # x, y, and the turn about z, of the six that a covariance has
 
 
 class VelocityWindow:
@@ -65,16 +72,6 @@ class WheelGeometry:
         for value in (self.wheel_distance, self.metres_per_unit):
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f"distances and radii must be positive and finite, not {value}")
-
-    @classmethod
-    def of_radius(cls, wheel_radius: float, wheel_distance: float) -> WheelGeometry:
-        """Return that of wheels [m] whose positions are angles [rad]."""
-        return cls(wheel_distance, wheel_radius)
-
-    @classmethod
-    def of_ticks(cls, ticks_per_metre: float, wheel_distance: float, counts: int | None = None) -> WheelGeometry:
-        """Return that of wheels whose positions are counts of their encoders."""
-        return cls(wheel_distance, 1.0 / ticks_per_metre if ticks_per_metre else math.inf, counts)
 
     def wheels(self, velocity: Velocity2) -> WheelSpeeds:
         """Return the speeds of the wheels [units/s] that move the base at `velocity`."""
@@ -370,3 +367,35 @@ class WheelOdometry:
         )
         noise = self.policy.variance_per_metre * np.diag([abs(left), abs(right)])
         self.covariance = by_pose @ self.covariance @ by_pose.T + by_wheels @ noise @ by_wheels.T
+
+
+def odometry_message(known: WheelOdometry, header: Header, child: str) -> Odometry:
+    """Return where a base is in the frame of `header`, and how its frame `child` moves."""
+    place = _place(known)
+    at = place.translation
+    pose = geometry.Pose(position=geometry.Point(at.x, at.y, at.z), orientation=place.rotation)
+    spread = np.zeros((3, 3))
+    spread[np.ix_((0, 2), (0, 2))] = known.velocity_covariance  # a wheel does not slip sideways
+    return Odometry(
+        header=header,
+        child_frame_id=child,
+        pose=geometry.PoseWithCovariance(pose=pose, covariance=planar(known.covariance)),
+        twist=geometry.TwistWithCovariance(twist=twist_message(known.velocity), covariance=planar(spread)),
+    )
+
+
+def odometry_transform(known: WheelOdometry, header: Header, child: str) -> TFMessage:
+    """Return the same place as a transform."""
+    link = geometry.TransformStamped(header=header, child_frame_id=child, transform=_place(known))
+    return TFMessage(transforms=(link,))
+
+
+def _place(known: WheelOdometry) -> geometry.Transform:
+    return transform_message(Transform3.from_pose2(known.pose))
+
+
+def planar(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the 36 numbers of a covariance of x, y and the turn about z; the others are unknown."""
+    whole = np.diag([UNKNOWN] * 6)
+    whole[np.ix_(PLANAR, PLANAR)] = covariance
+    return whole.ravel()

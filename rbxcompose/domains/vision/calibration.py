@@ -1,26 +1,30 @@
-"""How a camera maps directions to pixels, measured by pictures of a flat board.
+"""How a camera maps directions to pixels, measured by pictures of a flat board, and as a file.
 
 As Z. Zhang, A Flexible New Technique for Camera Calibration (2000), by OpenCV; its uncertainties are those of a fit to
-corners that are as far off as those of this one are.
+corners that are as far off as those of this one are. Files are in the form of ROS's camera_calibration.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
-from rbxcompose.domains.vision.camera_file import CameraFile
+from rbxcompose.domains.worlds.optics import Intrinsics
 
 Numbers = NDArray[np.float64]
 GreyPicture = NDArray[np.uint8]
 
-LARGEST = 100_000_000  # [bytes] of a picture
+LARGEST, LARGEST_FILE = 100_000_000, 100_000  # [bytes] of a picture, and of a calibration
+MODELS = {"plumb_bob": (0, 4, 5), "rational_polynomial": (8,)}
+"""Models of distortion, and how many coefficients each may have."""
 LEAST_VIEWS, LEAST_CORNERS = 8, 12
 SAME = 0.03  # of the diagonal of a picture, by which corners have moved at least in a new view
 TILTED = math.radians(12)  # between the normals of two views at least: views from one side do not tell the focal length
@@ -95,7 +99,7 @@ class BoardView:
 class Calibrated:
     """What was measured."""
 
-    camera: CameraFile
+    camera: Intrinsics
     miss: float
     """How far corners are from where they should be, root mean square [px]."""
     known_to: tuple[float, float]
@@ -175,7 +179,7 @@ class CalibrationViews:
         if not all(map(math.isfinite, (fx, fy, cx, cy, miss))) or min(fx, fy) <= 0:
             raise CalibrationError("no camera explains these views: is the size of the board right?")
         off = np.ravel(spread).tolist()
-        camera = CameraFile(*self.size, fx, fy, cx, cy, tuple(np.ravel(bent).tolist()[:5]))
+        camera = Intrinsics(*self.size, fx, fy, cx, cy, tuple(np.ravel(bent).tolist()[:5]))
         known_to = max(off[0], off[1]), max(off[2], off[3])
         return Calibrated(camera, float(miss), known_to, tuple(float(one) for one in np.ravel(misses)))
 
@@ -201,3 +205,66 @@ def picture_files(paths: Sequence[Any]) -> list[tuple[str, GreyPicture | None]]:
             picture = None
         found.append((str(path), None if picture is None else np.asarray(picture, np.uint8)))
     return found
+
+
+class CameraFileError(ValueError):
+    """Raised for a file that is no calibration, with the reason."""
+
+
+def read_calibration(path: Path) -> Intrinsics:
+    """Return what a file says.
+
+    Raises:
+        CameraFileError: if it cannot be read, or is no calibration.
+    """
+    try:
+        read = yaml.safe_load(read_regular(path, LARGEST_FILE).decode("utf-8"))
+    except OSError as error:
+        raise CameraFileError(f"it cannot be read: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+        raise CameraFileError("it is no YAML") from error
+    if not isinstance(read, dict):
+        raise CameraFileError("it is no calibration of a camera: it has no keys")
+    width, height = (_whole(read, key) for key in ("image_width", "image_height"))
+    matrix = _numbers(read, "camera_matrix", (9,))
+    model = read.get("distortion_model", "plumb_bob")
+    if model not in MODELS:
+        raise CameraFileError(f"its 'distortion_model' is not one of {', '.join(MODELS)}")
+    bent = _numbers(read, "distortion_coefficients", MODELS[model]) if "distortion_coefficients" in read else []
+    if min(matrix[0], matrix[4]) <= 0:
+        raise CameraFileError("its 'camera_matrix' has no focal length")
+    return Intrinsics(width, height, matrix[0], matrix[4], matrix[2], matrix[5], tuple(bent))
+
+
+def calibration_text(camera: Intrinsics) -> str:
+    """Return a calibration as a file."""
+    bent, projection = camera.distortion or (0.0,) * 5, np.column_stack((camera.matrix, np.zeros(3)))
+    return (
+        f"image_width: {camera.width}\nimage_height: {camera.height}\ncamera_name: camera\n"
+        f"camera_matrix: {_table(3, 3, camera.matrix)}\n"
+        f"distortion_model: {camera.model}\ndistortion_coefficients: {_table(1, len(bent), bent)}\n"
+        f"rectification_matrix: {_table(3, 3, np.eye(3))}\n"
+        f"projection_matrix: {_table(3, 4, projection)}\n"
+    )
+
+
+def _table(rows: int, columns: int, numbers: Any) -> str:
+    shown = ", ".join(f"{number:.8g}" for number in np.ravel(numbers))
+    return f"{{rows: {rows}, cols: {columns}, data: [{shown}]}}"
+
+
+def _whole(read: dict[str, Any], key: str) -> int:
+    number = read.get(key)
+    if isinstance(number, bool) or not isinstance(number, int) or not 0 < number <= 1 << 16:
+        raise CameraFileError(f"its '{key}' is no number of pixels")
+    return number
+
+
+def _numbers(read: dict[str, Any], key: str, counts: tuple[int, ...]) -> list[float]:
+    table = read.get(key)
+    data = table.get("data") if isinstance(table, dict) else None
+    if not isinstance(data, list) or len(data) not in counts:
+        raise CameraFileError(f"its '{key}' has no 'data' of {' or '.join(map(str, counts))} numbers")
+    if not all(isinstance(one, int | float) and not isinstance(one, bool) and math.isfinite(one) for one in data):
+        raise CameraFileError(f"its '{key}' has 'data' that are no numbers")
+    return [float(one) for one in data]

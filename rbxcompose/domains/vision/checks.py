@@ -161,10 +161,10 @@ def _focal_length(camera: RobotComponent) -> float | None:
     if camera.type_name == SIMULATED:
         return float(config.intrinsics.fx)
     if camera.type_name == REAL and config.calibration:
-        from rbxcompose.domains.vision.camera_file import CameraFile, CameraFileError  # imports numpy
+        from rbxcompose.domains.vision.calibration import CameraFileError, read_calibration  # imports numpy
 
         try:
-            return CameraFile.read(Path(config.calibration)).fx
+            return read_calibration(Path(config.calibration)).fx
         except CameraFileError:
             return None
     return None

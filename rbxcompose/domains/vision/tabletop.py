@@ -1,4 +1,6 @@
-"""What stands on a table, by a cloud of points: the table is a plane, each thing on it a box or an upright cylinder.
+"""What stands on a table, by a cloud of points, and how it is called.
+
+The table is a plane, each thing on it a box or an upright cylinder.
 
 Points are in a level frame, z up, lengths in [m]. A view shows only the near sides of things, so what is hidden is
 taken to be there: each thing goes down to the table, and one of which neither the top nor a second side is seen is as
@@ -8,6 +10,9 @@ deep as it is wide, away from the camera.
 from __future__ import annotations
 
 import math
+from collections import deque
+from collections.abc import Iterable, Sequence
+from itertools import count
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -15,7 +20,7 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3, quaternion_from_yaw
-from rbxcompose.domains.worlds.physics.solids import rotation_matrix
+from rbxcompose.domains.worlds.physics.solids import apply
 
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -32,6 +37,7 @@ PLATE = 0.02  # thickness that is made up for a table [m]
 FAR_OFF = 0.006  # how far a cell counts as off a side at most, so that few of them do not turn a box [m]
 MANY, FINE = 20, 0.004  # cells, and how far these are off a shape [m]: each halves the confidence
 SURE = 5  # cells that show where a side is
+ON = 0.02  # how far off the surface of a thing a tag on it may seem to be [m]
 _TURNS = np.radians(np.arange(0.0, 90.0, 1.0))
 _AROUND = np.radians(np.arange(0.0, 360.0, 5.0))
 _COMPASS = np.stack((np.cos(_AROUND), np.sin(_AROUND)))  # (2, 72)
@@ -45,24 +51,24 @@ class NothingFlatError(ValueError):
 class TabletopSettings:
     """Where a table may be, and what counts as a thing on it; lengths in [m], angles in [rad]."""
 
-    voxel: float = 0.005
-    """Side of the cells, each of which becomes one point."""
     lowest: float = 0.3
     """Height of a table, at least."""
     highest: float = 1.3
     """Height of a table, at most."""
     farthest: float = 1.5
     """How far from the camera something counts, seen from above."""
+    tallest: float = 0.5
+    """How far above the table it ends."""
+    gap: float = 0.02
+    """What is nearer to each other is one thing."""
+    voxel: float = 0.005
+    """Side of the cells, each of which becomes one point."""
     tilt: float = math.radians(8)
     """By how much a table, or the frame, may be off the level."""
     area: float = 0.02
     """What must be seen of a table at least [m^2]."""
     clear: float = 0.008
     """How far above the table a thing begins."""
-    tallest: float = 0.5
-    """How far above the table it ends."""
-    gap: float = 0.02
-    """What is nearer to each other is one thing."""
     least: int = 12
     """Cells of a thing, at least."""
 
@@ -78,8 +84,6 @@ class TabletopThing:
     """Of its middle in the level frame: z is up."""
     confidence: float = 1.0
     """From 0 to 1: few cells, and cells that are off the shape, lower it."""
-    residual: float = 0.0
-    """How far its cells are off the shape, root mean square."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,11 +124,6 @@ class _Footprint(NamedTuple):
     miss: float
 
 
-def levelled(points: Numbers, camera: Transform3) -> Numbers:
-    """Return points (n, 3) of a camera at a pose in a level frame as points of that."""
-    return np.asarray(points @ rotation_matrix(camera.rotation).T + camera.translation)
-
-
 def find_things(
     points: Numbers, camera: Transform3, settings: TabletopSettings | None = None, seed: int = 1
 ) -> Tabletop:
@@ -139,7 +138,7 @@ def find_things(
     settings = settings or TabletopSettings()
     eye = np.array(camera.translation)
     is_known = _is_of_surface(points) if points.ndim == 3 else np.isfinite(points).all(1)
-    points = levelled(points[is_known], camera)
+    points = apply(camera, points[is_known])
     if not len(points):
         raise NothingFlatError("the cloud has no points")
     is_near = np.hypot(*(points[:, :2] - eye[:2]).T) <= settings.farthest
@@ -305,7 +304,7 @@ def fitted(cells: Numbers, plane: TablePlane, eye: Numbers, voxel: float) -> Tab
     x, y = best.middle.tolist()
     pose = Transform3((x, y, low + height / 2), quaternion_from_yaw(best.yaw))
     confidence = len(outline) / (len(outline) + MANY) / (1 + (best.off / FINE) ** 2)
-    return TabletopThing(kind, (*best.sides, height), pose, confidence, best.off)
+    return TabletopThing(kind, (*best.sides, height), pose, confidence)
 
 
 def _circle(points: Numbers) -> _Footprint | None:
@@ -390,4 +389,85 @@ def _table(top: Numbers, plane: TablePlane) -> TabletopThing:
     x, y = x * cos[best] - y * sin[best], x * sin[best] + y * cos[best]
     level = float(plane.heights(np.array([(x, y)]))[0])
     pose = Transform3((float(x), float(y), level - PLATE / 2), quaternion_from_yaw(float(turns[best])))
-    return TabletopThing("box", (float(size[0]), float(size[1]), PLATE), pose, 1.0, plane.off)
+    return TabletopThing("box", (float(size[0]), float(size[1]), PLATE), pose)
+
+
+@dataclass(frozen=True, slots=True)
+class NamedThing:
+    """A thing with its name, when it was seen, and whether that is the name of a tag on it."""
+
+    name: str
+    thing: TabletopThing
+    at: float
+    is_tagged: bool
+
+
+class ThingNames:
+    """Gives things names: those of tags on them, which they keep, else `thing_1`, `thing_2` and so on."""
+
+    def __init__(self, near: float, forget: float) -> None:
+        """Take things up to `near` apart for the same one, if it was seen less than `forget` ago."""
+        self._near, self._forget, self._numbers = near, forget, count(1)
+        self._known: dict[str, NamedThing] = {}
+
+    def take(
+        self, now: float, things: Sequence[TabletopThing], tags: Sequence[tuple[str, Vector3]] = ()
+    ) -> list[NamedThing]:
+        """Return things with their names, in the same order; `tags` are names, and where these are seen."""
+        self._known = {name: one for name, one in self._known.items() if now - one.at <= self._forget}
+        carried = _paired(
+            (away, index, tag)
+            for index, thing in enumerate(things)
+            for tag, at in tags
+            if (away := _off_surface(thing, at)) <= ON
+        )
+        same = _paired(
+            (away, index, name)
+            for index, thing in enumerate(things)
+            if index not in carried
+            for name, one in self._known.items()
+            if name not in carried.values()
+            and (away := math.dist(thing.pose.translation, one.thing.pose.translation)) <= self._near
+        )
+        found = []
+        for index, thing in enumerate(things):
+            name = carried.get(index) or same.get(index) or f"thing_{next(self._numbers)}"
+            is_tagged = index in carried or (index in same and self._known[name].is_tagged)
+            found.append(NamedThing(name, thing, now, is_tagged))
+        self._known |= {one.name: one for one in found}
+        return found
+
+
+class SteadyLook:
+    """Tells whether the same things were seen at the same places in each of the last pictures."""
+
+    def __init__(self, pictures: int, still: float) -> None:
+        """Look at so many pictures, and allow things to be up to `still` elsewhere."""
+        self._still = still
+        self._seen = deque[dict[str, Vector3]](maxlen=pictures)
+
+    def take(self, things: Iterable[NamedThing]) -> bool:
+        """Take what one more picture shows; return whether the last ones agree."""
+        last = {one.name: one.thing.pose.translation for one in things}
+        self._seen.append(last)
+        return len(self._seen) == self._seen.maxlen and all(
+            one.keys() == last.keys() and all(math.dist(one[name], last[name]) <= self._still for name in last)
+            for one in self._seen
+        )
+
+
+def _paired(pairs: Iterable[tuple[float, int, str]]) -> dict[int, str]:
+    """Return numbers with names, the nearest first, each once."""
+    found: dict[int, str] = {}
+    for _, index, name in sorted(pairs):
+        if index not in found and name not in found.values():
+            found[index] = name
+    return found
+
+
+def _off_surface(thing: TabletopThing, point: Vector3) -> float:
+    """Return how far a point is from the surface of the box around a thing."""
+    own = thing.pose.inverse().apply(point)
+    beyond = [abs(at) - side / 2 for at, side in zip(own, thing.size, strict=True)]
+    outside = math.hypot(*(max(0.0, each) for each in beyond))
+    return outside if outside else -max(beyond)

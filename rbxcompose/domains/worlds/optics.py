@@ -76,6 +76,11 @@ class Intrinsics:
         """Return the angle from the left to the right edge [rad], without distortion."""
         return 2 * math.atan(self.width / 2 / self.fx)
 
+    @property
+    def model(self) -> str:
+        """Return the model of its distortion."""
+        return "plumb_bob" if len(self.distortion) <= 5 else "rational_polynomial"
+
     @cached_property
     def matrix(self) -> Numbers:
         """Return them as a matrix (3, 3)."""
@@ -145,7 +150,7 @@ def info_message(header: Header, camera: Intrinsics) -> CameraInfo:
         header,
         camera.height,
         camera.width,
-        "plumb_bob" if len(bent) <= 5 else "rational_polynomial",
+        camera.model,
         np.array(bent if len(bent) > 5 else (*bent, *(0.0,) * 5)[:5]),
         camera.matrix.ravel(),
         np.eye(3).ravel(),

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
-from rbxcompose.base.geometry import Pose2, Transform3, quaternion_from_rpy, yaw_of
-from rbxcompose.msgs import geometry_msgs as geometry
+from rbxcompose.base.geometry import Pose2, Transform3
+from rbxcompose.msgs.geometry_msgs import Pose
+from rbxcompose.msgs.poses import pose_message, pose_of
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.std_msgs import Header
@@ -19,16 +20,14 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.float64]
 
 
-def pose_in(message: geometry.Pose) -> Pose2:
+def pose_in(message: Pose) -> Pose2:
     """Return the planar part of a pose."""
-    at, turn = message.position, message.orientation
-    return Pose2(at.x, at.y, yaw_of((turn.x, turn.y, turn.z, turn.w)))
+    return pose_of(message).to_pose2()
 
 
-def message_of(pose: Pose2) -> geometry.Pose:
+def message_of(pose: Pose2) -> Pose:
     """Return a planar pose as a message."""
-    turn = quaternion_from_rpy(0.0, 0.0, pose.heading)
-    return geometry.Pose(geometry.Point(pose.x, pose.y, 0.0), geometry.Quaternion(*turn))
+    return pose_message(Transform3.from_pose2(pose))
 
 
 def rays_of(scan: LaserScan) -> tuple[Numbers, Numbers]:

@@ -8,12 +8,12 @@ from typing import Any, TypeVar
 from pydantic import Field
 
 from rbxcompose import sdk
-from rbxcompose.base.geometry import Pose2, Transform3, yaw_of
+from rbxcompose.base.geometry import Pose2, Transform3
 from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.domains.worlds.world import SimulatedWorld, world_of
 from rbxcompose.msgs.geometry_msgs import Transform
 from rbxcompose.msgs.nav_msgs import Odometry
-from rbxcompose.msgs.poses import pose_of
+from rbxcompose.msgs.poses import pose_of, transform_of
 from rbxcompose.msgs.rbxcompose_msgs import World, WorldRobots
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.sdk.bound import Sender
@@ -100,5 +100,5 @@ class WorldSensor(sdk.Component[C]):
 
 def placed(transform: Transform) -> tuple[Pose2, float]:
     """Return the planar part of a transform, and its height [m]."""
-    at, turn = transform.translation, transform.rotation
-    return Pose2(at.x, at.y, yaw_of((turn.x, turn.y, turn.z, turn.w))), at.z
+    at = transform_of(transform)
+    return at.to_pose2(), at.translation[2]

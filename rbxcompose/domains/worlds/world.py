@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import Pose2, quaternion_from_rpy, yaw_of
+from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.worlds.contact import TOUCHING, FirstContact, first_contact, overlap, touching
 from rbxcompose.domains.worlds.grid_map import GridMap
 from rbxcompose.domains.worlds.ground import WorldHole, in_polygon
+from rbxcompose.domains.worlds.poses import message_of, pose_in
 from rbxcompose.domains.worlds.ray_casting import Numbers, Rays
 from rbxcompose.domains.worlds.shapes import (
     CircleFootprint,
@@ -29,7 +30,6 @@ from rbxcompose.domains.worlds.shapes import (
     WorldTag,
 )
 from rbxcompose.msgs import rbxcompose_msgs as ours
-from rbxcompose.msgs.geometry_msgs import Point, Pose, Quaternion
 from rbxcompose.msgs.nav_msgs import MapMetaData, OccupancyGrid
 from rbxcompose.msgs.poses import pose_message, pose_of
 from rbxcompose.msgs.std_msgs import Header
@@ -199,9 +199,7 @@ def _at_start(robot: WorldShape) -> tuple[float, ...]:
 def grid_message(grid: GridMap, stamp: Header) -> OccupancyGrid:
     """Return a map as a message."""
     rows, columns = grid.cells.shape
-    at = grid.origin
-    turn = Quaternion(*quaternion_from_rpy(0.0, 0.0, at.heading))
-    about = MapMetaData(stamp.stamp, grid.resolution, columns, rows, Pose(Point(at.x, at.y, 0.0), turn))
+    about = MapMetaData(stamp.stamp, grid.resolution, columns, rows, message_of(grid.origin))
     return OccupancyGrid(stamp, about, grid.cells.ravel())
 
 
@@ -215,8 +213,7 @@ def grid_of(message: OccupancyGrid) -> GridMap:
     if not len(message.data):
         return NO_WALLS
     cells = np.asarray(message.data, np.int8).reshape(about.height, about.width)
-    at, turn = about.origin.position, about.origin.orientation
-    return GridMap(cells, about.resolution, Pose2(at.x, at.y, yaw_of((turn.x, turn.y, turn.z, turn.w))))
+    return GridMap(cells, about.resolution, pose_in(about.origin))
 
 
 def world_message(world: SimulatedWorld, header: Header, time: float = 0.0) -> ours.World:

@@ -12,7 +12,7 @@ import math
 import sys
 from collections.abc import Mapping, Sequence
 
-from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.geometry import AT_REST, Velocity2
 from rbxcompose.base.units import ANGULAR_SPEED, SPEED
 from rbxcompose.bus.graph import GraphName
 from rbxcompose.bus.topics import Publisher
@@ -21,7 +21,8 @@ from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, Guest, visit
 from rbxcompose.commands.lookup import add_bus_options, find_robot, known_state
 from rbxcompose.commands.options import add_timeout_option, positive
 from rbxcompose.commands.terminal import NO_TERMINAL, LiveScreen
-from rbxcompose.msgs.geometry_msgs import Twist, Vector3
+from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.msgs.poses import twist_message
 from rbxcompose.sdk.ports import Qos
 
 GROUP = "drive"
@@ -104,9 +105,9 @@ class _Wheel:
         """Command a halt, then be silent."""
         self._send(self._dead_man.release())
 
-    def _send(self, velocity: Velocity | None) -> None:
+    def _send(self, velocity: Velocity2 | None) -> None:
         if velocity is not None:
-            self._publisher(Twist(linear=Vector3(x=velocity.speed), angular=Vector3(z=velocity.turn)))
+            self._publisher(twist_message(velocity))
 
 
 _KEYS = {
@@ -124,14 +125,6 @@ _KEYS = {
     "\x1bOC": _RIGHT,
     " ": _STILL,
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Velocity:
-    """A command: forward [m/s], and turn [rad/s], positive to the left."""
-
-    speed: float = 0.0
-    turn: float = 0.0
 
 
 def keys(text: str) -> list[str]:
@@ -155,26 +148,26 @@ class DeadMan:
     def __init__(self, speed: float, turn: float) -> None:
         """Set full speed [m/s] and full turn [rad/s]."""
         self._speed, self._turn = speed, turn
-        self._wanted = Velocity()
+        self._wanted = AT_REST
         self._until = 0.0  # [s]
         self._is_moving = False  # the last command was not a halt
 
-    def press(self, key: str, now: float) -> Velocity | None:
+    def press(self, key: str, now: float) -> Velocity2 | None:
         """Handle a key at `now` [s]; return the command to send immediately, or None if it can wait."""
         direction = _KEYS.get(key)
         if direction is None:
             return None
         before = self._wanted if self._is_moving else None
-        self._wanted = Velocity(direction[0] * self._speed, direction[1] * self._turn)
+        self._wanted = Velocity2(direction[0] * self._speed, direction[1] * self._turn)
         self._until = now + HOLD
         if direction == _STILL:
             self._until = now  # nothing more is due
             self._is_moving = False
-            return Velocity()
+            return AT_REST
         self._is_moving = True
         return self._wanted if self._wanted != before else None
 
-    def due(self, now: float) -> Velocity | None:
+    def due(self, now: float) -> Velocity2 | None:
         """Return the command for `now` [s], to be called every `PERIOD`; None for silence."""
         if not self._is_moving:
             return None
@@ -182,10 +175,10 @@ class DeadMan:
             return self._wanted
         return self.release()
 
-    def release(self) -> Velocity | None:
+    def release(self) -> Velocity2 | None:
         """Return the final command before silence; None if already silent."""
         was_moving, self._is_moving = self._is_moving, False
-        return Velocity() if was_moving else None
+        return AT_REST if was_moving else None
 
 
 def command_topic(topics: Sequence[GraphName], wanted: str | None, inputs: Mapping[str, str] | None) -> str:

@@ -8,12 +8,14 @@ from pydantic import Field
 
 from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Velocity2
-from rbxcompose.domains.bases.twins import ChoreCore, ChoreSettings
-from rbxcompose.msgs.geometry_msgs import Twist, Vector3
+from rbxcompose.domains.bases.driving import commands_motion
+from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav2_msgs import Wait
+from rbxcompose.msgs.poses import twist_message
 from rbxcompose.msgs.stamps import to_duration, to_seconds
 
 LONGEST = 24 * 3600.0  # [s]
+NOTHING_LEFT = 1e-9  # [s]; anything less is rounding from many small steps, not work
 
 
 class ChoreSimConfig(sdk.Config):
@@ -25,6 +27,33 @@ class ChoreSimConfig(sdk.Config):
     """How fast it turns meanwhile, always in the same direction."""
     stroke: Annotated[sdk.Time, sdk.Live()] = Field(1.0, gt=0)
     """Duration of a stroke."""
+
+
+class ChoreCore:
+    """Work of a given duration, in strokes; each chore starts its own count."""
+
+    def __init__(self, settings: ChoreSimConfig) -> None:
+        self.settings = settings
+        self.done = 0.0  # [s]
+        self.left = 0.0  # [s]
+
+    def start(self, duration: float) -> None:
+        """Begin a chore of `duration` [s]."""
+        self.done, self.left = 0.0, duration
+
+    @property
+    def is_done(self) -> bool:
+        """Return whether nothing is left to do."""
+        return self.left <= NOTHING_LEFT
+
+    def step(self, dt: float) -> Velocity2:
+        """Work for `dt` [s]; return the velocity of the base meanwhile."""
+        if self.is_done:
+            return AT_REST
+        stroke = int((self.done + NOTHING_LEFT) / self.settings.stroke)
+        self.done, self.left = self.done + dt, self.left - dt
+        speed = self.settings.speed if stroke % 2 == 0 else -self.settings.speed
+        return Velocity2(speed, self.settings.turn_rate)
 
 
 @sdk.component("chore_sim")
@@ -46,21 +75,17 @@ class ChoreSim(sdk.Component[ChoreSimConfig]):
     @classmethod
     def capabilities(cls, config: ChoreSimConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it moves the base."""
-        return (
-            sdk.CommandsMotion(
-                "cmd_vel", sdk.Setting(config.speed, "speed"), sdk.Setting(config.turn_rate, "turn_rate")
-            ),
-        )
+        return (commands_motion(config),)
 
     def configure(self) -> None:
         """Do nothing."""
-        self.core = ChoreCore(settings_of(self.config))
+        self.core = ChoreCore(self.config)
         self.doing: object = None  # the goal that the core works on
         self.moving = False
 
     def reconfigure(self, old: ChoreSimConfig) -> None:
         """Continue the current chore with the new settings."""
-        self.core.settings = settings_of(self.config)
+        self.core.settings = self.config
 
     def accept_chore(self, goal: Wait.Goal) -> str:
         """Refuse a goal while another one is carried out, or one with an invalid time."""
@@ -106,9 +131,4 @@ class ChoreSim(sdk.Component[ChoreSimConfig]):
     def drive(self, velocity: Velocity2) -> None:
         """Publish a velocity."""
         self.moving = velocity != AT_REST
-        self.cmd_vel(Twist(linear=Vector3(x=velocity.linear), angular=Vector3(z=velocity.angular)))
-
-
-def settings_of(config: ChoreSimConfig) -> ChoreSettings:
-    """Return the settings of the core."""
-    return ChoreSettings(config.speed, config.turn_rate, config.stroke)
+        self.cmd_vel(twist_message(velocity))

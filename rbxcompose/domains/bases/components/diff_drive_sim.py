@@ -10,12 +10,11 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Pose2, Transform3, Velocity2
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.bases.driving import drives
-from rbxcompose.domains.bases.twins import DiffDriveCore, DiffDriveSettings
-from rbxcompose.domains.worlds.poses import pose_in
+from rbxcompose.domains.bases.driving import ABSURD, drives
+from rbxcompose.domains.worlds.poses import message_of, pose_in
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import Odometry
-from rbxcompose.msgs.poses import transform_message
+from rbxcompose.msgs.poses import transform_message, twist_message
 from rbxcompose.msgs.rbxcompose_msgs import Switches, World, WorldRobots
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header, String
@@ -44,6 +43,7 @@ WITH_WHEELS: dict[str, sdk.Port[Any]] = {
 }
 ODOM = "odom"
 BASE = "base_footprint"
+ROUNDING = 1e-12  # a smaller difference of velocities counts as none [m/s, rad/s]
 
 
 class DiffDriveSimConfig(sdk.Config):
@@ -69,6 +69,101 @@ class DiffDriveSimConfig(sdk.Config):
     """Whether it stands in the robot's `world` and touches what is there; if the robot has one, that is the default."""
     by_physics: bool = False
     """Whether a physics engine moves it; with `simulator: physics`, that is the default."""
+
+
+class DiffDriveCore:
+    """Moves along exact arcs; while both velocities change, with their means until one has reached its target.
+
+    So heading and distance driven never depend on how time is divided into steps, and neither does the position, except
+    slightly while speed and turn rate change together. `settings` may be replaced while driving.
+    """
+
+    def __init__(self, settings: DiffDriveSimConfig, pose: Pose2 | None = None) -> None:
+        self.settings = settings
+        self.pose = pose or Pose2()
+        self.velocity = AT_REST
+        self.distance = 0.0  # distance driven so far [m]; driving backwards counts, too
+        self.dropped = 0  # commands that were not finite, or absurd
+        self.clamped = 0  # commands that were clamped to a limit
+        self._target = AT_REST
+        self._target_until = -math.inf
+        self._braking = False
+
+    @property
+    def at_rest(self) -> bool:
+        """Return whether the base stands still."""
+        return self.velocity == AT_REST
+
+    def command(self, velocity: Velocity2, now: float) -> None:
+        """Accept the velocity to reach; it holds for `command_timeout`. While braking it is ignored."""
+        speed, turn_rate = self.settings.max_speed, self.settings.max_turn_rate
+        excess = max(abs(velocity.linear) / speed, abs(velocity.angular) / turn_rate)
+        if not velocity.is_finite or excess > ABSURD:
+            self.dropped += 1
+            return
+        if excess > 1.0:
+            self.clamped += 1
+            velocity = Velocity2(_clamp(velocity.linear, speed), _clamp(velocity.angular, turn_rate))
+        if not self._braking:
+            self._target = velocity
+            self._target_until = now + self.settings.command_timeout
+
+    def forget(self) -> None:
+        """Brake until the next command."""
+        self._target_until = -math.inf
+
+    def brake(self) -> None:
+        """Come to rest and stay there, whatever is commanded, until `release`."""
+        self._braking = True
+        self.forget()
+
+    def release(self) -> None:
+        """Follow commands again; the base stays at rest until the next one."""
+        self._braking = False
+
+    def step(self, now: float, dt: float) -> None:
+        """Move through the `dt` [s] that end at `now`; the command holds up to its deadline, not to the step's end."""
+        driven = min(max(self._target_until - (now - dt), 0.0), dt)
+        self._follow(self._target, driven)
+        self._follow(AT_REST, dt - driven)
+
+    def _follow(self, target: Velocity2, duration: float) -> None:
+        if duration <= 0.0 or self.velocity == target == AT_REST:
+            return
+        elapsed = 0.0
+        for until in self._corners(target, duration):
+            dt = until - elapsed
+            before = self.velocity
+            self.velocity = Velocity2(
+                _towards(before.linear, target.linear, self.settings.acceleration * dt),
+                _towards(before.angular, target.angular, self.settings.turn_acceleration * dt),
+            )
+            mean = Velocity2((before.linear + self.velocity.linear) / 2, (before.angular + self.velocity.angular) / 2)
+            self.pose = self.pose.moved(mean, dt)
+            self.distance += abs(mean.linear) * dt
+            elapsed = until
+
+    def _corners(self, target: Velocity2, duration: float) -> list[float]:
+        """Return the moments up to `duration` between which both velocities are linear and keep their signs [s]."""
+        now, limits = self.velocity, self.settings
+        if now == target:
+            return [duration]
+        corners = (
+            abs(now.linear) / limits.acceleration,
+            abs(target.linear - now.linear) / limits.acceleration,
+            abs(target.angular - now.angular) / limits.turn_acceleration,
+        )
+        return sorted({duration, *(corner for corner in corners if 0.0 < corner < duration)})
+
+
+def _clamp(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))
+
+
+def _towards(value: float, target: float, most: float) -> float:
+    """Return `value` moved towards `target` by at most `most`."""
+    change = target - value
+    return target if abs(change) <= most + ROUNDING else value + math.copysign(most, change)
 
 
 @sdk.component("diff_drive_sim")
@@ -110,7 +205,7 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
 
     def configure(self) -> None:
         """Put the base at the origin of `odom`."""
-        self.core = DiffDriveCore(settings_of(self.config))
+        self.core = DiffDriveCore(self.config)
         self.estimate = self.core.pose  # in `odom`, by the wheels
         self.pose, self.place = self.estimate, placed(self.estimate)  # the last one, and as a message
         self.world: SimulatedWorld | None = None
@@ -121,7 +216,7 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
 
     def reconfigure(self, old: DiffDriveSimConfig) -> None:
         """Apply the new limits to later commands; the last command stays as it was clamped."""
-        self.core.settings = settings_of(self.config)
+        self.core.settings = self.config
 
     @property
     def is_at_rest(self) -> bool:
@@ -186,8 +281,7 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
     @property
     def wanted(self) -> geometry.Twist:
         """Return how fast it drives by its commands and limits; where nothing is in its way, so fast it is."""
-        velocity = self.core.velocity
-        return geometry.Twist(linear=geometry.Vector3(x=velocity.linear), angular=geometry.Vector3(z=velocity.angular))
+        return twist_message(self.core.velocity)
 
     def drifted(self, moved: Pose2) -> Pose2:
         """Return where the wheels believe the base to be after a motion in its own frame."""
@@ -199,9 +293,8 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
     def report_truth(self) -> None:
         """Publish where the base is in `map`, for what sees the world from it."""
         if self.bound["truth"].is_wanted:
-            at = placed(self.core.pose)
-            pose = geometry.Pose(geometry.Point(at.translation.x, at.translation.y, 0.0), at.rotation)
-            self.bound["truth"](self.odometry(Header(stamp=to_time(self.stamp), frame_id="map"), pose))
+            header = Header(stamp=to_time(self.stamp), frame_id="map")
+            self.bound["truth"](self.odometry(header, message_of(self.core.pose)))
 
     def stay_outside(self, world: SimulatedWorld, before: Pose2) -> None:
         """Stop where the base touches something, and report what touches it when the contact begins."""
@@ -289,16 +382,4 @@ def in_world(config: DiffDriveSimConfig) -> dict[str, sdk.Port[Any]]:
 
 def placed(pose: Pose2) -> geometry.Transform:
     """Return a pose as a message."""
-    at = Transform3.from_pose2(pose)
-    return transform_message(at)
-
-
-def settings_of(config: DiffDriveSimConfig) -> DiffDriveSettings:
-    """Return the settings of the core."""
-    return DiffDriveSettings(
-        max_speed=config.max_speed,
-        max_turn_rate=config.max_turn_rate,
-        acceleration=config.acceleration,
-        turn_acceleration=config.turn_acceleration,
-        command_timeout=config.command_timeout,
-    )
+    return transform_message(Transform3.from_pose2(pose))

@@ -10,10 +10,12 @@ from typing import Annotated
 from pydantic import Field
 
 from rbxcompose import sdk
-from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2, quaternion_from_yaw, yaw_of
-from rbxcompose.domains.bases.driving import GoToCore, GoToSettings, least_time
-from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion, Twist, Vector3
+from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
+from rbxcompose.domains.bases.driving import GoToCore, GoToSettings, commands_motion, least_time
+from rbxcompose.domains.worlds.poses import message_of, pose_in
+from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
+from rbxcompose.msgs.poses import twist_message
 from rbxcompose.msgs.stamps import LONGEST, to_duration, to_time
 from rbxcompose.msgs.std_msgs import Header
 
@@ -52,9 +54,8 @@ class GoTo(sdk.Component[GoToConfig]):
     @classmethod
     def capabilities(cls, config: GoToConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it drives and how near it comes."""
-        speed, turn_rate = sdk.Setting(config.speed, "speed"), sdk.Setting(config.turn_rate, "turn_rate")
         tolerance = sdk.Setting(config.tolerance, "tolerance")
-        return sdk.CommandsMotion("cmd_vel", speed, turn_rate), sdk.Navigates(
+        return commands_motion(config), sdk.Navigates(
             "go_to", tolerance, least_time=partial(fastest, settings_of(config))
         )
 
@@ -70,7 +71,7 @@ class GoTo(sdk.Component[GoToConfig]):
 
     def accept_go_to(self, goal: NavigateToPose.Goal) -> str:
         """Refuse a goal in another frame, or one that is no valid pose."""
-        frame, at = goal.pose.header.frame_id, pose_of(goal.pose)
+        frame, at = goal.pose.header.frame_id, pose_in(goal.pose.pose)
         if frame not in ("", MAP):
             return f"a goal must be given in '{MAP}', not in '{frame}'"
         if not all(map(math.isfinite, (at.x, at.y, at.heading))):
@@ -99,7 +100,7 @@ class GoTo(sdk.Component[GoToConfig]):
 
     def follow(self, goal: ServedPose, pose: Pose2, dt: float) -> None:
         """Command the base for one cycle and report where it is and what remains."""
-        wanted = pose_of(goal.request.pose)
+        wanted = pose_in(goal.request.pose.pose)
         if goal is not self.driving:
             self.driving, self.began = goal, self.now
             self.core.start(wanted)
@@ -111,9 +112,8 @@ class GoTo(sdk.Component[GoToConfig]):
             self.fail(goal, "the base gets no closer")
         else:
             left = least_time(pose, wanted, self.core.settings)
-            at = Pose(Point(pose.x, pose.y), Quaternion(*quaternion_from_yaw(pose.heading)))
             told = NavigateToPose.Feedback(
-                current_pose=PoseStamped(Header(stamp=to_time(self.stamp), frame_id=MAP), at),
+                current_pose=PoseStamped(Header(stamp=to_time(self.stamp), frame_id=MAP), message_of(pose)),
                 navigation_time=to_duration(self.now - self.began),
                 estimated_time_remaining=to_duration(min(LONGEST, left)),
                 distance_remaining=self.core.distance,
@@ -127,7 +127,7 @@ class GoTo(sdk.Component[GoToConfig]):
 
     def drive(self, velocity: Velocity2) -> None:
         """Publish a velocity."""
-        self.cmd_vel(Twist(linear=Vector3(x=velocity.linear), angular=Vector3(z=velocity.angular)))
+        self.cmd_vel(twist_message(velocity))
 
 
 def fastest(settings: GoToSettings, start: Pose2, goal: Pose2, base: sdk.Drives | None) -> float:
@@ -146,9 +146,3 @@ def settings_of(config: GoToConfig) -> GoToSettings:
         distance_tolerance=config.tolerance,
         heading_tolerance=config.heading_tolerance,
     )
-
-
-def pose_of(message: PoseStamped) -> Pose2:
-    """Return the planar pose of a pose message."""
-    at, turn = message.pose.position, message.pose.orientation
-    return Pose2(at.x, at.y, yaw_of((turn.x, turn.y, turn.z, turn.w)))

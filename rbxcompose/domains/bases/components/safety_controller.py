@@ -10,9 +10,11 @@ from pydantic import Field, model_validator
 from rbxcompose import sdk
 from rbxcompose.base.geometry import Velocity2
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.bases.safety import SafetyCore, SafetyPhase, SafetySettings
+from rbxcompose.domains.bases.driving import commands_motion
+from rbxcompose.domains.bases.safety import SafetyCore, SafetyPhase
 from rbxcompose.manifest.fields import TopicName
-from rbxcompose.msgs.geometry_msgs import Twist, Vector3
+from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.msgs.poses import twist_message
 from rbxcompose.msgs.rbxcompose_msgs import Switches
 from rbxcompose.msgs.std_msgs import Empty
 
@@ -86,13 +88,12 @@ class SafetyController(sdk.Component[SafetyControllerConfig]):
     @classmethod
     def capabilities(cls, config: SafetyControllerConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it moves the base."""
-        speed, rate = sdk.Setting(config.back_speed, "back_speed"), sdk.Setting(config.turn_rate, "turn_rate")
-        return (sdk.CommandsMotion("cmd_vel", speed, rate, protects=True),)
+        return (commands_motion(config, "back_speed", protects=True),)
 
     def configure(self) -> None:
         """Have heard nothing yet."""
         config = self.config
-        self.core = SafetyCore(settings_of(config), config.evades, config.holds)
+        self.core = SafetyCore(config)
         self.topics = {port_of(topic): topic for topic in (*config.evades, *config.holds)}
         self.has_commanded = False
         self.misses_since = math.inf  # when a silence counts as a fault: sensors may begin a little later [s]
@@ -100,7 +101,7 @@ class SafetyController(sdk.Component[SafetyControllerConfig]):
 
     def reconfigure(self, old: SafetyControllerConfig) -> None:
         """Apply the new settings from now on."""
-        self.core.settings = settings_of(self.config)
+        self.core.settings = self.config
         if not self.config.enabled:
             self.core.forget(self.now)
 
@@ -125,7 +126,7 @@ class SafetyController(sdk.Component[SafetyControllerConfig]):
         wanted = self.core.command(self.now) if self.config.enabled else None
         if wanted is not None or self.has_commanded:
             velocity = wanted or Velocity2()
-            self.cmd_vel(Twist(linear=Vector3(x=velocity.linear), angular=Vector3(z=velocity.angular)))
+            self.cmd_vel(twist_message(velocity))
         self.has_commanded = wanted is not None
         self.report()
 
@@ -169,17 +170,3 @@ class SafetyController(sdk.Component[SafetyControllerConfig]):
 def port_of(topic: str) -> str:
     """Return the name of the input of a topic."""
     return topic.strip("/").replace("/", "_")
-
-
-def settings_of(config: SafetyControllerConfig) -> SafetySettings:
-    """Return the settings of the core."""
-    return SafetySettings(
-        config.pause,
-        config.back_speed,
-        config.back_time,
-        config.longest,
-        config.turn,
-        config.turn_rate,
-        config.settle,
-        config.silence,
-    )

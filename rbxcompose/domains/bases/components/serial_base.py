@@ -13,7 +13,6 @@ from rbxcompose.base.geometry import Pose2, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.bases import wheel_board
 from rbxcompose.domains.bases.driving import drives
-from rbxcompose.domains.bases.odometry_messages import odometry_message, odometry_transform
 from rbxcompose.domains.bases.wheels import (
     BaseLimits,
     OdometryPolicy,
@@ -21,6 +20,8 @@ from rbxcompose.domains.bases.wheels import (
     WheelGeometry,
     WheelOdometry,
     WheelSpeeds,
+    odometry_message,
+    odometry_transform,
 )
 from rbxcompose.domains.devices.serial_ports import PortError
 from rbxcompose.domains.devices.serial_sensor import SILENT, SerialConfig, SerialSensor
@@ -98,7 +99,7 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
         super().configure()
         self.patience = 0.0  # commands wait for nothing
         config = self.config
-        self.geometry = WheelGeometry.of_ticks(config.ticks_per_metre, config.wheel_distance, wheel_board.COUNTS)
+        self.geometry = WheelGeometry(config.wheel_distance, 1.0 / config.ticks_per_metre, wheel_board.COUNTS)
         limits = BaseLimits(config.max_speed, config.max_turn_rate, config.acceleration, config.turn_acceleration)
         self.drive = WheelDrive(self.geometry, limits, config.command_timeout, wheel_board.MOST_TICKS)
         self.link = wheel_board.BoardLink(self.faults)

@@ -12,8 +12,15 @@ from rbxcompose import sdk
 from rbxcompose.base.config import AngularJerk, Config, Jerk, JointName, LinkName
 from rbxcompose.base.geometry import Velocity2
 from rbxcompose.domains.bases.driving import drives
-from rbxcompose.domains.bases.odometry_messages import odometry_message, odometry_transform
-from rbxcompose.domains.bases.wheels import BaseLimits, OdometryPolicy, WheelDrive, WheelGeometry, WheelOdometry
+from rbxcompose.domains.bases.wheels import (
+    BaseLimits,
+    OdometryPolicy,
+    WheelDrive,
+    WheelGeometry,
+    WheelOdometry,
+    odometry_message,
+    odometry_transform,
+)
 from rbxcompose.domains.servos.controller import ControlledJoint, Controller, ControllerConfig, controller
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import geometry_msgs as geometry
@@ -146,7 +153,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
         self.wheels: tuple[ControlledJoint, ControlledJoint] = (joints[config.left], joints[config.right])
         tick = self.wheels[0].per_tick
         radius = config.wheel_radius or 1.0 / ((config.ticks_per_metre or math.nan) * tick)
-        rolling = WheelGeometry.of_radius(radius, config.wheel_distance)
+        rolling = WheelGeometry(config.wheel_distance, radius)
         limits = BaseLimits(
             config.max_speed,
             config.max_turn_rate,

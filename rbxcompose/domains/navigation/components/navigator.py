@@ -17,6 +17,7 @@ from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import ANGLE, LENGTH, MOST
+from rbxcompose.domains.bases.driving import commands_motion
 from rbxcompose.domains.navigation.costs import (
     DEAREST,
     INSCRIBED,
@@ -38,6 +39,7 @@ from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav2_msgs import BackUp as Nav2BackUp
 from rbxcompose.msgs.nav2_msgs import NavigateThroughPoses, NavigateToPose, Spin
 from rbxcompose.msgs.nav_msgs import OccupancyGrid, Path
+from rbxcompose.msgs.poses import twist_message
 from rbxcompose.msgs.rbxcompose_msgs import BackUp, RunMission
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import LONGEST, to_duration, to_time
@@ -171,9 +173,8 @@ class Navigator(sdk.Component[NavigatorConfig]):
     @classmethod
     def capabilities(cls, config: NavigatorConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it drives and how near it comes."""
-        speed, turn_rate = sdk.Setting(config.speed, "speed"), sdk.Setting(config.turn_rate, "turn_rate")
         return (
-            sdk.CommandsMotion("cmd_vel", speed, turn_rate),
+            commands_motion(config),
             sdk.Navigates("go_to", sdk.Setting(config.tolerance, "tolerance")),
             sdk.NeedsExtra(sdk.Setting("scipy"), sdk.Setting("navigation")),
         )
@@ -545,9 +546,7 @@ class Navigator(sdk.Component[NavigatorConfig]):
 
     def drive(self, velocity: Velocity2) -> None:
         """Publish a velocity."""
-        self.cmd_vel(
-            geometry.Twist(linear=geometry.Vector3(x=velocity.linear), angular=geometry.Vector3(z=velocity.angular))
-        )
+        self.cmd_vel(twist_message(velocity))
 
     def show(self) -> None:
         """Publish the costs, if anybody looks, at most once a second."""

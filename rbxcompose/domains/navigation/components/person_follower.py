@@ -12,6 +12,7 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
 from rbxcompose.base.units import LENGTH, TIME
+from rbxcompose.domains.bases.driving import commands_motion
 from rbxcompose.domains.navigation.companion import CompanionSettings, CompanionState, PersonCompanion, whom_to_follow
 from rbxcompose.domains.navigation.costs import CostSettings, CostZone, LayeredCosts
 from rbxcompose.domains.navigation.follower import FollowerSettings
@@ -21,9 +22,10 @@ from rbxcompose.domains.worlds.poses import NewestMessage, pose_in, rays_of
 from rbxcompose.domains.worlds.shapes import PolygonFootprint
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_of
 from rbxcompose.manifest.fields import TopicName
-from rbxcompose.msgs.geometry_msgs import Twist, Vector3
+from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav_msgs import OccupancyGrid
 from rbxcompose.msgs.people_msgs import People
+from rbxcompose.msgs.poses import twist_message
 from rbxcompose.msgs.rbxcompose_msgs import FollowPerson
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.sdk.ports import BULK
@@ -106,11 +108,7 @@ class PersonFollower(sdk.Component[PersonFollowerConfig]):
     @classmethod
     def capabilities(cls, config: PersonFollowerConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it drives, and what it imports."""
-        speed, turn_rate = sdk.Setting(config.speed, "speed"), sdk.Setting(config.turn_rate, "turn_rate")
-        return (
-            sdk.CommandsMotion("cmd_vel", speed, turn_rate),
-            sdk.NeedsExtra(sdk.Setting("scipy"), sdk.Setting("navigation")),
-        )
+        return (commands_motion(config), sdk.NeedsExtra(sdk.Setting("scipy"), sdk.Setting("navigation")))
 
     def configure(self) -> None:
         """Follow nobody yet."""
@@ -280,4 +278,4 @@ class PersonFollower(sdk.Component[PersonFollowerConfig]):
 
     def drive(self, velocity: Velocity2) -> None:
         """Publish a velocity."""
-        self.cmd_vel(Twist(linear=Vector3(x=velocity.linear), angular=Vector3(z=velocity.angular)))
+        self.cmd_vel(twist_message(velocity))

@@ -29,10 +29,10 @@ from rbxcompose.domains.vision.calibration import (
     CalibrationViews,
     Chessboard,
     TagSheet,
+    calibration_text,
     picture_files,
 )
-from rbxcompose.domains.vision.commands.tags import numbers, one_of
-from rbxcompose.domains.vision.tag_sheets import PAPERS, tag_places
+from rbxcompose.domains.vision.commands.tags import PAPERS, numbers, one_of, tag_places
 from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, FAMILIES, with_margin
 from rbxcompose.msgs.cdr import CdrError, decode
 from rbxcompose.msgs.images import WrongPictureError, grey
@@ -159,7 +159,7 @@ def _end(views: CalibrationViews, names: list[str], arguments: argparse.Namespac
         raise NotDoneError(NOT_MEASURED.at(None, str(error))) from error
     out = Path(arguments.out)
     try:
-        replace_file(out.resolve(), found.camera.text.encode())
+        replace_file(out.resolve(), calibration_text(found.camera).encode())
     except OSError as error:
         raise NotDoneError(NOT_MEASURED.at(None, f"'{out}' cannot be written: {error.strerror}")) from error
     camera, (focal, axis) = found.camera, found.known_to

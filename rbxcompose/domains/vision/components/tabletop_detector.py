@@ -30,8 +30,7 @@ from rbxcompose.msgs.vision_msgs import (
 from rbxcompose.sdk.ports import BULK
 
 if TYPE_CHECKING:
-    from rbxcompose.domains.vision.tabletop import TabletopThing
-    from rbxcompose.domains.vision.thing_names import NamedThing
+    from rbxcompose.domains.vision.tabletop import NamedThing, TabletopThing
 
 CLOUD, SEEN, TABLE, TAGS, LOOK = "cloud", "seen", "table", "tags", "look"  # ports that depend on the configuration
 RECENT = 1.0  # [s] for which a tag that was seen counts
@@ -141,19 +140,15 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
 
     def configure(self) -> None:
         """See nothing yet."""
-        from rbxcompose.domains.vision import tabletop, thing_names
+        from rbxcompose.domains.vision import tabletop
 
         config = self.config
         self.find_things, self.nothing_flat = tabletop.find_things, tabletop.NothingFlatError
         self.settings = tabletop.TabletopSettings(
-            lowest=config.lowest,
-            highest=config.highest,
-            farthest=config.farthest,
-            tallest=config.tallest,
-            gap=config.gap,
+            config.lowest, config.highest, config.farthest, config.tallest, config.gap
         )
-        self.names = thing_names.ThingNames(config.near, config.forget)
-        self.make_look = thing_names.SteadyLook
+        self.names = tabletop.ThingNames(config.near, config.forget)
+        self.make_look = tabletop.SteadyLook
         self.goal: FindGoal | None = None
         self.began, self.why = 0.0, ""
         self.steady = self.make_look(config.pictures, config.still)

@@ -1,4 +1,8 @@
-"""Driving after a tag."""
+"""Driving after a tag, so that it stays ahead at a distance.
+
+The law and its figures are those of the follower in P. Goebel, ROS By Example, volume 2 (2015), chapter 10, with an
+angle in place of a distance to the side, and with accelerations that a base can do.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +12,22 @@ from typing import Annotated
 from pydantic import Field
 
 from rbxcompose import sdk
-from rbxcompose.base.geometry import Vector3, Velocity2
+from rbxcompose.base.geometry import AT_REST, Vector3, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.base.units import LENGTH, TIME
-from rbxcompose.domains.vision.tag_pursuit import Following, FollowingSettings
+from rbxcompose.domains.bases.driving import commands_motion
 from rbxcompose.domains.vision.tag_watcher import TagWatcher, TagWatcherConfig, WatchedTag
-from rbxcompose.msgs import geometry_msgs as geometry
+from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.msgs.poses import twist_message
 from rbxcompose.msgs.rbxcompose_msgs import FollowTag
 
 LOST, NOT_SEEN = "lost", "not_seen"
 SOON = 0.5  # [s] without the tag, up to which it counts as seen
+ASIDE = math.radians(60)  # beyond this bearing it only turns
+SLOWS, EACH = 1.5, 0.1  # by which speeds are divided in each such time [s] without a target
+RESTS = 0.01  # [m/s, rad/s] below which it stands
+BACK = 1.5  # times as much gain backwards: what comes up is urgent
+TURN_ACCELERATION = 3.0  # [rad/s^2]
 ServedTag = sdk.ServedGoal[FollowTag.Goal, FollowTag.Result, FollowTag.Feedback]
 
 
@@ -54,6 +64,51 @@ class TagFollowerConfig(TagWatcherConfig):
     """Without anything from the camera, after which the robot stops at once."""
 
 
+def wanted(config: TagFollowerConfig, keep: float, distance: float, bearing: float) -> Velocity2:
+    """Return the velocity that keeps a distance [m] to a target at another one and at a bearing [rad, to the left]."""
+    turn = 0.0
+    if abs(bearing) > config.bearing:
+        turn = math.copysign(min(abs(bearing) * config.turn_gain, config.turn_rate), bearing)
+    off = distance - keep
+    if abs(off) <= config.tolerance or abs(bearing) > ASIDE:
+        return Velocity2(0.0, turn)
+    gain, most = (config.gain, config.speed) if off > 0 else (config.gain * BACK, config.back_speed)
+    return Velocity2(math.copysign(min(max(abs(off) * gain, min(config.slowest, most)), most), off), turn)
+
+
+class Following:
+    """What it commands, from cycle to cycle."""
+
+    def __init__(self) -> None:
+        self.velocity = AT_REST
+
+    def towards(self, config: TagFollowerConfig, keep: float, distance: float, bearing: float, dt: float) -> Velocity2:
+        """Return the velocity `dt` [s] after the last one that keeps a distance [m] to a target at another one and at a
+        bearing [rad]."""
+        goal, last = wanted(config, keep, distance, bearing), self.velocity
+        self.velocity = Velocity2(
+            _nearer(last.linear, goal.linear, config.acceleration * dt),
+            _nearer(last.angular, goal.angular, TURN_ACCELERATION * dt),
+        )
+        return self.velocity
+
+    def without(self, dt: float) -> Velocity2:
+        """Return the velocity `dt` [s] after the last one, without a target: slower and slower."""
+        share = SLOWS ** (-dt / EACH)
+        linear, angular = self.velocity.linear * share, self.velocity.angular * share
+        self.velocity = Velocity2(linear, angular) if max(abs(linear), abs(angular)) > RESTS else AT_REST
+        return self.velocity
+
+    def halt(self) -> Velocity2:
+        """Return that it stands, at once."""
+        self.velocity = AT_REST
+        return AT_REST
+
+
+def _nearer(last: float, goal: float, most: float) -> float:
+    return last + min(max(goal - last, -most), most)
+
+
 @sdk.component("tag_follower")
 class TagFollower(TagWatcher[TagFollowerConfig]):
     """Drives so that a tag stays ahead at a distance: the book's figures, with angles for distances to the side.
@@ -66,7 +121,7 @@ class TagFollower(TagWatcher[TagFollowerConfig]):
     """
 
     rate = 20.0
-    cmd_vel = sdk.Out(geometry.Twist, "cmd_vel", qos="command")
+    cmd_vel = sdk.Out(Twist, "cmd_vel", qos="command")
     follow = sdk.ServesAction(
         FollowTag,
         "follow_tag",
@@ -78,8 +133,7 @@ class TagFollower(TagWatcher[TagFollowerConfig]):
     @classmethod
     def capabilities(cls, config: TagFollowerConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it drives."""
-        speed, turn_rate = sdk.Setting(config.speed, "speed"), sdk.Setting(config.turn_rate, "turn_rate")
-        return (sdk.CommandsMotion("cmd_vel", speed, turn_rate),)
+        return (commands_motion(config),)
 
     def configure(self) -> None:
         """Follow nothing yet."""
@@ -131,7 +185,8 @@ class TagFollower(TagWatcher[TagFollowerConfig]):
         elif aim is None or self.now - self.seen > SOON:
             self.send(self.following.without(dt))
         else:
-            self.send(self.following.towards(self.settings, *aim, dt))
+            asked = goal.request.distance if goal is not None else 0.0
+            self.send(self.following.towards(config, asked or config.distance, *aim, dt))
         gone = self.now - max(self.seen, self.began)
         self.status(Level.WARN if problem else Level.OK, problem or ("follows" if gone <= SOON else "has lost the tag"))
         if goal is not None:
@@ -159,24 +214,6 @@ class TagFollower(TagWatcher[TagFollowerConfig]):
         fine = all(0.0 <= number < math.inf for number in (goal.distance, goal.patience, goal.duration))
         return "" if fine else "its distance, patience or duration is not finite, or below 0"
 
-    @property
-    def settings(self) -> FollowingSettings:
-        """Return how it drives now."""
-        config = self.config
-        asked = self.goal.request.distance if self.goal is not None else 0.0
-        return FollowingSettings(
-            asked or config.distance,
-            config.tolerance,
-            config.bearing,
-            config.gain,
-            config.turn_gain,
-            config.slowest,
-            config.speed,
-            config.back_speed,
-            config.turn_rate,
-            config.acceleration,
-        )
-
     def aim(self) -> tuple[float, float] | None:
         """Return the distance [m] and the bearing [rad, to the left] of the tag from where the robot is now."""
         if self.place is None or (base := self.bound["base"].now()) is None:
@@ -201,5 +238,4 @@ class TagFollower(TagWatcher[TagFollowerConfig]):
 
     def send(self, velocity: Velocity2) -> None:
         """Publish a velocity."""
-        linear, angular = geometry.Vector3(x=velocity.linear), geometry.Vector3(z=velocity.angular)
-        self.cmd_vel(geometry.Twist(linear=linear, angular=angular))
+        self.cmd_vel(twist_message(velocity))

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from rbxcompose import sdk
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.vision.camera_file import CameraFile
+from rbxcompose.domains.vision.calibration import read_calibration
 from rbxcompose.domains.worlds.optics import TO_OPTICAL, info_message, optical_frame
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.geometry_msgs import TransformStamped
@@ -94,7 +94,7 @@ class UsbCamera(sdk.Component[UsbCameraConfig]):
         self.camera: cv2.VideoCapture | None = None
         self.at_end.callback(self.close)
         file = self.config.calibration
-        self.known = CameraFile.read(Path(file)) if file else None
+        self.known = read_calibration(Path(file)) if file else None
         self.tried = -math.inf  # [s]
         self.state = TaskStatus(Level.STALE, "no picture yet")
         self.add_diagnostic("pictures", lambda now: self.state)
@@ -149,7 +149,7 @@ class UsbCamera(sdk.Component[UsbCameraConfig]):
         if (known := self.known) is None:
             return
         if (known.width, known.height) == (width, height):
-            self.bound["info"](info_message(header, known.intrinsics))
+            self.bound["info"](info_message(header, known))
         else:
             size = f"{known.width} x {known.height}"
             self.state = TaskStatus(Level.ERROR, f"pictures are {width} x {height}, and the calibration is of {size}")

@@ -64,9 +64,9 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             config["view"] = f"{model.view!r} rad"
             places = dict[str, KeyPath]()
             if file is not None:
-                from rbxcompose.domains.vision.camera_file import CameraFile  # imports numpy
+                from rbxcompose.domains.vision.calibration import read_calibration  # imports numpy
 
-                known = CameraFile.read(file)
+                known = read_calibration(file)
                 config["pinhole"] = [known.fx, known.fy, known.cx, known.cy]
                 config["distortion"] = list(known.distortion)
                 places = dict.fromkeys(("pinhole", "distortion"), ("cameras", name, "calibration"))
@@ -107,10 +107,10 @@ def cameras(reading: Reading[CameraModel]) -> dict[str, CameraOfRobot]:
 
 def _unlike(file: Path, size: tuple[int, int]) -> str:
     """Return why a file is no calibration of a camera with pictures of a size, or nothing."""
-    from rbxcompose.domains.vision.camera_file import CameraFile, CameraFileError  # imports numpy
+    from rbxcompose.domains.vision.calibration import CameraFileError, read_calibration  # imports numpy
 
     try:
-        known = CameraFile.read(file)
+        known = read_calibration(file)
     except CameraFileError as error:
         return str(error)
     if (known.width, known.height) != size:

@@ -12,7 +12,6 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Pose2, Transform3, Velocity2
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.urdf import body_of
 from rbxcompose.domains.worlds.inertial import imu_message
 from rbxcompose.domains.worlds.optics import TO_OPTICAL, depth_message, optical_frame, picture_message
@@ -20,12 +19,13 @@ from rbxcompose.domains.worlds.physics.conversion import GROUND
 from rbxcompose.domains.worlds.physics.engine import PhysicsWorld
 from rbxcompose.domains.worlds.physics.looks import DepthPicture, PhysicsCamera
 from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, PhysicsServo, outline_body
+from rbxcompose.domains.worlds.poses import message_of
 from rbxcompose.domains.worlds.sensors import OTHERS
 from rbxcompose.domains.worlds.shapes import ShapePath, WorldShape
 from rbxcompose.domains.worlds.world import MAP_FRAME, world_of
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import Odometry
-from rbxcompose.msgs.poses import pose_message, transform_message
+from rbxcompose.msgs.poses import transform_message, twist_message
 from rbxcompose.msgs.rbxcompose_msgs import World, WorldRobots
 from rbxcompose.msgs.sensor_msgs import Image, Imu, JointState
 from rbxcompose.msgs.stamps import to_time
@@ -153,7 +153,7 @@ class PhysicsSim(sdk.Component[PhysicsConfig]):
             self.engine.close()
         world, config = world_of(message), self.config
         robot = PhysicsRobot(
-            body_of(config.urdf) if config.urdf else outlined(message),
+            body_of(config.urdf) if config.urdf else outline_body(message.radius, message.height),
             {name: Path(file) for name, file in config.meshes.items()},
             drives=config.drives,
             wheel_distance=config.wheel_distance,
@@ -317,18 +317,11 @@ def shooting(topic: str) -> tuple[str, str, str]:
     return f"{topic} shoot", f"{topic} colour", f"{topic} distance"
 
 
-def outlined(message: World) -> Body:
-    """Return the body of a robot without a description."""
-    return outline_body(message.radius, message.height)
-
-
 def odometry(header: Header, pose: Pose2, velocity: Velocity2) -> Odometry:
     """Return a planar pose and velocity as a message."""
-    place = pose_message(Transform3.from_pose2(pose))
-    twist = geometry.Twist(linear=geometry.Vector3(x=velocity.linear), angular=geometry.Vector3(z=velocity.angular))
     return Odometry(
         header=header,
         child_frame_id=BASE,
-        pose=geometry.PoseWithCovariance(pose=place),
-        twist=geometry.TwistWithCovariance(twist=twist),
+        pose=geometry.PoseWithCovariance(pose=message_of(pose)),
+        twist=geometry.TwistWithCovariance(twist=twist_message(velocity)),
     )
