@@ -155,7 +155,8 @@ class RulesSay:
     refusal: ChangeRefusal | None
 
 
-SettingOrder = PrepareChange | CommitChange | UndoChange | EndChange | ChangeDecided | AskRules
+ComponentSettingOrder = PrepareChange | CommitChange | UndoChange | EndChange | ChangeDecided
+SettingOrder = ComponentSettingOrder | AskRules
 SettingWord = AskForChange | ChangePrepared | ChangeFollowed | RulesSay
 
 
@@ -381,46 +382,12 @@ class FromHost:
     report: HostReport
 
 
-ChannelOrder = (
-    Configure
-    | Activate
-    | Start
-    | Stop
-    | Release
-    | Brake
-    | Lost
-    | Ask
-    | Consider
-    | Adopt
-    | Retire
-    | Prepare
-    | Reconfigure
-    | SettingOrder
-    | Blocked
-    | ToHosts
-    | Shutdown
-)
-ChannelWord = (
-    Configured
-    | States
-    | StoppedByBus
-    | AtRest
-    | Failed
-    | MissionOver
-    | RobotHeld
-    | ComponentNoted
-    | Repeated
-    | TimeIsUp
-    | Answered
-    | Refusal
-    | Summary
-    | Retired
-    | Reconfigured
-    | Considered
-    | SettingWord
-    | FromHost
-    | Alive
-)
+Lifecycle = Configure | Activate | Start | Brake | Shutdown
+PlanOrder = Consider | Adopt | Retire | Prepare | Reconfigure
+ChannelOrder = Lifecycle | Stop | Release | Lost | Blocked | Ask | PlanOrder | SettingOrder | ToHosts
+Progress = Configured | States | Failed | Repeated | AtRest | TimeIsUp | Summary | Alive
+Reply = Answered | Refusal | Considered | Retired | Reconfigured
+ChannelWord = Progress | StoppedByBus | MissionOver | RobotHeld | ComponentNoted | Reply | SettingWord | FromHost
 ChannelMessage = ChannelOrder | ChannelWord
 
 MESSAGES: Family[ChannelMessage] = Family(get_args(ChannelMessage))

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.domains.muxes.account import state_of, why
+from rbxcompose.domains.muxes.account import MuxAccount
 from rbxcompose.domains.muxes.core import StampedTwistRamp, grown, is_zeroed, rest_of, zeroed
 from rbxcompose.msgs.geometry_msgs import Twist, TwistStamped, Vector3
 from rbxcompose.msgs.std_msgs import Float64, Float64MultiArray, Header
@@ -101,7 +101,7 @@ def test_a_lock_by_hand_stops_at_once_and_ends_by_hand_or_at_its_time() -> None:
         mux.core.lock(["low"], until, now)
         mux.take(mux.core.tick(now))
         assert mux.speeds[-1] == 0.0
-        assert why(mux.core, now) == "low is locked by hand"
+        assert MuxAccount(mux.core).why(now) == "low is locked by hand"
         assert not mux.send(now + 0.1, "low", 1.0)
         assert mux.send(now + 0.1, "high", 2.0)
         if until == math.inf:
@@ -124,7 +124,7 @@ def test_what_went_on_until_the_time_of_a_lock_by_hand_is_over_must_come_to_rest
     mux.core.lock(["low"], 0.5, 0.0)
     for step in range(1, 20):
         assert not mux.send(step * 0.1, "low", 1.0)
-    assert state_of(mux.core, "low", mux.now)[0] == "must rest"
+    assert MuxAccount(mux.core).state_of("low", mux.now)[0] == "must rest"
     assert mux.send(2.0, "low", 0.0)
     assert mux.send(2.1, "low", 1.0)
 

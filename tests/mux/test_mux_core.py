@@ -10,7 +10,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from rbxcompose.domains.muxes.account import why
+from rbxcompose.domains.muxes.account import MuxAccount
 from rbxcompose.domains.muxes.core import LockSource, MuxCore, MuxSource
 
 INPUTS = {"safety": MuxSource(200, 0.2), "teleop": MuxSource(100, 0.5), "navigation": MuxSource(10, 0.5)}
@@ -211,30 +211,30 @@ def test_closing_sends_one_zero_and_nothing_more() -> None:
 def test_it_says_who_holds_the_output() -> None:
     core = mux()
     core.receive("navigation", 1.0, 2.81)
-    assert why(core, 3.0) == "navigation holds"
+    assert MuxAccount(core).why(3.0) == "navigation holds"
 
 
 def test_it_says_why_nothing_passes() -> None:
     core = mux(locks=LOCKS)
-    assert why(mux(), 0.0) == "no input"
+    assert MuxAccount(mux()).why(0.0) == "no input"
     silent = "door gives no heartbeat: teleop and navigation are locked out"
-    assert (why(core, 0.0), core.refused(0.0)) == (silent, [])
+    assert (MuxAccount(core).why(0.0), core.refused(0.0)) == (silent, [])
     core.receive("teleop", 2.0, 0.0)
-    assert (why(core, 0.1), core.refused(0.1)) == (silent, ["teleop"])
+    assert (MuxAccount(core).why(0.1), core.refused(0.1)) == (silent, ["teleop"])
     core.stop(0.2)
-    assert why(core, 0.2) == "stopped"
+    assert MuxAccount(core).why(0.2) == "stopped"
     core.release(0.3)
-    assert why(core, 0.3) == f"teleop must come to rest once; {silent}"
+    assert MuxAccount(core).why(0.3) == f"teleop must come to rest once; {silent}"
     core.close(0.4)
-    assert why(core, 0.4) == "closed: the robot is going down"
+    assert MuxAccount(core).why(0.4) == "closed: the robot is going down"
 
 
 def test_an_input_above_a_silent_lock_holds_while_the_others_are_locked_out() -> None:
     core = mux(locks=LOCKS)
     core.receive("safety", 3.0, 0.1)
-    assert why(core, 0.1).startswith("safety holds; door gives no heartbeat: ")
+    assert MuxAccount(core).why(0.1).startswith("safety holds; door gives no heartbeat: ")
     core.heartbeat("door", 0.2)
-    assert (why(core, 0.2), core.locked_out(0.2)) == ("safety holds", [])
+    assert (MuxAccount(core).why(0.2), core.locked_out(0.2)) == ("safety holds", [])
 
 
 def test_a_lock_that_falls_silent_is_told_in_time_though_nothing_moves() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.domains.muxes.config import MuxProfile, mode_of
+from rbxcompose.domains.muxes.config import MODE_OF, MuxProfile
 from tests.mux.velocities import Driven, Input
 
 HIGH: Input = {"priority": 100, "timeout": 0.5}
@@ -165,7 +165,7 @@ def test_topic_tools_selects_first_what_is_named_or_nothing() -> None:
 
 @pytest.mark.parametrize("profile", ["twist_mux", "yocs", "topic_tools"])
 def test_the_stop_of_the_robot_is_above_every_profile(profile: MuxProfile) -> None:
-    mux = Driven({"one": {"priority": 1, "timeout": 0.5}}, profile=profile, mode=mode_of(None, profile))
+    mux = Driven({"one": {"priority": 1, "timeout": 0.5}}, profile=profile, mode=MODE_OF[profile])
     mux.send(0.0, "one", 1.0)
     mux.take(mux.core.stop(0.1))
     assert mux.speeds == [1.0, 0.0]

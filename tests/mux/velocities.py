@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from rbxcompose.domains.muxes.config import MuxConfig, core_of
-from rbxcompose.domains.muxes.core import MuxCore
+from rbxcompose.domains.muxes.config import MuxConfig
+from rbxcompose.domains.muxes.core import MuxCore, core_of
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 
 Input = dict[str, Any]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass, replace
-from selectors import DefaultSelector
 from typing import Any, Literal
 
 import pytest
@@ -26,9 +25,8 @@ from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import BringDown, NoteInLog, ReleaseRobot, RobotStatus, StopRobot
 from rbxcompose.runtime.supervision.changes import Fate
 from rbxcompose.runtime.supervision.conductor import Conductor
-from rbxcompose.runtime.supervision.judge import Judge
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
-from rbxcompose.runtime.supervision.supervisor import SettingLine
+from rbxcompose.runtime.supervision.setting_changes import SettingChanges, WhenJudged
 from rbxcompose.sdk import Component, Config, component
 from rbxcompose.sdk.component import RobotHeld
 from rbxcompose.testing.bench import Bench, instance
@@ -62,8 +60,7 @@ class Desk:
         self.texts: list[str] = []
         self.replies: list[tuple[int, object, bool]] = []
         self.conductor = Conductor(plan, RunOptions(is_stepped=is_stepped), Scheduler(), self, router=None)
-        changes = SettingLine(self, Judge(None, "rules", DefaultSelector(), Scheduler())).changes
-        self.handler = RequestHandler(self, changes, is_stepped=is_stepped)
+        self.handler = RequestHandler(self, SettingChanges(self), is_stepped=is_stepped)
         self.conductor.states["patrol"] = ("active", 0)
         self.conductor.members["mission"].is_configured = True
 
@@ -72,6 +69,15 @@ class Desk:
 
     def send(self, process: str, message: say.ChannelOrder) -> None:
         self.sent.append((process, message))
+
+    def plan(self) -> Plan:
+        return self.conductor.plan
+
+    def reached(self) -> list[str]:
+        return self.conductor.reached
+
+    def judge(self, now: list[str], new: list[str], then: WhenJudged) -> None:
+        then(None)
 
     def log(self, level: Level, text: str, detail: str = "") -> None:
         self.texts.append(text)

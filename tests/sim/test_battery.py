@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.power.battery_twin import BatteryCore, BatterySettings
+from rbxcompose.domains.power.components.battery_sim import BatteryCore, BatterySimConfig
 
-SETTINGS = BatterySettings(runtime=60.0)
+SETTINGS = BatterySimConfig(runtime=60.0)
 
 
 @given(st.floats(1, 7200), st.integers(1, 500))
 def test_it_is_empty_after_its_runtime_however_the_time_is_divided(runtime: float, steps: int) -> None:
-    battery = BatteryCore(BatterySettings(runtime))
+    battery = BatteryCore(BatterySimConfig(runtime=runtime))
     for _ in range(steps):
         battery.step(runtime / steps)
     assert battery.level == 0.0
@@ -25,7 +24,7 @@ def test_it_is_empty_after_its_runtime_however_the_time_is_divided(runtime: floa
 
 @given(st.floats(1, 100), st.lists(st.floats(0, 10), max_size=30))
 def test_it_drains_evenly_and_never_below_empty(runtime: float, steps: list[float]) -> None:
-    battery = BatteryCore(BatterySettings(runtime))
+    battery = BatteryCore(BatterySimConfig(runtime=runtime))
     for dt in steps:
         battery.step(dt)
     assert battery.level == pytest.approx(max(0.0, 1.0 - sum(steps) / runtime), abs=1e-6)
@@ -47,7 +46,7 @@ def test_it_complains_strictly_below_its_thresholds(level: float, status: tuple[
 
 
 def test_it_does_not_complain_at_a_threshold_that_it_came_to_in_small_steps() -> None:
-    battery = BatteryCore(BatterySettings(runtime=20.0))
+    battery = BatteryCore(BatterySimConfig(runtime=20.0))
     for _ in range(10):
         battery.step(1.0)
     assert battery.status == (Level.OK, "Battery OK")
@@ -72,7 +71,7 @@ def test_a_level_that_no_battery_has_is_refused_with_a_reason(level: float) -> N
 def test_a_new_runtime_keeps_the_level() -> None:
     battery = BatteryCore(SETTINGS)
     battery.step(30.0)
-    battery.settings = replace(SETTINGS, runtime=10.0)
+    battery.settings = BatterySimConfig(runtime=10.0)
     assert battery.level == pytest.approx(0.5)
     battery.step(5.0)
     assert battery.level == 0.0

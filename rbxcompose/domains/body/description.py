@@ -6,19 +6,21 @@ import os
 from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Related, Span, kind, once
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.body.files import PACKAGE, BodyFile, ReadFile, mesh_mistakes, read_files
-from rbxcompose.domains.body.link_pairs import CollisionMatrix
 from rbxcompose.domains.body.lint import lint, orientations
 from rbxcompose.domains.body.model import Body, BodyJoint, BodyLink
 from rbxcompose.domains.body.urdf import read_body
 from rbxcompose.domains.body.xml_reader import XmlElement, escaped, quoted, read_urdf
 from rbxcompose.manifest.fields import PieceAttachment
+
+if TYPE_CHECKING:
+    from rbxcompose.domains.body.link_pairs import CollisionMatrix
 
 NOT_ATTACHED = kind("RBX2016", is_fixable=True)
 MOUNT = "mount"

@@ -7,17 +7,20 @@ import struct
 from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import open_regular
 from rbxcompose.base.findings import Finding, Related, Span, kind, need
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.body.model import Body
-from rbxcompose.domains.body.xacro import Expanded, XacroFile, expand_all
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.manifest.files import library_root, project_of, shown_name
 from rbxcompose.manifest.reader import read_source
 from rbxcompose.manifest.tree import URDF_BYTES
+
+if TYPE_CHECKING:
+    from rbxcompose.domains.body.xacro import Expanded, XacroFile
 
 BAD_MESH = kind("RBX2015")
 LARGEST = 64_000_000  # [bytes]
@@ -128,6 +131,8 @@ class BodyFile:
     @property
     def as_xacro(self) -> XacroFile:
         """Return what is to be expanded."""
+        from rbxcompose.domains.body.xacro import XacroFile
+
         packages = {LIBRARY: library_root(), **self.packages}
         roots = [project_of(self.path), library_root()]
         return XacroFile(self.path, self.arguments, packages, roots, self.span, self.spans)
@@ -185,8 +190,11 @@ class ReadFile:
 
 def read_files(files: Sequence[BodyFile], sources: MutableMapping[str, str]) -> list[ReadFile | Finding]:
     """Return the URDF of each file, or why there is none; the texts of all that were read are added to `sources`."""
-    xacros = [file for file in files if file.is_xacro]
-    expansions = iter(expand_all([file.as_xacro for file in xacros]) if xacros else ())
+    expansions: Iterator[tuple[Expanded | Finding, Sequence[Path]]] = iter(())
+    if xacros := [file.as_xacro for file in files if file.is_xacro]:
+        from rbxcompose.domains.body.xacro import expand_all  # which few robots need
+
+        expansions = iter(expand_all(xacros))
     return [_expanded(file, *next(expansions), sources) if file.is_xacro else _plain(file, sources) for file in files]
 
 

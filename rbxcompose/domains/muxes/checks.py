@@ -22,8 +22,7 @@ from rbxcompose.compiler.checks.wiring import is_command
 from rbxcompose.compiler.model.build import MISSION
 from rbxcompose.compiler.model.flow import Wrong, is_written, period_of, setting_span
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, resolve
-from rbxcompose.domains.muxes.config import HIGHEST, MODE_OF, TIMELESS, HoldFirst, MuxConfig, is_own
-from rbxcompose.domains.muxes.core import RAMPS
+from rbxcompose.domains.muxes.config import HIGHEST, MODE_OF, TIMELESS, VELOCITIES, HoldFirst, MuxConfig, is_own
 from rbxcompose.domains.muxes.requests import NONE
 from rbxcompose.domains.muxes.sections.muxes import MuxModel, muxes
 from rbxcompose.missions.analysis.effects import published
@@ -179,7 +178,7 @@ def mux_rest(robot: Robot) -> Iterator[Finding]:
                 f"zeros of {config.message} are no rest, so mux '{mux}' cannot stop with them",
                 help="leave it out; or, if zeros are rest for the receiver, add 'zero_stops: true'",
             )
-        if entry.handover is not None and config.message not in RAMPS:
+        if entry.handover is not None and config.message not in VELOCITIES:
             yield mux_rest.at(
                 robot.key("muxes", mux, "handover"),
                 f"a hand-over is for velocities, and mux '{mux}' forwards {config.message}",

@@ -1,19 +1,15 @@
-"""The configuration of a mux, and the core that it describes: what each mode and profile makes of it."""
+"""The configuration of a mux."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
 from rbxcompose.base.config import Acceleration, AngularAcceleration, Config, Frequency, Live, Name, Time
-from rbxcompose.domains.muxes import core
-from rbxcompose.domains.muxes.requests import NONE
 from rbxcompose.manifest.fields import TopicName
-from rbxcompose.msgs import registry
-from rbxcompose.msgs.types import Message
 
 MuxMode = Literal["priority", "select", "latest"]
 MuxProfile = Literal["default", "topic_tools", "twist_mux", "yocs"]
@@ -30,6 +26,8 @@ HIGHEST = 255
 """The highest priority of twist_mux."""
 OWN_NAMES = frozenset({"output", "announced", "active", "selected", "select", "add", "delete", "list"})
 """Names that a mux needs itself, below its topic or among its ports; so are those that begin with `lock_`."""
+VELOCITIES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
+"""Types whose zero is rest by their definition. A zero position, pose or flag is a command like any other."""
 TIMELESS: frozenset[MuxProfile] = frozenset({"twist_mux", "yocs"})
 """Profiles in which a timeout may be 0."""
 
@@ -62,11 +60,6 @@ class HandoverLimits(Config):
     """For each axis; without it, it is not limited."""
     angular: Annotated[AngularAcceleration | None, Live()] = Field(None, gt=0)
     """For each axis; without it, it is not limited."""
-
-
-def mode_of(mode: MuxMode | None, profile: MuxProfile) -> MuxMode:
-    """Return the mode of a mux, which may be left out."""
-    return mode or MODE_OF[profile]
 
 
 ANNOUNCED: Mapping[MuxProfile, str] = {"topic_tools": "selected"}
@@ -151,7 +144,7 @@ class MuxConfig(Config):
     @property
     def has_rest(self) -> bool:
         """Return whether a message of zeros commands rest."""
-        return self.message in core.VELOCITIES if self.zero_stops is None else self.zero_stops
+        return self.message in VELOCITIES if self.zero_stops is None else self.zero_stops
 
     @property
     def announced(self) -> str:
@@ -162,79 +155,6 @@ class MuxConfig(Config):
         """Return the topic of an input or a lock as it is written."""
         config = self.inputs.get(name) or self.locks.get(name)
         return (config.topic if config else None) or f"{self.output}/{name}"
-
-
-def core_of(config: MuxConfig, *, is_stopped: bool = False) -> core.MuxCore[Message]:
-    """Return the core of a mux."""
-    message = registry.message(config.message)
-    rest: dict[str, Any] = (
-        {"zero": core.rest_of(message), "is_zero": core.is_zeroed} if config.has_rest else {"zero": None}
-    )
-    return core.MuxCore(
-        {name: source_of(input_config, config) for name, input_config in config.inputs.items()},
-        arbiter=arbiter_of(config),
-        locks={name: _lock(lock, config) for name, lock in config.locks.items()},
-        endings=core.MuxEndings(_wait(config.on_idle, config.profile), _wait(config.on_lock, config.profile)),
-        handover=_ramp(config),
-        stopped=is_stopped,
-        **rest,
-    )
-
-
-def arbiter_of(config: MuxConfig) -> core.Arbiter:
-    """Return the rule by which the output is given."""
-    if config.mode == "select":
-        first = next(iter(config.inputs), None)
-        return core.BySelection(first if config.initial is None else None if config.initial == NONE else config.initial)
-    if config.mode == "latest":
-        return core.ByLatest()
-    made: Mapping[MuxProfile, Callable[[], core.Arbiter]] = {"twist_mux": core.AsTwistMux, "yocs": core.AsYocs}
-    return made.get(config.profile, core.ByPriority)()
-
-
-def source_of(input_config: MuxInputConfig, config: MuxConfig) -> core.MuxSource:
-    """Return an input as the core knows it.
-
-    In `twist_mux` an input with the timeout 0 never expires, and masks others before its first message. What is
-    selected by hand needs no timeout: it is live as long as it is selected.
-    """
-    never_ends = input_config.timeout is None or (input_config.timeout == 0 and config.profile == "twist_mux")
-    starts_live = never_ends and (config.mode == "select" or config.profile == "twist_mux")
-    return core.MuxSource(
-        _priority(input_config.priority, config) if config.has_priorities else 0,
-        core.NEVER if never_ends or input_config.timeout is None else input_config.timeout,
-        input_config.zero_releases and config.has_rest,
-        starts_live,
-    )
-
-
-def _lock(lock_config: MuxLockConfig, config: MuxConfig) -> core.LockSource:
-    counts = config.has_priorities and lock_config.priority is not None
-    return core.LockSource(
-        _priority(lock_config.priority or 0, config) if counts else core.NEVER,
-        lock_config.timeout or core.NEVER,
-        is_flag=bool(lock_config.topic),
-    )
-
-
-def _priority(written: int, config: MuxConfig) -> int:
-    return max(0, min(written, HIGHEST)) if config.profile == "twist_mux" else written
-
-
-def _wait(ending: MuxEnding | None, profile: MuxProfile) -> float:
-    """Return how long after the last command the stop follows [s]."""
-    match ending:
-        case HoldFirst(hold=time):
-            return time
-        case None:
-            return 0.0 if profile == "default" else core.NEVER
-        case _:
-            return 0.0 if ending == "stop" else core.NEVER
-
-
-def _ramp(config: MuxConfig) -> core.Ramp[Any] | None:
-    made = core.RAMPS.get(config.message)
-    return None if made is None or config.handover is None else made(*handover_limits(config.handover))
 
 
 def handover_limits(limits: HandoverLimits | None) -> tuple[float, float]:

@@ -1,4 +1,7 @@
-"""Selects which of several command sources is let through, below latches and locks that no source can override."""
+"""Selects which of several command sources is let through, below latches and locks that no source can override.
+
+A running mux alone needs this: `core_of` makes of a configuration what its mode and profile mean.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,18 @@ from functools import cache
 from typing import Any, Generic, Protocol, TypeVar
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.domains.muxes.config import (
+    HIGHEST,
+    HoldFirst,
+    MuxConfig,
+    MuxEnding,
+    MuxInputConfig,
+    MuxLockConfig,
+    MuxProfile,
+    handover_limits,
+)
+from rbxcompose.domains.muxes.requests import NONE
+from rbxcompose.msgs import registry
 from rbxcompose.msgs.arrays import holds_numbers, zeros
 from rbxcompose.msgs.definitions import FLOATS, INTEGERS, FieldShape, FieldType, attribute, parse_type
 from rbxcompose.msgs.geometry_msgs import Twist, TwistStamped, Vector3
@@ -20,8 +35,6 @@ M = TypeVar("M")
 
 QUIET = 0.5  # [s] of silence after which an input without a timeout counts as come to rest
 NEVER = math.inf
-VELOCITIES = (Twist.TYPE, TwistStamped.TYPE)
-"""Types whose zero is rest by their definition. A zero position, pose or flag is a command like any other."""
 AXES = ("x", "y", "z")
 
 
@@ -699,3 +712,74 @@ class MuxCore(Generic[M]):
     @property
     def _is_shut(self) -> bool:
         return self.is_stopped or self.is_closed or self.is_held
+
+
+def core_of(config: MuxConfig, *, is_stopped: bool = False) -> MuxCore[Message]:
+    """Return the core of a mux."""
+    message = registry.message(config.message)
+    rest: dict[str, Any] = {"zero": rest_of(message), "is_zero": is_zeroed} if config.has_rest else {"zero": None}
+    return MuxCore(
+        {name: source_of(input_config, config) for name, input_config in config.inputs.items()},
+        arbiter=arbiter_of(config),
+        locks={name: _lock(lock, config) for name, lock in config.locks.items()},
+        endings=MuxEndings(_wait(config.on_idle, config.profile), _wait(config.on_lock, config.profile)),
+        handover=_ramp(config),
+        stopped=is_stopped,
+        **rest,
+    )
+
+
+def arbiter_of(config: MuxConfig) -> Arbiter:
+    """Return the rule by which the output is given."""
+    if config.mode == "select":
+        first = next(iter(config.inputs), None)
+        return BySelection(first if config.initial is None else None if config.initial == NONE else config.initial)
+    if config.mode == "latest":
+        return ByLatest()
+    made: Mapping[MuxProfile, Callable[[], Arbiter]] = {"twist_mux": AsTwistMux, "yocs": AsYocs}
+    return made.get(config.profile, ByPriority)()
+
+
+def source_of(input_config: MuxInputConfig, config: MuxConfig) -> MuxSource:
+    """Return an input as the core knows it.
+
+    In `twist_mux` an input with the timeout 0 never expires, and masks others before its first message. What is
+    selected by hand needs no timeout: it is live as long as it is selected.
+    """
+    never_ends = input_config.timeout is None or (input_config.timeout == 0 and config.profile == "twist_mux")
+    starts_live = never_ends and (config.mode == "select" or config.profile == "twist_mux")
+    return MuxSource(
+        _priority(input_config.priority, config) if config.has_priorities else 0,
+        NEVER if never_ends or input_config.timeout is None else input_config.timeout,
+        input_config.zero_releases and config.has_rest,
+        starts_live,
+    )
+
+
+def _lock(lock_config: MuxLockConfig, config: MuxConfig) -> LockSource:
+    counts = config.has_priorities and lock_config.priority is not None
+    return LockSource(
+        _priority(lock_config.priority or 0, config) if counts else NEVER,
+        lock_config.timeout or NEVER,
+        is_flag=bool(lock_config.topic),
+    )
+
+
+def _priority(written: int, config: MuxConfig) -> int:
+    return max(0, min(written, HIGHEST)) if config.profile == "twist_mux" else written
+
+
+def _wait(ending: MuxEnding | None, profile: MuxProfile) -> float:
+    """Return how long after the last command the stop follows [s]."""
+    match ending:
+        case HoldFirst(hold=time):
+            return time
+        case None:
+            return 0.0 if profile == "default" else NEVER
+        case _:
+            return 0.0 if ending == "stop" else NEVER
+
+
+def _ramp(config: MuxConfig) -> Ramp[Any] | None:
+    made = RAMPS.get(config.message)
+    return None if made is None or config.handover is None else made(*handover_limits(config.handover))

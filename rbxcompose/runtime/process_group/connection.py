@@ -263,6 +263,8 @@ class Driven(Protocol):
 class Driver:
     """Waits for channel and inbox, and passes their messages on; subclasses define how time advances."""
 
+    _clock: Clock
+
     def __init__(self, scheduler: Scheduler, inbox: CallbackInbox, channel: Channel, driven: Driven) -> None:
         self._scheduler, self._inbox, self._channel, self._driven = scheduler, inbox, channel, driven
         self._selector = selectors.SelectSelector()  # its timeouts have microseconds; epoll rounds up to milliseconds
@@ -285,12 +287,12 @@ class Driver:
         raise NotImplementedError
 
     def _advance(self) -> None:
-        """Advance time and run what is due."""
-        raise NotImplementedError
+        """Advance time, unless it does so by itself, and run what is due."""
+        self._run_present()
 
     def _run_present(self) -> None:
         """Run what is due at the present instant."""
-        raise NotImplementedError
+        self._scheduler.advance(self._clock.now())
 
     def _listen(self, pause: float) -> None:
         until_beat = self._next_beat - time.monotonic()
@@ -353,12 +355,6 @@ class RealTimeDriver(Driver):
         due = self._scheduler.next_due()
         return BEAT if due is None else due - self._clock.now()
 
-    def _advance(self) -> None:
-        self._scheduler.advance(self._clock.now())
-
-    def _run_present(self) -> None:
-        self._scheduler.advance(self._clock.now())
-
 
 class SteppedDriver(Driver):
     """Robot time stands still until `go`, then jumps from event to event, and stands still again after `halt`.
@@ -417,9 +413,6 @@ class SteppedDriver(Driver):
             self._clock.advance_to(max(following, self._clock.now()))
         self._run_present()
 
-    def _run_present(self) -> None:
-        self._scheduler.advance(self._clock.now())
-
 
 class ExternalDriver(Driver):
     """Robot time follows `receive`, event by event, so that a step runs for each instant at which it was due.
@@ -467,9 +460,6 @@ class ExternalDriver(Driver):
             self._clock.advance_to(max(following, self._clock.now()))
             self._run_present()
         self._run_present()
-
-    def _run_present(self) -> None:
-        self._scheduler.advance(self._clock.now())
 
 
 BEATS = 6  # of the process between two calls

@@ -77,7 +77,7 @@ def open_stop_line(
     return transport.serve(stop_key(robot, process), asked)
 
 
-def change_settings(host: Host, order: messages.SettingOrder, channel: messages.Channel) -> None:
+def change_settings(host: Host, order: messages.ComponentSettingOrder, channel: messages.Channel) -> None:
     """Carry out an order, and answer it."""
     changes = host.parameters.changes
     match order:
@@ -122,15 +122,11 @@ class Taping:
 
     def keep(self) -> None:
         """Write what is due; must be called several times a second."""
-        recorder = self._recorder
-        if recorder is not None:
-            self._try(lambda: recorder.keep(self._real.now()))
+        self._do(lambda recorder: recorder.keep(self._real.now()))
 
     def finish(self) -> None:
         """End the file, which then has its index and its name."""
-        recorder = self._recorder
-        if recorder is not None:
-            self._try(recorder.finish)
+        self._do(lambda recorder: recorder.finish())
         self._recorder = None
 
     def _begin(self, plan: Plan) -> None:
@@ -140,14 +136,16 @@ class Taping:
         self._recorder.attach(PLAN, dump(plan, keeps_order=True).encode())
 
     def _declare(self, topic: RecordedTopic) -> None:
-        recorder = self._recorder
-        if recorder is not None:
-            self._try(lambda: recorder.declare(topic))
+        self._do(lambda recorder: recorder.declare(topic))
 
     def _add(self, message: Recorded) -> None:
+        self._do(lambda recorder: recorder.add(message))
+
+    def _do(self, action: Callable[["Recorder"], None]) -> None:
+        """Do something with the recorder, if there is one."""
         recorder = self._recorder
         if recorder is not None:
-            self._try(lambda: recorder.add(message))
+            self._try(lambda: action(recorder))
 
     def _try(self, action: Callable[[], None]) -> None:
         try:
@@ -254,13 +252,7 @@ class ProcessGroup:
                 self._plan = load(plan)
             case messages.Retire() | messages.Prepare() | messages.Reconfigure():
                 self._change(self._made_host(), message)
-            case (
-                messages.PrepareChange()
-                | messages.CommitChange()
-                | messages.UndoChange()
-                | messages.EndChange()
-                | messages.ChangeDecided()
-            ):
+            case _ if isinstance(message, messages.ComponentSettingOrder):
                 change_settings(self._made_host(), message, self._channel)
             case messages.Blocked(causes):
                 self._made_host().statuses.block(causes)

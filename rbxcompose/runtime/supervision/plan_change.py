@@ -1,18 +1,22 @@
 """A change of a running robot, carried out step by step. Pure: the conductor drives it and gets the result.
 
-Components that stop are retired in reverse start order; empty processes end; then the new plan applies: new processes
-are forked, new components configured and, as at the start of the robot, activated in start order.
+Components are asked first how they would take it. Those that stop are retired in reverse start order; empty processes
+end; then the new plan applies: new processes are forked, new components configured and, as at the start of the robot,
+activated in start order.
 """
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
-from itertools import groupby
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import field, replace
+from itertools import count, groupby
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.compiler.plan.dump import dump
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.supervision.changes import Changes, Fate
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member
+from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.registry import component_type
 
 LONGEST = 20.0  # [s] within which all new components must be active
 
@@ -161,3 +165,58 @@ def summary(changes: Changes) -> str:
     """Return one line that says what happens to which components."""
     named = ((fate, changes.names(fate)) for fate in Fate if fate is not Fate.KEPT)
     return ", ".join(f"{' '.join(names)} {fate}" for fate, names in named if names) or "nothing to do"
+
+
+WhenConsidered = Callable[[Sequence[str], str], None]  # what components say, and why they refuse, which may be empty
+
+
+@dataclass(slots=True)
+class _Question:
+    waiting: set[str]  # processes whose answers are due
+    then: WhenConsidered
+    said: list[str] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+
+
+class Consultations:
+    """The questions that are open; a process that ends says nothing, since its components have nothing to lose."""
+
+    def __init__(self, send: Callable[[str, messages.ChannelOrder], None]) -> None:
+        self._send = send
+        self._numbers = count(1)
+        self._open: dict[int, _Question] = {}
+
+    def ask(self, changes: Changes, reached: Collection[str], then: WhenConsidered) -> None:
+        """Ask the components that are changed or restarted, in these processes; `then` is called now or later."""
+        asked: dict[str, list[str]] = {}
+        for one in changes.fated:
+            is_asked = component_type(one.instance.type).consider is not Component.consider
+            if one.fate in (Fate.LIVE, Fate.RESTARTED) and is_asked and one.instance.process in reached:
+                asked.setdefault(one.instance.process, []).append(one.instance.name)
+        if not asked:
+            then((), "")
+            return
+        number = next(self._numbers)
+        self._open[number] = _Question(set(asked), then)
+        for process, names in asked.items():
+            mine = [instance for instance in changes.after.instances if instance.name in names]
+            self._send(process, messages.Consider(number, text_of(changes.after, mine)))
+
+    def receive(self, process: str, message: messages.ChannelWord) -> None:
+        """Take a message of a process; others than answers are ignored."""
+        if isinstance(message, messages.Considered) and (question := self._open.get(message.number)) is not None:
+            question.said += message.said
+            question.refused += message.refused
+            self._heard(message.number, process)
+
+    def gone(self, process: str) -> None:
+        """Expect nothing of a process any more."""
+        for number in list(self._open):
+            self._heard(number, process)
+
+    def _heard(self, number: int, process: str) -> None:
+        question = self._open[number]
+        question.waiting.discard(process)
+        if not question.waiting:
+            del self._open[number]
+            question.then(tuple(question.said), "; ".join(question.refused))

@@ -1,8 +1,11 @@
 """Carries out the requests from the control socket, or passes them on to the component that takes them."""
 
+import inspect
+import math
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
+from enum import Enum
 from typing import Any, Protocol
 
 from rbxcompose.base.config import value_at, with_values
@@ -14,12 +17,25 @@ from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.folder import ChosenLayers, RobotState
 from rbxcompose.runtime.plan_requests import AdoptSaved, ApplyPlan, ComparePlan, PlanComparison, RevertPlan
-from rbxcompose.runtime.requests import ROBOT, BringDown, DescribeRobot, NoteInLog, ReleaseRobot, RobotStatus, StopRobot
+from rbxcompose.runtime.requests import (
+    ROBOT,
+    BringDown,
+    ComponentDescription,
+    DescribeRobot,
+    NoteInLog,
+    PortDescription,
+    ReleaseRobot,
+    RobotStatus,
+    StopRobot,
+)
 from rbxcompose.runtime.supervision.changes import Changes, changes
 from rbxcompose.runtime.supervision.conductor import FINE, Conductor
-from rbxcompose.runtime.supervision.consultation import Consultations
-from rbxcompose.runtime.supervision.descriptions import described
+from rbxcompose.runtime.supervision.members import ConductorEffects
+from rbxcompose.runtime.supervision.plan_change import Consultations
 from rbxcompose.runtime.supervision.setting_changes import SettingChanges
+from rbxcompose.sdk.capabilities import Capability, Setting
+from rbxcompose.sdk.parameters import si_unit
+from rbxcompose.sdk.ports import In, Out, Port, Qos, Serves, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
 
 OWN = requests(
@@ -29,29 +45,13 @@ OWN = requests(
 MOST_BACK = 20  # changes that can be taken back
 
 
-class Supervised(Protocol):
+class Supervised(ConductorEffects, Protocol):
     """What requests can do with a supervisor; an answer carries the number of its request."""
 
     conductor: Conductor
 
     def state(self) -> RobotState:
         """Return the state that is known from outside."""
-        ...
-
-    def send(self, process: str, message: messages.ChannelOrder) -> None:
-        """Send a message to a process."""
-        ...
-
-    def log(self, level: Level, text: str, detail: str = "") -> None:
-        """Write a record of the whole robot."""
-        ...
-
-    def answer(self, number: int, answer: object) -> None:
-        """Answer a request, with data."""
-        ...
-
-    def refuse(self, number: int, reason: str) -> None:
-        """Refuse a request."""
         ...
 
 
@@ -268,3 +268,66 @@ def _loaded(plan: str) -> Plan:
         return load(plan)
     except PlanTextError as error:
         raise Refused(str(error)) from error
+
+
+def described(instance: Instance) -> ComponentDescription:
+    """Return what a component of the plan declares."""
+    cls = component_type(instance.type)
+    ports = cls.ports(instance.config)
+    capabilities: dict[str, tuple[Mapping[str, Any], ...]] = {}
+    for one in cls.capabilities(instance.config):
+        capabilities[type(one).__name__] = (*capabilities.get(type(one).__name__, ()), _plain_fields(one))
+    return ComponentDescription(
+        name=instance.name,
+        type=instance.type,
+        about=inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].replace("\n", " "),
+        process=instance.process,
+        ports=tuple(
+            _port(ports[wire.port], wire.port, wire.topic, wire.type) for wire in instance.wires if wire.port in ports
+        ),
+        capabilities=capabilities,
+        requests={name: issubclass(taken, Command) for name, taken in cls.requests().types.items()},
+    )
+
+
+def _port(port: Port[Any], name: str, topic: str, type_: str) -> PortDescription:
+    named = port.skill if isinstance(port, Serves | ServesAction) else "" if isinstance(port, ServesTopic) else None
+    return PortDescription(
+        name,
+        port.kind,
+        topic,
+        type_,
+        unit=port.unit if isinstance(port, In | Out | Serves) else "",
+        skill="" if named is None else named or topic.rpartition("/")[-1],
+        is_command=isinstance(port, In) and port.qos is Qos.COMMAND,
+        claims=port.claims if isinstance(port, ServesTopic | ServesAction) else "",
+        is_pausable=isinstance(port, ServesAction) and port.pausable,
+        measures=_units(port.measures) if isinstance(port, ServesAction) else {},
+        choices={key: tuple(words) for key, words in port.choices.items()} if isinstance(port, ServesAction) else {},
+        outcomes=dict(port.outcomes) if isinstance(port, ServesTopic | ServesAction) else {},
+    )
+
+
+def _units(measures: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: _units(one) if isinstance(one, Mapping) else si_unit(one) for key, one in measures.items()}
+
+
+def _plain_fields(capability: Capability) -> dict[str, Any]:
+    """Return the fields of a capability, those that JSON can hold; of a setting, its value."""
+    values = ((field.name, getattr(capability, field.name)) for field in fields(capability))
+    return {name: _plain(value.value if isinstance(value, Setting) else value) for name, value in values}
+
+
+def _plain(value: Any) -> Any:
+    match value:
+        case bool() | int() | str() | None:
+            return value
+        case float():
+            return value if math.isfinite(value) else None
+        case Enum():
+            return value.value
+        case Mapping():
+            return {str(key): _plain(entry) for key, entry in value.items()}
+        case list() | tuple():
+            return [_plain(entry) for entry in value]
+    return _plain({field.name: getattr(value, field.name) for field in fields(value)}) if is_dataclass(value) else None

@@ -6,9 +6,8 @@ import signal
 import socket
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
-from functools import cached_property
 from types import FrameType
-from typing import Any, Protocol
+from typing import Any
 
 from rbxcompose.base.clock import MonotonicClock
 from rbxcompose.base.dataclass import dataclass
@@ -24,15 +23,12 @@ from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, Gauge, 
 from rbxcompose.runtime.log import Record
 from rbxcompose.runtime.process_group.connection import MARK
 from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor, waits_of
-from rbxcompose.runtime.supervision import silence
-from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
+from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED, Conductor, rest_time
 from rbxcompose.runtime.supervision.judge import Judge
-from rbxcompose.runtime.supervision.members import Phase
+from rbxcompose.runtime.supervision.members import DEAD, LOOK, SILENT_FOR, Phase
 from rbxcompose.runtime.supervision.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
 from rbxcompose.runtime.supervision.setting_changes import SettingChanges, WhenJudged
-from rbxcompose.runtime.supervision.shutdown import rest_time
-from rbxcompose.runtime.supervision.silence import DEAD, LOOK
 from rbxcompose.sdk.capabilities import Drains, Drives, Forwards, RunsMissions
 from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type, declared
@@ -55,22 +51,15 @@ class ServiceManager:
                 sender.sendto(state, socket.MSG_DONTWAIT, self._address)
 
 
-def of_this_process() -> ServiceManager:
-    """Return the manager that has started this process."""
-    return ServiceManager(os.environ)
-
-
 def gauges_of(plan: Plan) -> dict[str, Gauge]:
     """Return the gauges of the batteries, by component."""
-    return dict(_gauges(plan))
-
-
-def _gauges(plan: Plan) -> Iterator[tuple[str, Gauge]]:
+    found = dict[str, Gauge]()
     for instance in plan.instances:
         for drains in declared(instance.type, instance.config, Drains):
             port = component_type(instance.type).ports(instance.config)[drains.level]
             if isinstance(port, Out) and port.interface is not None:
-                yield instance.name, Gauge(instance.topic(drains.level), port.interface.TYPE, port.unit)
+                found[instance.name] = Gauge(instance.topic(drains.level), port.interface.TYPE, port.unit)
+    return found
 
 
 def teleoperated(plan: Plan) -> dict[str, str]:
@@ -107,42 +96,6 @@ def _written(instance: Instance) -> set[str]:
     return {instance.topic(name) for name, port in ports.items() if isinstance(port, Out)}
 
 
-class _Supervisor(Protocol):
-    conductor: Conductor
-
-    def send(self, process: str, message: messages.ChannelOrder) -> None: ...
-
-
-class SettingLine:
-    """What changes of settings can do; `changes` are those changes."""
-
-    def __init__(self, supervisor: _Supervisor, judge: Judge) -> None:
-        self._supervisor, self._judge = supervisor, judge
-        self.changes = SettingChanges(self)
-
-    def plan(self) -> Plan:
-        """Return the plan in effect."""
-        return self._supervisor.conductor.plan
-
-    def reached(self) -> Collection[str]:
-        """Return the processes that take orders; none if the robot goes down."""
-        return self._supervisor.conductor.reached
-
-    def send(self, process: str, message: messages.ChannelOrder) -> None:
-        """Send a message to a process."""
-        self._supervisor.send(process, message)
-
-    def judge(self, now: list[str], new: list[str], then: WhenJudged) -> None:
-        """Ask the judge."""
-        conductor = self._supervisor.conductor
-        file = os.path.realpath(conductor.plan.file)
-        self._judge.ask(conductor.generation, file, conductor.layers, now, new, then)
-
-    def close(self) -> None:
-        """End the judge."""
-        self._judge.close()
-
-
 _TAIL = 8000  # [B] of a process's printed output that go into the log
 _LONGEST_WAIT = 60.0  # [s]
 _ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -159,21 +112,14 @@ class _Child:
     wanted_end: signal.Signals | None = None  # to be sent as soon as it is forked
 
 
-@dataclass(frozen=True)
-class _Lasting:
-    """What of the state does not change while a plan runs: it takes long to find out, and is written often."""
-
-    plan: Plan
-
-    @cached_property
-    def state(self) -> dict[str, Any]:
-        """Return it, as arguments of `RobotState`."""
-        return {
-            "batteries": gauges_of(self.plan),
-            "executive": _executive(self.plan),
-            "teleoperated": teleoperated(self.plan),
-            "rest_time": rest_time(self.plan),
-        }
+def _lasting(plan: Plan) -> dict[str, Any]:
+    """Return what of the state does not change while a plan runs, as arguments of `RobotState`."""
+    return {
+        "batteries": gauges_of(plan),
+        "executive": _executive(plan),
+        "teleoperated": teleoperated(plan),
+        "rest_time": rest_time(plan),
+    }
 
 
 class Supervisor:
@@ -188,15 +134,15 @@ class Supervisor:
         self._selector = selectors.DefaultSelector()
         self._children: dict[str, _Child] = {}
         self._interrupts = 0
-        self._manager = of_this_process()
+        self._manager = ServiceManager(os.environ)  # that of this process
         self._is_state_old = False  # the state file is out of date
-        self._lasting = _Lasting(launch.plan)
+        self._lasting: tuple[Plan, dict[str, Any]] | None = None  # it takes long to find out, and is written often
         self._complained = ""
         router = None if launch.plan.bus.router else ROUTER
         self.conductor = Conductor(launch.plan, launch.options, self._scheduler, self, router=router)
-        judge = Judge(launch.rules, launch.title("rules"), self._selector, self._scheduler)
-        self.settings = SettingLine(self, judge)
-        self._requests = RequestHandler(self, self.settings.changes, is_stepped=launch.options.is_stepped)
+        self._judge = Judge(launch.rules, launch.title("rules"), self._selector, self._scheduler)
+        self._settings = SettingChanges(self)
+        self._requests = RequestHandler(self, self._settings, is_stepped=launch.options.is_stepped)
         self._wake, self._wakened = socket.socketpair()
         for end in (self._wake, self._wakened):
             end.setblocking(False)
@@ -238,7 +184,7 @@ class Supervisor:
 
     def _close(self) -> None:
         self._control.close()
-        self.settings.close()
+        self._judge.close()
         if self._parent is not None:
             self._parent.end()
         signal.set_wakeup_fd(-1)
@@ -339,6 +285,22 @@ class Supervisor:
         """Refuse a request."""
         self._control.refuse(number, reason)
 
+    # Changes of settings
+
+    def plan(self) -> Plan:
+        """Return the plan in effect."""
+        return self.conductor.plan
+
+    def reached(self) -> Collection[str]:
+        """Return the processes that take orders; none if the robot goes down."""
+        return self.conductor.reached
+
+    def judge(self, now: list[str], new: list[str], then: WhenJudged) -> None:
+        """Ask whether components may have the configurations `new`, where others have those of `now`."""
+        conductor = self.conductor
+        file = os.path.realpath(conductor.plan.file)
+        self._judge.ask(conductor.generation, file, conductor.layers, now, new, then)
+
     # What happens
 
     def _receive(self, name: str, channel: messages.Channel) -> None:
@@ -350,7 +312,7 @@ class Supervisor:
             self._selector.unregister(channel)
         for message in received:
             self.conductor.receive(name, message)  # type: ignore[arg-type]
-            self.settings.changes.receive(name, message)  # type: ignore[arg-type]
+            self._settings.receive(name, message)  # type: ignore[arg-type]
             self._requests.consultations.receive(name, message)  # type: ignore[arg-type]
 
     def _receive_from_parent(self) -> None:
@@ -389,7 +351,7 @@ class Supervisor:
         if printed and self.conductor.is_going_down:
             self.log(Level.OK, f"process '{name}' {how}; what it had printed is in the log file", printed)
         self.conductor.exited(name, how, printed)
-        self.settings.changes.gone(name)
+        self._settings.gone(name)
         self._requests.consultations.gone(name)
 
     def _printed(self, name: str) -> str:
@@ -440,7 +402,7 @@ class Supervisor:
         """End a pre-fork parent that a signal has suspended: it neither forks nor reports the end of a process."""
         now, looked = self._clock.now(), self._parent_looked
         self._parent_looked = now
-        if self._parent is None or not self._parent.process.is_stopped or now - looked > silence.SILENT:
+        if self._parent is None or not self._parent.process.is_stopped or now - looked > SILENT_FOR:
             self._parent_ran = now  # or this process did not run itself, so it cannot know
         elif now - self._parent_ran > DEAD:
             self.log(Level.ERROR, "the pre-fork parent was suspended by a signal and is killed")
@@ -478,8 +440,8 @@ class Supervisor:
         """Return the state for the state file and `ps`."""
         running = {name: child.process for name, child in self._children.items() if child.process is not None}
         plan = self.conductor.plan
-        if self._lasting.plan is not plan:
-            self._lasting = _Lasting(plan)
+        if self._lasting is None or self._lasting[0] is not plan:
+            self._lasting = plan, _lasting(plan)
         components = tuple(
             self._component(instance.name, instance.type, instance.process) for instance in plan.instances
         )
@@ -495,7 +457,7 @@ class Supervisor:
             layers=self.conductor.layers,
             stop=self.conductor.latch.state,
             clocks=self.conductor.hosts.clocks,
-            **self._lasting.state,
+            **self._lasting[1],
         )
 
     def _component(self, name: str, type_name: str, process: str) -> ComponentState:

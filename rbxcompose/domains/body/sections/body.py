@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints, model_validator
 from pydantic_core import PydanticCustomError
@@ -17,7 +17,6 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.units import Quantity, UnitError, parse_quantity
 from rbxcompose.domains.body.description import BodyPart, Description, VirtualJoint, VirtualKind, describe, misfits
 from rbxcompose.domains.body.files import BodyFile
-from rbxcompose.domains.body.link_pairs import CollisionMatrix, digest_of, read_matrix
 from rbxcompose.manifest.fields import FileName, PieceAttachment
 from rbxcompose.manifest.files import folder_named, resolve, shown_name
 from rbxcompose.manifest.reader import UNREADABLE, read_source
@@ -25,6 +24,9 @@ from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import AlwaysRun, Contents, Reading, WantedComponent, Wiring
 from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.validate import WRONG_TYPE
+
+if TYPE_CHECKING:
+    from rbxcompose.domains.body.link_pairs import CollisionMatrix
 
 STALE = kind("RBX2307", Severity.WARNING)
 
@@ -197,6 +199,8 @@ def _matrix(reading: Reading[BodyModel], node: TreeNode, read: BodyModel, found:
     """Return the pairs of the file that the body names; None if there is none for just this body."""
     if read.collisions is None:
         return None
+    from rbxcompose.domains.body.link_pairs import digest_of, read_matrix  # which only robots with such a file need
+
     span, command = value_span(node, ("collisions",)), "run 'rbxcompose arm setup'"
     path = resolve(read.collisions, _writer(reading, span), span)
     if isinstance(path, Finding):

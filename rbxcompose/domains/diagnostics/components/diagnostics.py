@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.diagnostics import requests
-from rbxcompose.domains.diagnostics.core import Aggregator, TreeRow
-from rbxcompose.domains.diagnostics.ros1 import Ros1Aggregator
 from rbxcompose.domains.diagnostics.settings import DiagnosticsModel
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.sdk import Component, In, MessageLimits, Out, Refused, answers, component
+
+if TYPE_CHECKING:
+    from rbxcompose.domains.diagnostics.core import TreeRow
 
 PAUSE = 0.05  # [s] between two reports at least, so that flapping levels cost little
 MOST_ARRAYS, ARRAY = (
@@ -50,6 +52,9 @@ class Diagnostics(Component[DiagnosticsConfig]):
 
     def configure(self) -> None:
         """Build the core."""
+        from rbxcompose.domains.diagnostics.core import Aggregator  # which only a running robot needs
+        from rbxcompose.domains.diagnostics.ros1 import Ros1Aggregator
+
         made = Ros1Aggregator if self.config.profile == "ros1" else Aggregator
         self.core: Aggregator | Ros1Aggregator = made(self.config, self.config.expected, started=self.now)
         self.levels: dict[str, Level] = {}
@@ -61,13 +66,10 @@ class Diagnostics(Component[DiagnosticsConfig]):
     def take_over(self, old: Diagnostics) -> None:
         """Keep what is known: statuses, levels of groups that stay, and the history."""
         self.levels, self.published = old.levels, old.published
-        match self.core, old.core:
-            case (Aggregator() as core, Aggregator() as before):
-                core.take_over(before, self.now)
-            case (Ros1Aggregator() as core, Ros1Aggregator() as before):
-                core.take_over(before, self.now)
-            case _:
-                self.core.history = old.core.history
+        if type(self.core) is type(old.core):
+            self.core.take_over(old.core, self.now)  # type: ignore[arg-type]
+        else:
+            self.core.history = old.core.history
 
     def on_diagnostics(self, message: DiagnosticArray) -> None:
         """Take statuses and report immediately if a group's level has changed."""

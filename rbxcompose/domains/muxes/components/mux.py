@@ -14,18 +14,7 @@ from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.requests import Command, Refused, answers
 from rbxcompose.base.units import MOST
 from rbxcompose.domains.muxes import requests
-from rbxcompose.domains.muxes.account import lock_states, states_of, why
-from rbxcompose.domains.muxes.config import (
-    NOBODY,
-    TIMELESS,
-    AddedInput,
-    MuxConfig,
-    core_of,
-    handover_limits,
-    is_own,
-    source_of,
-)
-from rbxcompose.domains.muxes.core import NEVER
+from rbxcompose.domains.muxes.config import NOBODY, TIMELESS, AddedInput, MuxConfig, handover_limits, is_own
 from rbxcompose.domains.muxes.requests import AddMuxInput, DeleteMuxInput, LockMuxInputs, SelectMuxInput
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.fields import is_finite
@@ -150,7 +139,11 @@ class Mux(Component[MuxConfig]):
 
     def configure(self) -> None:
         """Build the core; a mux restarted while the robot is stopped starts closed."""
+        from rbxcompose.domains.muxes.account import MuxAccount  # which only a running mux needs
+        from rbxcompose.domains.muxes.core import core_of
+
         self.core = core_of(self.config, is_stopped=self.context.is_stopped)
+        self.account = MuxAccount(self.core)
         self.topics = {name: self.config.topic_of(name) for name in self.config.inputs}
         self.reported: object = None
         self.announced: str | None = None
@@ -259,12 +252,12 @@ class Mux(Component[MuxConfig]):
             config.mode,
             config.profile,
             now,
-            why(core, now),
+            self.account.why(now),
             core.active,
             until if until < math.inf else None,
             core.arbiter.selected,
-            states_of(core, self.topics, self.received_at, now, has_priorities=config.has_priorities),
-            lock_states(core, {name: config.topic_of(name) for name in config.locks}, now),
+            self.account.inputs(self.topics, self.received_at, now, has_priorities=config.has_priorities),
+            self.account.locks({name: config.topic_of(name) for name in config.locks}, now),
         )
 
     @answers(requests.ReadMuxChanges)
@@ -309,7 +302,7 @@ class Mux(Component[MuxConfig]):
         names = [self.known(name) for name in request.inputs] or list(self.core.inputs)
         if request.seconds is not None and not 0 < request.seconds < MOST:  # false for NaN, too
             raise Refused("a lock takes a finite time above 0 s")
-        self.core.lock(names, NEVER if request.seconds is None else self.now + request.seconds, self.now)
+        self.core.lock(names, math.inf if request.seconds is None else self.now + request.seconds, self.now)
         self.orders.keep(requests.LockMuxInputs(self.name, tuple(names), request.seconds))
         self.send(self.core.tick(self.now))
         self.changed()
@@ -370,6 +363,8 @@ class Mux(Component[MuxConfig]):
             raise Refused(f"'{self.name}' already has the input '{name}'")
         if is_own(name) or name in self.config.locks:
             raise Refused(f"'{name}' cannot be the name of an input: '{self.name}' needs it itself")
+        from rbxcompose.domains.muxes.core import source_of
+
         config = self.checked(request)
         self.context.listen(_input(name, topic, self.config, None))
         self.listening.add(name)
@@ -445,7 +440,7 @@ class Mux(Component[MuxConfig]):
             self.context.wake_at(deadline)
         active = "stop" if self.core.is_stopped else self.core.active
         locked, refused = self.core.locked_out(self.now), self.core.refused(self.now)
-        text = why(self.core, self.now)
+        text = self.account.why(self.now)
         if (text, active, locked) != self.reported:
             self.reported = text, active, locked
             level = Level.WARN if locked else Level.OK

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from rbxcompose.base.config import Config, Frequency, Name, Time
 from rbxcompose.compiler.sections.components import ComponentEntry, components
-from rbxcompose.domains.muxes.config import MODE_OF, HandoverLimits, MuxEnding, MuxMode, MuxProfile, mode_of
+from rbxcompose.domains.muxes.config import MODE_OF, HandoverLimits, MuxEnding, MuxMode, MuxProfile
 from rbxcompose.manifest.fields import PortName, TopicName
 from rbxcompose.manifest.registry import section, sections_in_use
 from rbxcompose.manifest.section import ANY, ROBOT, Contents, Reading, Renames, SetScope, WantedComponent, Wiring
@@ -79,7 +79,7 @@ class MuxModel(Config):
     @property
     def works_by(self) -> MuxMode:
         """Return the mode, which may be left out."""
-        return mode_of(self.mode, self.profile)
+        return self.mode or MODE_OF[self.profile]
 
     @property
     def has_priorities(self) -> bool:

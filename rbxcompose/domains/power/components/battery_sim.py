@@ -1,4 +1,4 @@
-"""The simulated battery."""
+"""The simulated battery, and its twin: a charge that drains evenly."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pydantic import Field
 
 from rbxcompose import sdk
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.power.battery_twin import BatteryCore, BatterySettings
 from rbxcompose.msgs.rbxcompose_msgs import SetBatteryLevel
 from rbxcompose.msgs.std_msgs import Float32
 
 PERCENT = 100.0  # a `battery_level` message counts from 0 to 100
 DIGITS = 6  # of a percentage; further ones are rounding errors, which would put 80 % below 80 %
+NOTHING_LEFT = 1e-9  # anything less is rounding from many small steps, not charge
 
 
 class BatterySimConfig(sdk.Config):
@@ -27,6 +27,51 @@ class BatterySimConfig(sdk.Config):
     """Below this charge its status is WARN."""
     error: Annotated[sdk.Ratio, sdk.Live()] = Field(0.2, ge=0, le=1)
     """Below this charge its status is ERROR."""
+
+
+class BatteryCore:
+    """Charge that falls from 1 to 0 over `settings.runtime`; replacing `settings` keeps the level."""
+
+    def __init__(self, settings: BatterySimConfig, level: float = 1.0) -> None:
+        self._settings = settings
+        self._start, self._drained = level, 0.0  # a ratio, and how long it has drained since then [s]
+
+    @property
+    def settings(self) -> BatterySimConfig:
+        """How it drains and warns."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: BatterySimConfig) -> None:
+        self.set(self.level)
+        self._settings = settings
+
+    @property
+    def level(self) -> float:
+        """Charge as a ratio from 0 to 1, computed from the total time: steps would accumulate rounding errors."""
+        runtime = self._settings.runtime
+        left = (self._start * runtime - self._drained) / runtime
+        return left if left > NOTHING_LEFT else 0.0
+
+    @property
+    def status(self) -> tuple[Level, str]:
+        """Diagnostic level and a message for people."""
+        if self.level < self.settings.error:
+            return Level.ERROR, "Low battery"
+        if self.level < self.settings.warn:
+            return Level.WARN, "Medium battery"
+        return Level.OK, "Battery OK"
+
+    def set(self, level: float) -> str:
+        """Set the charge; return the reason if `level` is not a ratio from 0 to 1, else nothing."""
+        if not 0.0 <= level <= 1.0:
+            return f"a battery level is between 0 % and 100 %, not at {level * 100:g} %"
+        self._start, self._drained = level, 0.0
+        return ""
+
+    def step(self, dt: float) -> None:
+        """Drain for `dt` [s]."""
+        self._drained += dt
 
 
 @sdk.component("battery_sim")
@@ -52,12 +97,12 @@ class BatterySim(sdk.Component[BatterySimConfig]):
 
     def configure(self) -> None:
         """Fill the battery."""
-        self.core = BatteryCore(settings_of(self.config), self.config.initial)
+        self.core = BatteryCore(self.config, self.config.initial)
         self.reported = Level.OK
 
     def reconfigure(self, old: BatterySimConfig) -> None:
         """Apply the new runtime and thresholds; the charge stays unchanged."""
-        self.core.settings = settings_of(self.config)
+        self.core.settings = self.config
         self.publish()
 
     def activate(self) -> None:
@@ -86,8 +131,3 @@ class BatterySim(sdk.Component[BatterySimConfig]):
         if level is not self.reported:
             self.context.log(level, f"{message}: {percent:.0f} %")
             self.reported = level
-
-
-def settings_of(config: BatterySimConfig) -> BatterySettings:
-    """Return the settings of the core."""
-    return BatterySettings(runtime=config.runtime, warn=config.warn, error=config.error)
