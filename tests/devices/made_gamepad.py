@@ -15,7 +15,7 @@ import pytest
 from evdev.eventio import EventIO
 
 from rbxcompose.commands.main import main
-from rbxcompose.domains.devices import event_devices
+from rbxcompose.domains.devices.components import gamepad
 
 EVENT = struct.Struct("llHHi")  # struct input_event
 STICKS = (evdev.ecodes.ABS_X, evdev.ecodes.ABS_Y, evdev.ecodes.ABS_RX, evdev.ecodes.ABS_RY)
@@ -109,7 +109,7 @@ class PipedDevice(EventIO):
 def let_be_made(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let gamepads of this folder be those of the machine."""
     monkeypatch.setattr(evdev, "InputDevice", PipedDevice)
-    monkeypatch.setattr(event_devices, "FOLDER", folder)
+    monkeypatch.setattr(gamepad, "FOLDER", folder)
 
 
 if __name__ == "__main__":  # FOLDER WORD ...: `rbxcompose WORD ...` on a machine whose gamepads are in a folder

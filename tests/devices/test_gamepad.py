@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.domains.devices.gamepad import ABS_X, ABS_Y, PadLayout, PadState
+from rbxcompose.domains.devices.components.gamepad import ABS_X, ABS_Y, PadLayout, PadState
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.sensor_msgs import Joy

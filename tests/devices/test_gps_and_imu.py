@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import rotate
-from rbxcompose.domains.devices.inertial_boards import GRAVITY, VectornavDecoder, WitmotionDecoder
+from rbxcompose.domains.devices.components.imu import GRAVITY, VectornavDecoder, WitmotionDecoder
 from rbxcompose.domains.devices.nmea import (
     GroundVelocity,
     ImpossibleSentenceError,

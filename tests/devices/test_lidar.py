@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.domains.devices.turning_lidar import LENGTH, LidarReader, TurnMaker, crc8
+from rbxcompose.domains.devices.components.lidar import LENGTH, LidarReader, TurnMaker, crc8
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.testing import Bench, instance

@@ -5,9 +5,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.domains.devices.serial_ports import SerialPort
+from rbxcompose.domains.devices.serial_ports import SerialPort, UsbDevice
 from rbxcompose.domains.devices.udev import names_of, proposed, same_serials
-from rbxcompose.domains.devices.usb import UsbDevice
 
 PLACES = st.tuples(st.sampled_from(["1-1", "1-1.2", "2-1"]), st.integers(0, 2))
 KINDS = st.tuples(st.sampled_from(["0403", "1a86"]), st.sampled_from(["6001", "6014"]), st.sampled_from(["", "1", "2"]))

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rbxcompose.domains.devices.serial_ports import UsbDevice, as_udev_writes
 from rbxcompose.domains.devices.udev import rules_text
-from rbxcompose.domains.devices.usb import UsbDevice, as_udev_writes
 
 ADAPTER = UsbDevice("0403", "6001", "A700eUxA", name="arm")
 PLACED = UsbDevice("1a86", "7523", usb_port="1-1.4", interface=2, name="leg")

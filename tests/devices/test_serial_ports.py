@@ -11,11 +11,11 @@ from rbxcompose.domains.devices.serial_ports import (
     DeviceNotUniqueError,
     NoDeviceError,
     SerialPort,
+    UsbDevice,
     latency_timers,
     port_path,
     serial_ports,
 )
-from rbxcompose.domains.devices.usb import UsbDevice
 from tests.devices.machine_tree import MachineTree
 
 

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.base.clock import SteppedClock
-from rbxcompose.domains.devices.components.voice import Voice
-from rbxcompose.domains.devices.speech import Utterance, pipeline_of
+from rbxcompose.domains.devices.components.voice import Utterance, Voice, pipeline_of
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 from rbxcompose.msgs.rbxcompose_msgs import Say
 from rbxcompose.msgs.std_srvs import SetBool

@@ -15,8 +15,7 @@ from rbxcompose.bus.graph import Graph, GraphEnd, GraphName, WireType
 from rbxcompose.bus.wire import RosQos
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.domains.devices.serial_ports import SerialPort
-from rbxcompose.domains.devices.usb import UsbDevice
+from rbxcompose.domains.devices.serial_ports import SerialPort, UsbDevice
 from rbxcompose.runtime.folder import ClockOffset, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.tools import doctor as machine

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.domains.devices.openable import PortFile, look_at, port_findings
-from rbxcompose.domains.devices.serial_ports import SerialPort
-from rbxcompose.domains.devices.usb import UsbDevice
+from rbxcompose.domains.devices.serial_ports import SerialPort, UsbDevice
+from rbxcompose.domains.devices.udev import PortFile, look_at, port_findings
 from rbxcompose.testing import check_text
 from tests.checks import strangers
 

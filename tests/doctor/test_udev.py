@@ -5,10 +5,8 @@ from __future__ import annotations
 import pytest
 
 from rbxcompose.base.findings import Finding, Span
-from rbxcompose.domains.devices.openable import PortFile
-from rbxcompose.domains.devices.serial_ports import SerialPort
-from rbxcompose.domains.devices.udev import Account, device_answers, group_answer, rules_answer
-from rbxcompose.domains.devices.usb import UsbDevice
+from rbxcompose.domains.devices.serial_ports import SerialPort, UsbDevice
+from rbxcompose.domains.devices.udev import Account, PortFile, device_answers, group_answer, rules_answer
 
 ARM = UsbDevice("0403", "6014", "FT4", name="arm")
 PLACE = Span("robot.yaml", 5, 3, 5, 6)

@@ -1,4 +1,4 @@
-"""Rules of udev that give devices their names; whether those of a robot are plugged in and may be opened."""
+"""Rules of udev that give devices their names; whether those of a robot, and its ports, are there and may be opened."""
 
 from __future__ import annotations
 
@@ -7,15 +7,27 @@ import os
 import pwd
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Severity, Span, kind
 from rbxcompose.base.printable import plain
-from rbxcompose.domains.devices.openable import LookAt
-from rbxcompose.domains.devices.serial_ports import FORBIDDEN, PortError, SerialPort, port_of
-from rbxcompose.domains.devices.usb import UsbDevice
+from rbxcompose.compiler.model.flow import setting_span
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.domains.devices.serial_ports import (
+    FORBIDDEN,
+    NO_PORT,
+    UNFIT,
+    PortError,
+    SerialPort,
+    UsbDevice,
+    connected,
+    latency_of,
+    port_of,
+    slow_adapter,
+)
+from rbxcompose.sdk.capabilities import OpensPort
 
 RULES = Path("etc/udev/rules.d")
 """The folder of rules, below the root."""
@@ -193,3 +205,60 @@ def rules_answer(wanted: str, found: str | None, file: str) -> str | Finding:
         return f"{file} has the rules of the robot"
     words = f"{plain(file)} does not exist" if found is None else f"{plain(file)} has other rules"
     return OTHER_RULES.at(None, words, help="sudo rbxcompose udev install")
+
+
+@dataclass(frozen=True, slots=True)
+class PortFile:
+    """What is at the path of a port: `group` owns it, `latency` [s] is how long its adapter holds replies back."""
+
+    exists: bool = True
+    is_device: bool = True
+    may_open: bool = True
+    group: str = ""
+    latency: float | None = None
+
+
+LookAt = Callable[[str], PortFile]
+
+
+def port_findings(robot: Robot, ports: Sequence[SerialPort], look: LookAt) -> Iterator[Finding]:
+    """Yield what is wrong with the ports that components open, given those that are connected."""
+    for component, opens in robot.declared(OpensPort):
+        yield from _of_port(opens.port.value, ports, look, setting_span(robot, (component, opens.port.field)))
+
+
+def _of_port(name: str, ports: Sequence[SerialPort], look: LookAt, span: Span) -> Iterator[Finding]:
+    path = name
+    if wanted := UsbDevice.of(name):
+        try:
+            path = port_of(wanted, ports).path
+        except PortError as error:
+            yield error.finding(span)
+            return
+    file, shown = look(path), plain(path)
+    if not file.exists:
+        yield NO_PORT.at(span, f"{shown} does not exist", help=connected(ports, "serial port"))
+    elif not file.is_device:
+        yield UNFIT.at(span, f"{shown} is not a serial port", help=connected(ports, "serial port"))
+    elif not file.may_open:
+        todo = f"sudo usermod -aG {file.group or 'dialout'} $USER, then log in again"
+        yield FORBIDDEN.at(span, f"{shown} may not be opened by this user", help=todo)
+    elif warning := slow_adapter(path, file.latency, span):
+        yield warning
+
+
+def look_at(path: str) -> PortFile:
+    """Return what is at a path of this machine."""
+    file = Path(path)
+    try:
+        group = _group_name(file.stat().st_gid)
+    except OSError:
+        return PortFile(exists=False)
+    return PortFile(True, file.is_char_device(), os.access(file, os.R_OK | os.W_OK), group, latency_of(path))
+
+
+def _group_name(number: int) -> str:
+    try:
+        return grp.getgrgid(number).gr_name
+    except KeyError:
+        return str(number)

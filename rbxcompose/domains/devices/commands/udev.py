@@ -27,10 +27,9 @@ from rbxcompose.commands.importing.manifest_text import key
 from rbxcompose.commands.options import Declare, Subcommand, add_actions, add_json_option, argument, run_action
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, compiled, robot_path
 from rbxcompose.domains.devices import udev
-from rbxcompose.domains.devices.openable import look_at
 from rbxcompose.domains.devices.sections.devices import devices
-from rbxcompose.domains.devices.serial_ports import ROOT, SerialPort, serial_ports
-from rbxcompose.domains.devices.usb import UsbDevice
+from rbxcompose.domains.devices.serial_ports import ROOT, SerialPort, UsbDevice, serial_ports
+from rbxcompose.domains.devices.udev import look_at
 from rbxcompose.manifest.tree import key_span
 
 GROUP = "system"

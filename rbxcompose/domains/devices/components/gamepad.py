@@ -1,22 +1,334 @@
-"""A gamepad at this machine."""
+"""A gamepad at this machine: what its events mean, and the velocity that a person commands while a button is held.
+
+Codes are those of Linux (`input-event-codes.h`), and `joy` has the order and the signs of ROS's `joy_linux`: axes and
+buttons by their codes, a stick to the left or up is +1, a trigger that nobody touches is +1.
+"""
 
 from __future__ import annotations
 
+import errno
 import math
-from typing import Annotated, Any
+import os
+import select
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field
 
 from rbxcompose import sdk
-from rbxcompose.base.geometry import Velocity2
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.geometry import AT_REST, Velocity2
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.devices.event_devices import EventPad, LostGamepadError, NoGamepadError, listing, open_gamepad
-from rbxcompose.domains.devices.gamepad import REPEATED, AxisName, ButtonName, HeldDrive, HeldSettings
+from rbxcompose.base.printable import plain
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.sensor_msgs import Joy
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
+
+if TYPE_CHECKING:
+    from evdev import InputDevice
+
+EV_SYN, EV_KEY, EV_ABS = 0, 1, 3
+SYN_REPORT, SYN_DROPPED = 0, 3
+ABS_X, ABS_Y, ABS_Z, ABS_RX, ABS_RY, ABS_RZ = range(6)
+ABS_HAT0X, ABS_HAT0Y = 0x10, 0x11
+BTN_JOYSTICK, BTN_GAMEPAD, LAST_BUTTON = 0x120, 0x130, 0x13F
+REPEATED = 0.05  # [s] between two commands that are alike
+
+ButtonName = Literal["a", "b", "x", "y", "l1", "r1", "l2", "r2", "select", "start", "mode", "l3", "r3"]
+AxisName = Literal["left_x", "left_y", "right_x", "right_y", "pad_x", "pad_y"]
+_BUTTONS: Mapping[ButtonName, tuple[int, int]] = {  # as the kernel names them, and on pads that only number them
+    "a": (0x130, 0x121),
+    "b": (0x131, 0x122),
+    "x": (0x133, 0x120),
+    "y": (0x134, 0x123),
+    "l1": (0x136, 0x124),
+    "r1": (0x137, 0x125),
+    "l2": (0x138, 0x126),
+    "r2": (0x139, 0x127),
+    "select": (0x13A, 0x128),
+    "start": (0x13B, 0x129),
+    "mode": (0x13C, 0x12C),
+    "l3": (0x13D, 0x12A),
+    "r3": (0x13E, 0x12B),
+}
+_AXES: Mapping[AxisName, tuple[int, int]] = {  # with a right stick that is RX and RY, and on pads where it is Z and RZ
+    "left_x": (ABS_X, ABS_X),
+    "left_y": (ABS_Y, ABS_Y),
+    "right_x": (ABS_RX, ABS_Z),
+    "right_y": (ABS_RY, ABS_RZ),
+    "pad_x": (ABS_HAT0X, ABS_HAT0X),
+    "pad_y": (ABS_HAT0Y, ABS_HAT0Y),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class PadLayout:
+    """Which axes a device has, by code with the least and the greatest value of each, and which keys."""
+
+    axes: Mapping[int, tuple[int, int]]
+    keys: tuple[int, ...]
+
+    @property
+    def is_gamepad(self) -> bool:
+        """Return whether it has a stick and buttons of a gamepad; mice, keyboards and touch pads have not."""
+        return {ABS_X, ABS_Y} <= self.axes.keys() and bool(self.buttons)
+
+    @property
+    def buttons(self) -> tuple[int, ...]:
+        """Return the codes of its buttons."""
+        return tuple(sorted(code for code in self.keys if BTN_JOYSTICK <= code <= LAST_BUTTON))
+
+    def button(self, name: ButtonName) -> int | None:
+        """Return the code of a button; None if it has no such."""
+        named, numbered = _BUTTONS[name]
+        code = named if any(key >= BTN_GAMEPAD for key in self.buttons) else numbered
+        return code if code in self.keys else None
+
+    def axis(self, name: AxisName) -> int | None:
+        """Return the code of an axis; None if it has no such."""
+        usual, other = _AXES[name]
+        code = usual if ABS_RX in self.axes else other
+        return code if code in self.axes else None
+
+    def lacks(self, button: ButtonName, axes: Iterable[AxisName]) -> list[str]:
+        """Return which of these it does not have."""
+        missing = [f"button {button}"] if self.button(button) is None else []
+        return missing + [f"axis {name}" for name in dict.fromkeys(axes) if self.axis(name) is None]
+
+
+class PadState:
+    """Where the sticks of a device are and which of its buttons are down, by its events."""
+
+    def __init__(self, layout: PadLayout) -> None:
+        self.layout = layout
+        self._axes = {code: (least + most) / 2 for code, (least, most) in layout.axes.items()}
+        self._down: set[int] = set()
+        self.lost_events = False  # the kernel dropped some: until the state was read anew, nothing counts
+
+    def read_anew(self, axes: Mapping[int, int], down: Iterable[int]) -> None:
+        """Take the whole state, as it is at the first moment and after events were lost."""
+        self._axes |= {code: float(value) for code, value in axes.items() if code in self._axes}
+        self._down = set(down)
+        self.lost_events = False
+
+    def feed(self, type_: int, code: int, value: int) -> None:
+        """Take an event."""
+        if type_ == EV_SYN and code == SYN_DROPPED:
+            self.lost_events = True
+        elif type_ == EV_ABS and code in self._axes:
+            self._axes[code] = float(value)
+        elif type_ == EV_KEY and value:
+            self._down.add(code)
+        elif type_ == EV_KEY:
+            self._down.discard(code)
+
+    def is_down(self, button: ButtonName) -> bool:
+        """Return whether a button is down."""
+        return self.layout.button(button) in self._down
+
+    def position(self, name: AxisName, dead_zone: float) -> float:
+        """Return where an axis is, from -1 (right, down) to 1 (left, up); 0 within the dead zone, and without it."""
+        code = self.layout.axis(name)
+        return 0.0 if code is None else self._position(code, dead_zone)
+
+    def axes(self, dead_zone: float) -> list[float]:
+        """Return all axes, as `joy_linux` orders them."""
+        return [self._position(code, dead_zone) for code in sorted(self._axes)]
+
+    def buttons(self) -> list[int]:
+        """Return all buttons: 1 is down."""
+        return [int(code in self._down) for code in self.layout.buttons]
+
+    def _position(self, code: int, dead_zone: float) -> float:
+        least, most = self.layout.axes[code]
+        if most <= least:
+            return 0.0
+        value = -(2.0 * (self._axes[code] - least) / (most - least) - 1.0)
+        # Sticks with an even number of values have no middle: 127 of 255 is at rest, too, within any dead zone.
+        beyond = max(0.0, min(abs(value), 1.0) - dead_zone) / (1.0 - dead_zone)
+        return math.copysign(beyond, value) if beyond else 0.0
+
+
+class HeldDrive:
+    """Commands while the button is held, and a single zero at the end of that.
+
+    The button counts only after it was seen released: a pad that is plugged in with the button down moves nothing, nor
+    does one whose button was held through a stop. Of a pad out of reach of its radio, the kernel knows nothing for
+    seconds; a hand on a stick is never quite still, so that a held button without any event ends, too.
+    """
+
+    def __init__(self, config: GamepadConfig) -> None:
+        self.config = config
+        self.is_driving = False
+        self.is_silent = False  # the last drive ended because the pad sent nothing
+        self._is_armed = self._is_down = False
+        self._heard_at = self._sent_at = -math.inf
+        self._sent = AT_REST
+
+    @property
+    def must_be_released(self) -> bool:
+        """Return whether the button is held, and counts only after it was released."""
+        return self._is_down and not self._is_armed
+
+    def disarm(self) -> None:
+        """Let the button, if it is held, count only after it was released: the robot was stopped."""
+        self._is_armed = not self._is_down
+
+    def hear(self, now: float, *, is_down: bool) -> None:
+        """Take where the button is, as the pad has just said."""
+        self._heard_at, self._is_down = now, is_down
+        self._is_armed = self._is_armed or not is_down
+        self.is_silent = self.is_silent and is_down
+
+    def forget(self) -> None:
+        """Take the pad for gone: until it is heard again, nobody knows where its button is."""
+        self._is_down = self._is_armed = False
+
+    def command(self, now: float, forwards: float, turn: float) -> Velocity2 | None:
+        """Return the velocity to send now, None for silence; `forwards` and `turn` are the axes, from -1 to 1."""
+        if self.is_driving and now - self._heard_at > self.config.silence:
+            self.is_silent = True
+            self.disarm()
+        if not (self._is_down and self._is_armed):
+            ends, self.is_driving = self.is_driving, False
+            return AT_REST if ends else None
+        wanted = Velocity2(forwards * self.config.max_speed, turn * self.config.max_turn_rate)
+        if self.is_driving and wanted == self._sent and now - self._sent_at < REPEATED - 1e-6:
+            return None
+        self.is_driving, self._sent, self._sent_at = True, wanted, now
+        return wanted
+
+
+FOLDER = Path("/dev/input")
+JOIN_GROUP = 'sudo usermod -aG input $USER, then log in again; or a udev rule with TAG+="uaccess"'
+_PREFIX = "event"
+_MOST = 16  # reads of 64 events each in one go: a device that floods holds nothing up, and the kernel drops the rest
+
+
+class NoGamepadError(Exception):
+    """Raised when there is no gamepad to open, with the reason and what helps; `is_wrong` if waiting does not."""
+
+    def __init__(self, problem: str, help: str = "", *, is_wrong: bool = False) -> None:
+        super().__init__(problem)
+        self.help, self.is_wrong = help, is_wrong
+
+
+class LostGamepadError(Exception):
+    """Raised when an open gamepad has gone."""
+
+
+class EventPad:
+    """An open gamepad."""
+
+    def __init__(self, device: InputDevice[str], layout: PadLayout) -> None:
+        self._device = device
+        self.name, self.path = plain(device.name), str(device.path)
+        self.state = PadState(layout)
+        self._read_anew()
+
+    def read(self, patience: float) -> Iterator[None]:
+        """Wait for events for up to `patience` [s], and yield after each that was taken.
+
+        Raises:
+            LostGamepadError: if the gamepad has gone.
+        """
+        try:
+            for _ in range(_MOST):
+                if not select.select([self._device.fd], [], [], patience)[0]:
+                    return
+                events, patience = list(self._device.read()), 0.0
+                if not events:
+                    raise LostGamepadError(f"{self.path} has ended")
+                for event in events:
+                    self.state.feed(event.type, event.code, event.value)
+                    if not self.state.lost_events:
+                        yield
+                if self.state.lost_events:
+                    self._read_anew()
+                    yield
+        except (OSError, ValueError) as error:
+            raise LostGamepadError(str(error)) from error
+
+    def close(self) -> None:
+        """Close it."""
+        self._device.close()
+
+    def _read_anew(self) -> None:
+        axes = {code: self._device.absinfo(code).value for code in self.state.layout.axes}
+        self.state.read_anew(axes, self._device.active_keys())
+
+
+def listing(folder: Path | None = None) -> tuple[tuple[str, int], ...]:
+    """Return the input devices that are there now, each with when it or its rights changed: cheap to compare."""
+    try:
+        with os.scandir(folder or FOLDER) as entries:
+            found = [(entry.path, entry.stat().st_ctime_ns) for entry in entries if entry.name.startswith(_PREFIX)]
+    except OSError:
+        return ()  # none was ever plugged in, or it went meanwhile
+    return tuple(sorted(found, key=lambda item: (len(item[0]), item[0])))
+
+
+def open_gamepad(wanted: str, hold: ButtonName, axes: tuple[AxisName, ...]) -> EventPad:
+    """Open the gamepad with this path, or part of a name; without either, the first one.
+
+    Raises:
+        NoGamepadError: if there is none, or it lacks the button or an axis.
+    """
+    is_path = wanted.startswith("/")
+    paths = [wanted] if is_path else [path for path, _ in listing()]
+    forbidden: list[str] = []
+    others: list[str] = []
+    for path in paths:
+        try:
+            device = _opened(path)
+        except PermissionError:
+            forbidden.append(path)
+            continue
+        except OSError as error:
+            if is_path and error.errno not in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+                words = "is no event device of the kernel"
+                raise NoGamepadError(
+                    f"{path} {words}", "name one that ends in -event-joystick", is_wrong=True
+                ) from error
+            continue  # it went meanwhile
+        try:
+            layout = _layout(device)
+            name = plain(device.name)
+            if is_path or wanted.casefold() in name.casefold():
+                if not (missing := layout.lacks(hold, axes)) and layout.is_gamepad:
+                    return EventPad(device, layout)
+                if wanted:
+                    lacking = f"it has no {' and no '.join(missing)}" if missing else "it has no stick and buttons"
+                    others.append(f"{path} ({name}) cannot drive: {lacking}")
+        except OSError:
+            others.append(f"{path} went while it was opened")
+        device.close()
+    if others:
+        raise NoGamepadError(others[0], is_wrong=True)
+    if is_path and forbidden:
+        raise NoGamepadError(f"{wanted} may not be read by this user", JOIN_GROUP, is_wrong=True)
+    named = f" with '{wanted}' in its name" if wanted and not is_path else ""
+    problem = f"{wanted} is not connected" if is_path else f"no gamepad{named} is connected"
+    if not forbidden:
+        raise NoGamepadError(problem)
+    hidden = f"{len(forbidden)} input device{'s' if len(forbidden) > 1 else ''}"
+    raise NoGamepadError(f"{problem}, or this user may not read it: {hidden} may not be read", JOIN_GROUP)
+
+
+def _opened(path: str) -> InputDevice[str]:
+    import evdev
+
+    return evdev.InputDevice(path, readonly=True)
+
+
+def _layout(device: InputDevice[str]) -> PadLayout:
+    found: dict[int, list[Any]] = dict(device.capabilities())  # evdev's own type says nothing of ranges
+    axes = {code: (info.min, info.max) for code, info in found.get(EV_ABS, ())}
+    return PadLayout(axes, tuple(found.get(EV_KEY, ())))
+
 
 _WAIT = 0.008  # [s] of a step in which it waits for events, in real time
 _AGAIN = 1.0  # [s] between two looks for a gamepad that is not there
@@ -90,7 +402,7 @@ class Gamepad(sdk.Component[GamepadConfig]):
         """Begin without a gamepad."""
         self.pad: EventPad | None = None
         self.at_end.callback(self.close)
-        self.held = HeldDrive(settings_of(self.config))
+        self.held = HeldDrive(self.config)
         self.patience = _WAIT if self.context.clock.is_real else 0.0
         self.there: object = None  # the input devices when it looked the last time
         self.looked_at = self.published_at = -math.inf
@@ -99,7 +411,7 @@ class Gamepad(sdk.Component[GamepadConfig]):
 
     def reconfigure(self, old: GamepadConfig) -> None:
         """Follow other speeds."""
-        self.held.settings = settings_of(self.config)
+        self.held.config = self.config
 
     @property
     def is_at_rest(self) -> bool:
@@ -229,8 +541,3 @@ class Gamepad(sdk.Component[GamepadConfig]):
         if self.pad is not None:
             self.pad.close()
             self.pad = None
-
-
-def settings_of(config: GamepadConfig) -> HeldSettings:
-    """Return the settings of the core."""
-    return HeldSettings(config.max_speed, config.max_turn_rate, config.silence)

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, ValidationInfo
 
 from rbxcompose.base.config import DEVICE, DEVICE_PORT, PREFIXED, Config, Refers
 from rbxcompose.base.findings import Finding, Related, Severity, Span, kind
-from rbxcompose.domains.devices.usb import USB_PORT, UsbDevice
+from rbxcompose.domains.devices.serial_ports import USB_PORT, UsbDevice
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
 
