@@ -26,10 +26,8 @@ from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.bundle import NOT_EXPORTED, BundledFile, files_of
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.tools.commands.needs import requirements
-from rbxcompose.tools.exporting import compose, kubernetes, ros2, systemd
-from rbxcompose.tools.exporting.exported_share import shares
-from rbxcompose.tools.exporting.foxglove import foxglove_layout
-from rbxcompose.tools.exporting.rviz import rviz_config
+from rbxcompose.tools.exporting import ros2, shares
+from rbxcompose.tools.exporting.viewers import foxglove_layout, rviz_config
 
 GROUP = "system"
 SRDF, ROS2, RVIZ, FOXGLOVE, BT = "srdf", "ros2", "rviz", "foxglove", "bt"
@@ -118,7 +116,7 @@ def _export_mission(arguments: argparse.Namespace) -> int:
 
 
 def _made(system: System, arguments: argparse.Namespace) -> dict[str, BundledFile]:
-    found, (file, files) = list(shares(system, arguments.host)), files_of(system)
+    found, (file, files) = list(shares.shares(system, arguments.host)), files_of(system)
     match arguments.program:
         case "systemd":
             words = {
@@ -126,14 +124,14 @@ def _made(system: System, arguments: argparse.Namespace) -> dict[str, BundledFil
                 "file": arguments.file or str(system.path),
                 "user": arguments.user or getpass.getuser(),
             }
-            made = {systemd.unit_name(item): systemd.unit(item, **words) for item in found}
+            made = {shares.unit_name(item): shares.unit(item, **words) for item in found}
         case "compose":
-            text = compose.compose_file(found, system=system.name, file=file)
+            text = shares.compose_file(found, system=system.name, file=file)
             needed = requirements([placed.robot for placed in system.robots.values()], __version__)
-            made = {"Dockerfile": compose.dockerfile(needed), "compose.yaml": text}
+            made = {"Dockerfile": shares.dockerfile(needed), "compose.yaml": text}
             return {**_encoded(made), **{f"project/{name}": one for name, one in files.items()}}
         case _:
-            made = kubernetes.manifests(found, system=system.name, file=file, files=files, image=arguments.image)
+            made = shares.kubernetes_manifests(found, system=system.name, file=file, files=files, image=arguments.image)
     return _encoded(made)
 
 
