@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    return visit(arguments, lambda guest: int(arguments.do(ParameterNodes(guest, arguments.timeout), arguments)))
+    return visit(arguments, lambda guest: options.run_action(arguments, ParameterNodes(guest, arguments.timeout)))
 
 
 def run_on_system(command: SystemCommand) -> int | None:
