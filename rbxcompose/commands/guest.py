@@ -33,7 +33,7 @@ from rbxcompose.bus.zenoh_session import open_client, open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport, direct
 from rbxcompose.commands import options
 from rbxcompose.commands.console import NotDoneError, emit, table
-from rbxcompose.commands.interrupts import ENDINGS
+from rbxcompose.commands.interrupts import ENDINGS, handling
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place
 from rbxcompose.runtime.process_group.connection import CallbackInbox
 from rbxcompose.sdk.ports import Qos
@@ -203,13 +203,8 @@ class Guest:
             signal.signal(number, before[signal.Signals(number)])
             self._inbox.put(NAME, interrupted)
 
-        for number in ENDINGS:
-            signal.signal(number, note)
-        try:
+        with handling(note):
             yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
 
     def _lasting(self, router: str) -> zenoh.Session:
         try:
@@ -251,13 +246,15 @@ def _complain(owner: str, text: str) -> None:
     sys.stderr.write(f"{text}\n")
 
 
-Do = Callable[[Guest, argparse.Namespace], int]
-
-
 def visit(arguments: argparse.Namespace, do: Callable[[Guest], int]) -> int:
     """Join the chosen bus, run `do` there, and return the exit code."""
     with Guest(find_place(arguments)) as guest:
         return do(guest)
+
+
+def visit_for_action(arguments: argparse.Namespace) -> int:
+    """Run the chosen subcommand on the chosen bus, and return the exit code."""
+    return visit(arguments, lambda guest: options.run_action(arguments, guest))
 
 
 def wanted(names: Sequence[GraphName], name: str, what: str) -> GraphName:
@@ -305,19 +302,20 @@ def described(graph_name: GraphName, ends: tuple[str, str]) -> dict[str, Any]:
 
 
 def add_server_verbs(
-    parser: argparse.ArgumentParser, noun: str, verb: tuple[str, str], content: str, example: str, do: Sequence[Do]
+    parser: argparse.ArgumentParser, noun: str, verb: tuple[str, str], content: str, example: str
 ) -> None:
-    """Declare the subcommands of services or actions: `ls`, and a `verb` with its help, which sends a `content`.
+    """Declare the subcommands of services or actions: `ls`, and a `verb` with its help, which sends a `content`."""
 
-    `do` has the functions that carry them out, in this order.
-    """
+    def list_all(guest: Guest, arguments: argparse.Namespace) -> int:
+        return write_names(getattr(guest.graph(), f"{noun}s"), ("servers", "clients"), arguments)
+
     named = options.argument("name", metavar=noun.upper(), help=f"its name, such as {example}")
     words = "YAML; missing fields are zero"
     written = options.argument("content", metavar=content.upper(), nargs="?", default="", help=words)
     sent = (named, written, partial(options.add_timeout_option, default="5s"), options.add_json_option)
     actions = (
-        options.Subcommand("ls", f"list the {noun}s with their types", do[0], (options.add_ls_options,)),
-        options.Subcommand(*verb, do[1], sent),
+        options.Subcommand("ls", f"list the {noun}s with their types", list_all, (options.add_ls_options,)),
+        options.Subcommand(*verb, options.deferred("rbxcompose.commands.messages", verb[0]), sent),
     )
     options.add_actions(parser, actions, add_bus_options, options.add_system_options)
 

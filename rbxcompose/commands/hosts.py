@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -24,7 +25,7 @@ from rbxcompose.base.files import alone_in, read_regular, replace_file
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import NotDoneError, ReportedError, emit, refuse, write_report
-from rbxcompose.commands.interrupts import INTERRUPTED, noted_interrupts
+from rbxcompose.commands.interrupts import INTERRUPTED, handling, noted_interrupts
 from rbxcompose.commands.lookup import NOT_UP, find_robot
 from rbxcompose.commands.options import BUS, EACH, system_and_robot
 from rbxcompose.runtime.folder import made_base, system_record
@@ -115,10 +116,11 @@ def send_all(remotes: Iterable[Remote], bundle: Bundle) -> dict[str, str | Findi
 
 
 class Running:
-    """A command on a host whose output is shown line by line, each with the name of the host."""
+    """A command on a host; each line of its output is given to `take`, or kept in `lines`."""
 
-    def __init__(self, label: str, command: Sequence[str], *, shows: bool = True) -> None:
-        self._label, self._shows = label, shows
+    def __init__(self, command: Sequence[str], take: Callable[[str], None] | None = None) -> None:
+        self.lines: list[str] = []
+        self._take = take or self.lines.append
         self._process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
@@ -128,17 +130,19 @@ class Running:
             errors="replace",
             start_new_session=True,  # an interrupt is for us, who pass it on
         )
-        self.lines: list[str] = []
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
 
     def _read(self) -> None:
         for line in self._process.stdout or ():
-            self.lines.append(text := line.rstrip("\r\n"))
-            if self._shows:
-                emit(f"{self._label} | {plain(text)}")
+            self._take(line.rstrip("\r\n"))
         if self._process.stdout is not None:
             self._process.stdout.close()
+
+    @property
+    def is_over(self) -> bool:
+        """Return whether all of its output has been read."""
+        return not self._thread.is_alive()
 
     def poll(self) -> int | None:
         """Return the exit code if it has ended."""
@@ -168,7 +172,7 @@ def on_all(commands: Mapping[str, Sequence[str]]) -> dict[str, Running]:
     """Run commands, each by its label, some at once, and wait for all; nothing is shown."""
 
     def run(label: str) -> Running:
-        running = Running(label, commands[label], shows=False)
+        running = Running(commands[label])
         running.wait()
         return running
 
@@ -290,7 +294,7 @@ def follow_commands(commands: Mapping[str, Sequence[str]], optional: Collection[
     Those of the labels that are `optional` may fail.
     """
     with noted_interrupts() as interrupts:
-        running = [Running(label, command) for label, command in commands.items()]
+        running = [Running(command, partial(_show, label)) for label, command in commands.items()]
         needed = [one for label, one in zip(commands, running, strict=True) if label not in optional]
         while any(item.poll() is None for item in running):
             if interrupts or any(item.poll() for item in needed):
@@ -302,6 +306,10 @@ def follow_commands(commands: Mapping[str, Sequence[str]], optional: Collection[
         codes = [item.wait() for item in needed]
     failed = [code for code in codes if code > 0]
     return INTERRUPTED if interrupts else min(failed, default=0)
+
+
+def _show(label: str, line: str) -> None:
+    emit(f"{label} | {plain(line)}")
 
 
 def follow_all(shares: Shares, words: Callable[[str], Sequence[str]]) -> int:
@@ -458,11 +466,8 @@ def _run_there(remote: Remote, words: Sequence[str]) -> int:
         """Leave it to the command, which gets it, too."""
 
     has_terminal = sys.stdin.isatty() and sys.stdout.isatty()
-    before = signal.signal(signal.SIGINT, leave)
-    try:
+    with handling(leave, [signal.SIGINT]):
         code = subprocess.run(remote.rbxcompose(words, has_terminal=has_terminal), check=False).returncode
-    finally:
-        signal.signal(signal.SIGINT, before)
     if code == SSH_FAILED and not remote.is_here:
         return refuse(UNREACHED.at(None, f"'{remote.name}' cannot be reached: see the message of ssh"))
     return code if code >= 0 else 128 - code

@@ -1,5 +1,7 @@
 """The robots that a verb is about: by file, by folder, or the only one here; and the layers put over them."""
 
+from __future__ import annotations
+
 import argparse
 import json
 import os
@@ -7,18 +9,23 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TypedDict
+from types import MappingProxyType
+from typing import TYPE_CHECKING, TypedDict
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Severity, Span, kind
-from rbxcompose.commands.console import NotDoneError
+from rbxcompose.commands.console import NotDoneError, ReportedError, write_report
 from rbxcompose.commands.options import is_manifest, is_system, kind_of, unsaved_of
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.manifest.files import PREFIX, ROBOT_FILE, find, project_of, shown_name
 from rbxcompose.manifest.section import OVERLAY, ROBOT, SYSTEM, TEST
 from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.sdk.capabilities import NeedsExtra
+
+if TYPE_CHECKING:
+    from rbxcompose.compiler.systems.model import System
 
 UNUSED = kind("RBX9007", Severity.WARNING)
 _USE = "name it in a robot ('missions:', 'include:')"
@@ -239,6 +246,35 @@ def compiled(robot: str, arguments: argparse.Namespace, *overlays: str, tries_pr
     layers = layers_of(arguments)
     layers["overlays"] = [*layers["overlays"], *overlays]
     return compile_robot(robot, **layers, tries_profiles=tries_profiles)
+
+
+def without_errors(found: Compilation) -> tuple[Robot, Plan]:
+    """Report the findings of a robot, and return it with its plan.
+
+    Raises:
+        ReportedError: if it has errors.
+    """
+    write_report(found.report, found.sources)
+    if found.report.has_errors or found.robot is None or found.plan is None:
+        raise ReportedError
+    return found.robot, found.plan
+
+
+def system_without_errors(
+    path: str, profiles: Sequence[str], *, real: bool = False, unsaved: Mapping[Path, str] = MappingProxyType({})
+) -> System:
+    """Compile a system, report its findings, and return it.
+
+    Raises:
+        ReportedError: if it has errors.
+    """
+    from rbxcompose.compiler.systems.reader import compile_system  # only needed for systems
+
+    system = compile_system(path, environment=os.environ, real=real, profiles=profiles, unsaved=unsaved)
+    write_report(system.report, system.sources)
+    if system.report.has_errors:
+        raise ReportedError
+    return system
 
 
 def missing_extras(robot: Robot) -> Iterator[Finding]:

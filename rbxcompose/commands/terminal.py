@@ -13,6 +13,7 @@ from types import FrameType, TracebackType
 from typing import Self, TextIO
 
 from rbxcompose.base.findings import kind
+from rbxcompose.commands.interrupts import handling
 
 NO_TERMINAL = kind("RBX9027")
 _MOST_READ = 4096  # bytes of keys per read
@@ -70,7 +71,7 @@ class LiveScreen:
         self._shown: Sequence[str] | None = None
 
     def __enter__(self) -> Self:
-        self._stack.callback(signal.signal, signal.SIGINT, signal.signal(signal.SIGINT, self._interrupted))
+        self._stack.enter_context(handling(self._interrupted, [signal.SIGINT]))
         self._stack.enter_context(raw(self.keyboard))
         return self
 

@@ -3,7 +3,6 @@
 import argparse
 import json
 import os
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, field, replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from rbxcompose.base.units import example
 from rbxcompose.commands.console import FINDINGS, NotDoneError, ReportedError, emit, misused, table, write_report
 from rbxcompose.commands.lookup import REFUSED, answer_of, known_state, robots_up
 from rbxcompose.commands.options import unsaved_of
-from rbxcompose.commands.targets import put_robot_last, robot_path
+from rbxcompose.commands.targets import put_robot_last, robot_path, without_errors
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.model.skills import python_skills
@@ -51,7 +50,6 @@ FORMATS = {
     "dot": mission_dot,
     "html": mission_html,
 }
-USAGE = 2
 _SAMPLES: Mapping[str, str] = {"TEXT": "hello", "FLAG": "true", "COUNT": "2", "PLACE": "dock", "POSE": "dock"}
 NO_MISSION = kind("RBX9040")
 _LARGEST = 16_000_000  # [B] largest log that is replayed
@@ -73,11 +71,8 @@ def robot_of(path: str | None) -> Robot:
     """
     if path is None:
         path = _running_file() or robot_path(None, may_run=False)
-    out = compile_robot(path, environment=os.environ)
-    write_report(out.report, out.sources)
-    if out.report.has_errors or out.robot is None:
-        raise ReportedError
-    return out.robot
+    robot, _ = without_errors(compile_robot(path, environment=os.environ))
+    return robot
 
 
 def _running_file() -> str | None:
@@ -100,8 +95,7 @@ def show(arguments: argparse.Namespace) -> int:
     try:
         Path(arguments.out).write_text(text, encoding="utf-8")
     except OSError as error:
-        sys.stderr.write(f"rbxcompose mission show: '{arguments.out}' cannot be written: {error.strerror}\n")
-        return USAGE
+        return misused("mission show", f"'{arguments.out}' cannot be written: {error.strerror}")
     return 0
 
 

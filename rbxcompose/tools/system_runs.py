@@ -12,13 +12,13 @@ from rbxcompose.base.findings import Finding, Report, kind
 from rbxcompose.commands import hosts
 from rbxcompose.commands.console import FINDINGS, NotDoneError, ReportedError, emit, misused, refuse, write_report
 from rbxcompose.commands.lookup import ALREADY_UP
+from rbxcompose.commands.targets import system_without_errors
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.bundle import NOT_EXPORTED, Bundle, bundle_of
 from rbxcompose.compiler.systems.certificates import NO_SECURITY, common_name, folder_of, tls_of
 from rbxcompose.compiler.systems.exchange import exchange_of
 from rbxcompose.compiler.systems.model import PlacedRobot, System
-from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.compiler.systems.share import robots_on, share_of
 from rbxcompose.runtime.folder import ChosenLayers, RobotFolder, RunOptions
 from rbxcompose.runtime.supervision.changes import Fate
@@ -125,11 +125,7 @@ def compiled_for(path: str, arguments: argparse.Namespace, verb: str) -> System:
     for word, given in (("-f", arguments.overlays), ("--set or --no-mission", arguments.sets)):
         if given:
             raise ReportedError(misused(verb, f"{word} is for a robot; a system says itself what its robots are"))
-    system = compile_system(path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
-    write_report(system.report, system.sources)
-    if system.report.has_errors:
-        raise ReportedError
-    return system
+    return system_without_errors(path, arguments.profile, real=arguments.real)
 
 
 def layers_of(system: System, robot: PlacedRobot, *, real: bool) -> ChosenLayers:

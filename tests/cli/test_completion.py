@@ -24,13 +24,12 @@ ROOT = Path(__file__).parents[2]
 ECHO_OPTIONS = ["--count", "--domain", "--help", "--json", "--once", "--profile", "--robot", "--router", "--ssh-config"]
 
 
-class Nothing:
-    def of(self, metavar: str, dest: str, current: str, given: Mapping[str, str]) -> list[str]:
-        return [f"{metavar}:{dest}"]
+def nothing(metavar: str, dest: str, current: str, given: Mapping[str, str]) -> list[str]:
+    return [f"{metavar}:{dest}"]
 
 
 def fitting(*words: str) -> list[str]:
-    return candidates(words, Nothing())
+    return candidates(words, nothing)
 
 
 def test_verbs_are_completed() -> None:
@@ -99,7 +98,7 @@ def test_robots_components_and_topics_are_known() -> None:
         asked.append(place)
         return Graph((), [GraphName("/odom", (), ()), GraphName("/a/_b", (), ())], (), ())
 
-    known = KnownValues(graph)
+    known = KnownValues(graph).of
     assert candidates(["down", "--robot", ""], known) == ["cart"]
     assert candidates(["param", "get", "b"], known) == ["base", "battery"]
     assert candidates(["param", "get", "battery", ""], known) == ["error", "runtime", "warn"]

@@ -22,8 +22,8 @@ from rbxcompose.compiler.systems.certificates import folder_of
 from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.runtime.supervision.supervisor import ALIVE, READY, ServiceManager
 from rbxcompose.testing.golden import Golden
-from rbxcompose.tools.exporting import compose, kubernetes, systemd
-from rbxcompose.tools.exporting.exported_share import CERTIFICATES, CONFIGURATION, FILE, ExportedShare, shares
+from rbxcompose.tools.exporting import shares
+from rbxcompose.tools.exporting.shares import CERTIFICATES, CONFIGURATION, FILE, ExportedShare
 from tests.soak import Soak
 from tests.third_party.places import put, see
 
@@ -45,7 +45,7 @@ patches:
 
 @pytest.fixture
 def found(repository: Path) -> list[ExportedShare]:
-    return list(shares(compile_system(PATH, environment={})))
+    return list(shares.shares(compile_system(PATH, environment={})))
 
 
 def tool(name: str) -> str:
@@ -58,15 +58,15 @@ def test_a_unit_runs_one_share_in_a_sandbox_and_opens_only_its_devices(
     found: list[ExportedShare], golden: Golden
 ) -> None:
     words = {"program": "/opt/robot env/bin/rbxcompose", "file": "/srv/100%/system.yaml", "user": "pi"}
-    golden.check("robot.service", systemd.unit(found[0], **words))
-    assert "DeviceAllow=/dev/ttyUSB0 rw" in systemd.unit(WITH_DEVICE, **words)
+    golden.check("robot.service", shares.unit(found[0], **words))
+    assert "DeviceAllow=/dev/ttyUSB0 rw" in shares.unit(WITH_DEVICE, **words)
 
 
 def test_systemd_accepts_the_units(found: list[ExportedShare], tmp_path: Path) -> None:
     analyze = tool("systemd-analyze")
     for share in (*found, WITH_DEVICE):
-        path = tmp_path / systemd.unit_name(share)
-        path.write_text(systemd.unit(share, program="/bin/true", file="/srv/system.yaml", user="root"))
+        path = tmp_path / shares.unit_name(share)
+        path.write_text(shares.unit(share, program="/bin/true", file="/srv/system.yaml", user="root"))
         done = subprocess.run([analyze, "verify", path], capture_output=True, text=True, check=False)
         assert (done.returncode, done.stderr) == (0, "")
 
@@ -74,8 +74,8 @@ def test_systemd_accepts_the_units(found: list[ExportedShare], tmp_path: Path) -
 def test_a_compose_file_has_a_service_for_each_share_in_the_profile_of_its_host(
     found: list[ExportedShare], golden: Golden
 ) -> None:
-    golden.check("compose.yaml", compose.compose_file(found, system="patrol_two_hosts", file=PATH))
-    services = yaml.safe_load(compose.compose_file([WITH_DEVICE], system="lab", file=PATH))["services"]
+    golden.check("compose.yaml", shares.compose_file(found, system="patrol_two_hosts", file=PATH))
+    services = yaml.safe_load(shares.compose_file([WITH_DEVICE], system="lab", file=PATH))["services"]
     assert services["arm-bench"]["devices"] == ["/dev/ttyUSB0:/dev/ttyUSB0"]
 
 
@@ -93,7 +93,7 @@ def test_compose_accepts_the_file_and_would_refuse_a_key_that_it_does_not_know(
     found: list[ExportedShare], tmp_path: Path, soak: Soak
 ) -> None:
     given = [*found, dataclasses.replace(SECRET, devices=WITH_DEVICE.devices)]
-    command, text = composer(compose.compose_file(given, system="lab", file=PATH))
+    command, text = composer(shares.compose_file(given, system="lab", file=PATH))
     profiles = [word for share in given for word in ("--profile", share.host)]
     path = tmp_path / "compose.yaml"
 
@@ -112,7 +112,7 @@ def test_compose_accepts_the_file_and_would_refuse_a_key_that_it_does_not_know(
 
 def k8s(found: list[ExportedShare]) -> dict[str, str]:
     file, files = files_of(compile_system(PATH, environment={}))
-    return kubernetes.manifests(found, system="patrol_two_hosts", file=file, files=files, image="robot:1")
+    return shares.kubernetes_manifests(found, system="patrol_two_hosts", file=file, files=files, image="robot:1")
 
 
 def test_what_a_pod_of_kubernetes_mounts_is_there_and_the_files_are_those_of_the_system(
@@ -148,7 +148,7 @@ def test_names_that_kubernetes_does_not_take_are_written_in_another_way() -> Non
     paths = ["a map.yaml", "a_map.yaml", "é.yaml", "ü.yaml", "a/b.yaml", "a..b.yaml", "a/.b", "a./b", "x" * 300]
     share = ExportedShare("lab_", "r" * 70, "bench_", ("up",), (), 1.0, secrets=("key_",))
     files = {path: BundledFile(path.encode()) for path in paths}
-    made = kubernetes.manifests([share], system="lab_", file="a", files=files, image="i")
+    made = shares.kubernetes_manifests([share], system="lab_", file="a", files=files, image="i")
     whole = {name: yaml.safe_load(text) for name, text in made.items()}
     data, deployment = whole["files.yaml"]["data"], whole[f"{share.name}.yaml"]
     pod = deployment["spec"]["template"]["spec"]
@@ -157,7 +157,7 @@ def test_names_that_kubernetes_does_not_take_are_written_in_another_way() -> Non
     }
     assert all(re.fullmatch(r"[-._a-zA-Z0-9]{1,253}", key) for key in data)
     labels = [*deployment["metadata"]["labels"].values(), *pod["nodeSelector"].values()]
-    labels += whole[kubernetes.KUSTOMIZATION]["labels"][0]["pairs"].values()
+    labels += whole[shares.KUSTOMIZATION]["labels"][0]["pairs"].values()
     assert all(re.fullmatch(r"[a-zA-Z0-9]([-\w.]{0,61}[a-zA-Z0-9])?", label) for label in labels)
     secret = pod["containers"][0]["env"][-1]["valueFrom"]["secretKeyRef"]["name"]
     objects = [secret, *(one["metadata"]["name"] for one in whole.values() if "metadata" in one)]
@@ -209,7 +209,7 @@ def test_secrets_are_named_and_never_written_down() -> None:
     assert container["env"][-1]["valueFrom"] == {"secretKeyRef": {"name": "arm-bench.api-key", "key": "value"}}
     certificates = {volume["name"]: volume for volume in pod["volumes"]}["certificates"]
     assert certificates["secret"]["secretName"] == "arm-bench-certificates"
-    composed = yaml.safe_load(compose.compose_file([SECRET], system="lab", file=PATH))
+    composed = yaml.safe_load(shares.compose_file([SECRET], system="lab", file=PATH))
     service = composed["services"]["arm-bench"]
     assert service["environment"] == ["RBX_SECRET_API_KEY"]
     assert {secret["source"] for secret in service["secrets"]} == composed["secrets"].keys()

@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.compiler.systems.reader import compile_system
-from rbxcompose.tools.exporting.exported_share import shares
-from rbxcompose.tools.exporting.systemd import WATCHDOG, unit, unit_name
+from rbxcompose.tools.exporting.shares import WATCHDOG, shares, unit, unit_name
 from tests.conftest import ROOT
 from tests.exporting.own_systemd import FILES, TREE, OwnSystemd
 from tests.systems.namespaces import NotPermittedError

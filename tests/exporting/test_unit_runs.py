@@ -17,8 +17,7 @@ import pytest
 
 from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.runtime.supervision.supervisor import ALIVE, READY
-from rbxcompose.tools.exporting.exported_share import shares
-from rbxcompose.tools.exporting.systemd import WATCHDOG, unit
+from rbxcompose.tools.exporting.shares import WATCHDOG, shares, unit
 from tests.conftest import ROOT
 from tests.systems.sshd import wrapper
 

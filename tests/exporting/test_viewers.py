@@ -13,9 +13,7 @@ import yaml
 from rbxcompose.commands.main import main
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.testing.golden import Golden
-from rbxcompose.tools.exporting.foxglove import foxglove_layout
-from rbxcompose.tools.exporting.rviz import rviz_config
-from rbxcompose.tools.exporting.viewed_topics import driven
+from rbxcompose.tools.exporting.viewers import driven, foxglove_layout, rviz_config
 from tests.shipped import ROOT, compiled
 from tests.soak import rare
 

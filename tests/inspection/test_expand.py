@@ -16,7 +16,7 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.diff import difference
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.testing import Checked, Golden, check_file, check_text
-from rbxcompose.tools.inspection.expand import expand, expand_data, leaves
+from rbxcompose.tools.inspection.origin import expand, expand_data, leaves
 from tests.conftest import ROOT
 
 TURTLEBOT, TWINS = "robots/turtlebot/robot.yaml", "robots/twins/robot.yaml"

@@ -11,9 +11,8 @@ from rbxcompose.base.findings import Finding
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.testing import Golden, check_text
-from rbxcompose.tools.inspection.expand import leaves
-from rbxcompose.tools.inspection.paths import short
-from rbxcompose.tools.inspection.why import PathAnswer, why
+from rbxcompose.tools.inspection.origin import leaves
+from rbxcompose.tools.inspection.why import PathAnswer, short, why
 from tests.loops import for_all
 
 ASKED = {

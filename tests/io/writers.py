@@ -18,7 +18,7 @@ from rbxcompose.base.files import replace_file
 from rbxcompose.base.levels import Level
 from rbxcompose.commands import main as command
 from rbxcompose.commands.new_files import write_new
-from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.log import NAME, PREVIOUS, LogFile, Record, read_log, start_new
@@ -100,7 +100,7 @@ def _prepare_fix(run: Run) -> None:
 
 
 def _fix(run: Run) -> None:
-    empty = SimpleNamespace(report=[], sources={})
+    empty = Compilation()
     said: list[str] = []
     fix(lambda: run.made["left"].pop() if run.made["left"] else empty, said.append)
     run.told += [text for text in said if text.startswith("left")]

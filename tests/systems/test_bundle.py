@@ -13,7 +13,7 @@ import pytest
 from rbxcompose.compiler.systems.bundle import BundledFile, archive_of, digest_of, files_of
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.compiler.systems.reader import compile_system
-from rbxcompose.tools.exporting import kubernetes
+from rbxcompose.tools.exporting import shares
 
 MAP = "image: room.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n"
 URDF = '<robot name="one"><link name="base_link"><visual><geometry><mesh filename="meshes/{}.stl"/></geometry></visual>'
@@ -92,7 +92,7 @@ def test_all_files_travel_that_manifests_name_and_scripts_stay_executable(tmp_pa
     assert compiled(tmp_path / "there" / name).robots.keys() == {"one"}
     (tmp_path / "robots/one/bin/run.sh").chmod(0o600)
     assert digest_of(files_of(compiled(tmp_path / name))[1]) != digest_of(files)
-    made = kubernetes.manifests([], system="all", file=name, files=files, image="i")
+    made = shares.kubernetes_manifests([], system="all", file=name, files=files, image="i")
     assert "robots..one..bin..run.sh" in made["files.yaml"]
 
 

@@ -6,8 +6,8 @@ does not wait.
 
 import argparse
 
-from rbxcompose.commands.guest import Guest, add_server_verbs, visit, write_names
-from rbxcompose.commands.options import BUS, deferred
+from rbxcompose.commands.guest import add_server_verbs, visit_for_action
+from rbxcompose.commands.options import BUS
 
 GROUP = "data"
 ON_SYSTEM = BUS
@@ -17,13 +17,9 @@ _VERB = ("send", "send a goal, print feedback and result")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    add_server_verbs(parser, "action", _VERB, "goal", "/go_to", (_ls, deferred("rbxcompose.commands.messages", "send")))
+    add_server_verbs(parser, "action", _VERB, "goal", "/go_to")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    return visit(arguments, lambda guest: int(arguments.do(guest, arguments)))
-
-
-def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
-    return write_names(guest.graph().actions, ("servers", "clients"), arguments)
+    return visit_for_action(arguments)

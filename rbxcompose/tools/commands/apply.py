@@ -8,10 +8,17 @@ the reason. Of a system, all hosts are asked first: if one refuses, none is chan
 import argparse
 import json
 
-from rbxcompose.commands.console import emit, write_report
+from rbxcompose.commands.console import emit
 from rbxcompose.commands.lookup import answer_of, find_robot, show_answer
 from rbxcompose.commands.options import add_system_options, is_system
-from rbxcompose.commands.targets import add_layer_options, add_path_argument, chosen_layers, compiled, robot_path
+from rbxcompose.commands.targets import (
+    add_layer_options,
+    add_path_argument,
+    chosen_layers,
+    compiled,
+    robot_path,
+    without_errors,
+)
 from rbxcompose.runtime.plan_requests import RevertPlan
 from rbxcompose.tools.robot_changes import LONGEST_CHANGE, Proposal, carry_out, unsure
 
@@ -43,11 +50,8 @@ def run(arguments: argparse.Namespace) -> int:
         return apply_system(path, arguments)
     if arguments.undo is not None:
         return _undo(path, arguments)
-    compilation = compiled(path, arguments)
-    write_report(compilation.report, compilation.sources)
-    if compilation.plan is None or compilation.robot is None:
-        return 1
-    proposal = Proposal.of(compilation.plan, compilation.robot, chosen_layers(arguments))
+    robot, plan = without_errors(compiled(path, arguments))
+    proposal = Proposal.of(plan, robot, chosen_layers(arguments))
     emit(json.dumps(proposal.data) if arguments.json else proposal.text())
     return carry_out(proposal, arguments)
 

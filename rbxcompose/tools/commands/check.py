@@ -12,7 +12,6 @@ import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import field, replace
 from pathlib import Path
-from typing import Protocol
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
@@ -155,21 +154,7 @@ def _whisper(text: str) -> None:
 PrintLine = Callable[[str], None]
 
 
-class CheckedTexts(Protocol):
-    """The findings of a check, and the texts that it read."""
-
-    @property
-    def report(self) -> Report:
-        """Return the findings."""
-        ...
-
-    @property
-    def sources(self) -> Sources:
-        """Return the texts by the names that findings show."""
-        ...
-
-
-def fix(check: Callable[[], CheckedTexts], say: PrintLine) -> None:
+def fix(check: Callable[[], CheckedRobots | Compilation], say: PrintLine) -> None:
     """Check, apply and report all safe fixes, and repeat until none is left."""
     for _ in range(ROUNDS):
         checked = check()

@@ -14,12 +14,11 @@ from dataclasses import field
 from functools import partial
 from pathlib import Path
 from threading import Thread
-from typing import Protocol
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.bus.graph import Graph
 from rbxcompose.commands.console import NotDoneError, emit
-from rbxcompose.commands.lookup import BusPlace, answer_of, find_robot, known_state, place_of, robots_up
+from rbxcompose.commands.lookup import BusPlace, answer_of, find_place, find_robot, known_state, robots_up
 from rbxcompose.commands.verbs import load, parser_of, verbs
 from rbxcompose.domains.muxes.requests import MUX, LookAtMux
 from rbxcompose.runtime.folder import ComponentState
@@ -74,12 +73,9 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-class CandidateValues(Protocol):
-    """Finds candidates for the value of an argument."""
-
-    def of(self, metavar: str, dest: str, current: str, given: Mapping[str, str]) -> Iterable[str]:
-        """Return the candidates; `given` has the options typed so far by `dest`, other words by metavar."""
-        ...
+Values = Callable[[str, str, str, Mapping[str, str]], Iterable[str]]
+"""Finds candidates for the value of an argument by its metavar, its `dest` and what is typed of it; the last one has
+the options typed so far by `dest`, other words by metavar."""
 
 
 @dataclass(slots=True)
@@ -116,7 +112,7 @@ class _Place:
                 if first.nargs not in _SEVERAL:
                     self.positionals.pop(0)
 
-    def fitting(self, current: str, values: CandidateValues) -> Iterable[str]:
+    def fitting(self, current: str, values: Values) -> Iterable[str]:
         """Yield the candidates for the current word."""
         options = self.parser._option_string_actions
         name, equals, value = current.partition("=")
@@ -129,13 +125,13 @@ class _Place:
         else:
             yield from self._values(self.positionals[0], current, values)
 
-    def _values(self, action: argparse.Action, current: str, values: CandidateValues) -> Iterable[str]:
+    def _values(self, action: argparse.Action, current: str, values: Values) -> Iterable[str]:
         if action.choices is not None:
             return map(str, action.choices)
-        return values.of(str(action.metavar or ""), action.dest, current, self.given)
+        return values(str(action.metavar or ""), action.dest, current, self.given)
 
 
-def candidates(words: Sequence[str], values: CandidateValues) -> list[str]:
+def candidates(words: Sequence[str], values: Values) -> list[str]:
     """Return the sorted candidates for the last of `words`, the words after `rbxcompose`."""
     *before, current = words
     if not before:
@@ -256,10 +252,7 @@ def _live(component: ComponentState) -> list[str]:
 def _place(given: Mapping[str, str]) -> BusPlace:
     domain = given.get("domain", "")
     number = int(domain) if domain.isdecimal() else None
-    if "router" in given:
-        return BusPlace(given["router"], number or 0)
-    found = place_of(find_robot(given.get("robot")))
-    return found if number is None else BusPlace(found.router, number)
+    return find_place(argparse.Namespace(router=given.get("router"), robot=given.get("robot"), domain=number))
 
 
 def robots() -> list[str]:
@@ -296,7 +289,7 @@ def complete(words: Sequence[str]) -> int:
     """Print the candidates for the end of a command line, one per line: `rbxcompose __complete SHELL WORD ...`."""
     if not words:
         return 2
-    found = for_shell(words[0], words[1:], partial(candidates, values=KnownValues(_at_once)))
+    found = for_shell(words[0], words[1:], partial(candidates, values=KnownValues(_at_once).of))
     sys.stdout.write("".join(f"{text}\n" for text in found))
     sys.stdout.flush()
     return 0

@@ -10,7 +10,7 @@ import json
 from rbxcompose.base.printable import escaped
 from rbxcompose.commands.console import FINDINGS, emit, write_report
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, compiled, robot_path
-from rbxcompose.tools.inspection.expand import expand, expand_data
+from rbxcompose.tools.inspection.origin import expand, expand_data
 
 GROUP = "write"
 

@@ -20,16 +20,14 @@ from rbxcompose import __version__
 from rbxcompose.base.findings import Finding, Report
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.options import is_system, out_option
-from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.commands.targets import system_without_errors, without_errors
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.bundle import NOT_EXPORTED, BundledFile, files_of
 from rbxcompose.compiler.systems.model import System
-from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.tools.commands.needs import requirements
-from rbxcompose.tools.exporting import compose, kubernetes, ros2, systemd
-from rbxcompose.tools.exporting.exported_share import shares
-from rbxcompose.tools.exporting.foxglove import foxglove_layout
-from rbxcompose.tools.exporting.rviz import rviz_config
+from rbxcompose.tools.exporting import ros2, shares
+from rbxcompose.tools.exporting.viewers import foxglove_layout, rviz_config
 
 GROUP = "system"
 SRDF, ROS2, RVIZ, FOXGLOVE, BT = "srdf", "ros2", "rviz", "foxglove", "bt"
@@ -67,10 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         return _export_mission(arguments)
     if not is_system(arguments.path):
         return refuse(NOT_EXPORTED.at(None, f"'{arguments.path}' is not the file of a system"))
-    system = compile_system(arguments.path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
-    write_report(system.report, system.sources)
-    if system.report.has_errors:
-        return FINDINGS
+    system = system_without_errors(arguments.path, arguments.profile, real=arguments.real)
     if arguments.host is not None and arguments.host not in system.hosts:
         message = f"the system has no host '{arguments.host}'"
         return refuse(NOT_EXPORTED.misspelt(None, message, arguments.host, system.hosts, "hosts"))
@@ -83,16 +78,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _export_robots(arguments: argparse.Namespace, made: Callable[[Sequence[Plan]], dict[str, str]]) -> int:
     """Write what is made of the robots of a system, or of a single robot."""
-    compiled: System | Compilation
     if is_system(arguments.path):
-        compiled = compile_system(arguments.path, environment=os.environ, real=arguments.real)
-        plans = [robot.plan for robot in compiled.robots.values()]
+        system = system_without_errors(arguments.path, (), real=arguments.real)
+        plans = [robot.plan for robot in system.robots.values()]
     else:
-        compiled = compile_robot(arguments.path, real=arguments.real, environment=os.environ)
-        plans = [compiled.plan] if compiled.plan else []
-    write_report(compiled.report, compiled.sources)
-    if compiled.report.has_errors:
-        return FINDINGS
+        _, plan = without_errors(compile_robot(arguments.path, real=arguments.real, environment=os.environ))
+        plans = [plan]
     return _finish(arguments, _encoded(made(plans)))
 
 
@@ -107,11 +98,8 @@ def _finish(arguments: argparse.Namespace, made: Mapping[str, BundledFile]) -> i
 def _export_robot(arguments: argparse.Namespace) -> int:
     from rbxcompose.tools.exporting.srdf import exported  # imports the sections of robots
 
-    compilation = compile_robot(arguments.path, environment=os.environ, real=arguments.real)
-    write_report(compilation.report, compilation.sources)
-    if compilation.robot is None or compilation.report.has_errors:
-        return FINDINGS
-    manifest = compilation.robot.manifest
+    robot, _ = without_errors(compile_robot(arguments.path, environment=os.environ, real=arguments.real))
+    manifest = robot.manifest
     made = exported(manifest.contents, manifest.name)
     if not made:
         return refuse(NOT_EXPORTED.at(None, f"'{manifest.name}' has no body"))
@@ -128,7 +116,7 @@ def _export_mission(arguments: argparse.Namespace) -> int:
 
 
 def _made(system: System, arguments: argparse.Namespace) -> dict[str, BundledFile]:
-    found, (file, files) = list(shares(system, arguments.host)), files_of(system)
+    found, (file, files) = list(shares.shares(system, arguments.host)), files_of(system)
     match arguments.program:
         case "systemd":
             words = {
@@ -136,14 +124,14 @@ def _made(system: System, arguments: argparse.Namespace) -> dict[str, BundledFil
                 "file": arguments.file or str(system.path),
                 "user": arguments.user or getpass.getuser(),
             }
-            made = {systemd.unit_name(item): systemd.unit(item, **words) for item in found}
+            made = {shares.unit_name(item): shares.unit(item, **words) for item in found}
         case "compose":
-            text = compose.compose_file(found, system=system.name, file=file)
+            text = shares.compose_file(found, system=system.name, file=file)
             needed = requirements([placed.robot for placed in system.robots.values()], __version__)
-            made = {"Dockerfile": compose.dockerfile(needed), "compose.yaml": text}
+            made = {"Dockerfile": shares.dockerfile(needed), "compose.yaml": text}
             return {**_encoded(made), **{f"project/{name}": one for name, one in files.items()}}
         case _:
-            made = kubernetes.manifests(found, system=system.name, file=file, files=files, image=arguments.image)
+            made = shares.kubernetes_manifests(found, system=system.name, file=file, files=files, image=arguments.image)
     return _encoded(made)
 
 

@@ -6,11 +6,11 @@ Exit codes: 0 fine, 1 refused or errors found, 2 wrong usage.
 import argparse
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
 from rbxcompose.base.requests import Command, Query, Refused, to_data
-from rbxcompose.commands.console import NotDoneError, emit, refuse, table
+from rbxcompose.commands.console import NotDoneError, emit, table
 from rbxcompose.commands.lookup import REFUSED, WHICH, add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.commands.options import (
     Declare,
@@ -67,8 +67,8 @@ def _operating() -> tuple[_Row, ...]:
         ("ls", "list the robot's missions with their states", _list, (add_asking_options,)),
         ("triggers", "list what starts missions by itself, with the next times", _triggers, (add_asking_options,)),
         ("run", "start a mission beside those that run", _run, started),
-        ("cancel", "end a mission for good", _to(requests.CancelMission), _NAMED),
-        ("pause", "hold a mission; its timers stand still", _to(requests.PauseMission), _NAMED),
+        ("cancel", "end a mission for good", _to(requests.CancelMission, "name"), _NAMED),
+        ("pause", "hold a mission; its timers stand still", _to(requests.PauseMission, "name"), _NAMED),
         ("resume", "resume a mission where it was held", _resume, resumed),
     )
 
@@ -89,14 +89,15 @@ def _debugging() -> tuple[_Row, ...]:
         which,
         add_asking_options,
     )
+    force = _to(requests.ForceNode, "where", "outcome", "name")
     changed = (argument("sets", nargs="+", metavar="NAME=VALUE", help="what to set"), which, add_asking_options)
     jumped = (argument("state", metavar="STATE", help="the state to enter"), which, add_asking_options)
     return (
-        ("step", "go on to the next leaf or transition", _to(requests.StepMission), _NAMED),
+        ("step", "go on to the next leaf or transition", _to(requests.StepMission, "name"), _NAMED),
         ("break", "stop at a node or a transition; without one, list the breakpoints", _break, broken),
-        ("force", "let a node that runs end with an outcome", _force, forced),
+        ("force", "let a node that runs end with an outcome", force, forced),
         ("set", "set data of a mission that runs", _set, changed),
-        ("jump", "bring a machine that runs into another state", _jump, jumped),
+        ("jump", "bring a machine that runs into another state", _to(requests.JumpMission, "state", "name"), jumped),
     )
 
 
@@ -157,17 +158,21 @@ def ask(robot: str | None, query: Query[A]) -> A:
     return answer_of(find_robot(robot), query)
 
 
-def _to(command: Callable[[str], Command]) -> Callable[[argparse.Namespace], int]:
-    return lambda arguments: pass_on(arguments, command(arguments.name))
+def _to(command: Callable[..., Command], *given: str) -> Callable[[argparse.Namespace], int]:
+    """Return what sends a command with these of the arguments."""
+    return lambda arguments: pass_on(arguments, command(*(getattr(arguments, name) for name in given)))
+
+
+def _settings(arguments: argparse.Namespace) -> Mapping[str, str]:
+    name = find_robot(arguments.robot).path.name
+    try:
+        return requests.settings(arguments.sets)
+    except Refused as refusal:
+        raise NotDoneError(REFUSED.at(None, f"'{name}' refuses: {refusal}")) from refusal
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    folder = find_robot(arguments.robot)
-    try:
-        inputs = requests.settings(arguments.sets)
-    except Refused as refusal:
-        return refuse(REFUSED.at(None, f"'{folder.path.name}' refuses: {refusal}"))
-    return pass_on(arguments, requests.RunMission(arguments.name, inputs, arguments.start))
+    return pass_on(arguments, requests.RunMission(arguments.name, _settings(arguments), arguments.start))
 
 
 def _resume(arguments: argparse.Namespace) -> int:
@@ -190,21 +195,8 @@ def _break(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _force(arguments: argparse.Namespace) -> int:
-    return pass_on(arguments, requests.ForceNode(arguments.where, arguments.outcome, arguments.name))
-
-
 def _set(arguments: argparse.Namespace) -> int:
-    folder = find_robot(arguments.robot)
-    try:
-        values = requests.settings(arguments.sets)
-    except Refused as refusal:
-        return refuse(REFUSED.at(None, f"'{folder.path.name}' refuses: {refusal}"))
-    return pass_on(arguments, requests.SetMissionData(values, arguments.name))
-
-
-def _jump(arguments: argparse.Namespace) -> int:
-    return pass_on(arguments, requests.JumpMission(arguments.state, arguments.name))
+    return pass_on(arguments, requests.SetMissionData(_settings(arguments), arguments.name))
 
 
 def _list(arguments: argparse.Namespace) -> int:

@@ -48,8 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("load", "changes", "set all parameters of a file, all or none", (file,)),
         ("reset", "files", "set parameters to the values in the manifest", (names,)),
         ("undo", "changes", "take back the last change, or another one", (change,)),
-        ("history", "history", "list the changes: who, when, from what to what", (only, last)),
-        ("watch", "history", "follow the changes", (only, options.add_count_options)),
+        ("history", "changes", "list the changes: who, when, from what to what", (only, last)),
+        ("watch", "changes", "follow the changes", (only, options.add_count_options)),
         ("diff", "files", "show what is not as in the manifest", ()),
         ("dump", "files", "write the live parameters as YAML, for `load`", (only,)),
         ("save", "files", "write changed values into the manifest, each at its place", (names, dry, seen)),
@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    return visit(arguments, lambda guest: int(arguments.do(ParameterNodes(guest, arguments.timeout), arguments)))
+    return visit(arguments, lambda guest: options.run_action(arguments, ParameterNodes(guest, arguments.timeout)))
 
 
 def run_on_system(command: SystemCommand) -> int | None:

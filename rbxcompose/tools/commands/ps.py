@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from rbxcompose.base.requests import to_data
-from rbxcompose.commands.console import NotDoneError, emit, refuse
+from rbxcompose.commands.console import NotDoneError, emit, refuse, table
 from rbxcompose.commands.lookup import NO_SUPERVISOR, add_robot_option, answer_of, find_robot, known_state, robots_up
 from rbxcompose.commands.options import EACH, add_system_options
 from rbxcompose.runtime.folder import SUSPENDED, ClockOffset, ComponentState, RobotFolder, RobotState
@@ -111,15 +111,13 @@ def _state(component_state: ComponentState, alive: Mapping[str, Process]) -> str
 def _table(shown: Mapping[str, Any]) -> str:
     pid, endpoint = shown["supervisor"]["pid"], shown["router"]["endpoint"]
     head = f"{shown['robot']}: supervisor {pid or 'dead'}, router {endpoint or 'none'}"
-    rows = [_COLUMNS, *([_cell(component[column]) for column in _COLUMNS] for component in shown["components"])]
-    widths = [max(len(row[index]) for row in rows) for index in range(len(_COLUMNS))]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    rows = [[_cell(component[column]) for column in _COLUMNS] for component in shown["components"]]
     blocked = [component for component in shown["components"] if "waits_for" in component]
     waiting = [f"{component['name']} waits for {component['waits_for']}, which failed" for component in blocked]
     notes = [f"{component['name']}: {component['note']}" for component in shown["components"] if "note" in component]
     clocks = [f"clock of {host}: {ClockOffset(**clock).words}" for host, clock in shown["clocks"].items()]
     left = [] if pid else [_CLEANS_UP.format(shown["robot"])]
-    return "\n".join([head, *_stop_lines(shown["stop"]), *lines, *waiting, *notes, *clocks, *left])
+    return "\n".join([head, *_stop_lines(shown["stop"]), table([_COLUMNS, *rows]), *waiting, *notes, *clocks, *left])
 
 
 def _stop_lines(stop: Mapping[str, Any] | None) -> Iterator[str]:

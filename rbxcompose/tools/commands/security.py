@@ -19,11 +19,11 @@ from rbxcompose.base.findings import Finding, Report, Severity, kind
 from rbxcompose.base.requests import to_data
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.options import add_system_options, is_system
+from rbxcompose.commands.targets import system_without_errors
 from rbxcompose.compiler.plan.model import LinkTls
 from rbxcompose.compiler.systems import certificates
 from rbxcompose.compiler.systems.audit import listeners, reachable_keys
 from rbxcompose.compiler.systems.model import System
-from rbxcompose.compiler.systems.reader import compile_system
 
 GROUP = "system"
 NOT_MADE = kind("RBX6116")
@@ -56,15 +56,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
     if not is_system(arguments.path):
         return refuse(NOT_MADE.at(None, f"'{arguments.path}' is not the file of a system"))
-    system = compile_system(arguments.path, environment=os.environ, profiles=arguments.profile)
-    write_report(system.report, system.sources)
-    if system.report.has_errors:
-        return FINDINGS
-    return (
-        _init(system, arguments)
-        if arguments.action == "init"
-        else _audit(system, arguments.path, in_json=arguments.json)
-    )
+    system = system_without_errors(arguments.path, arguments.profile)
+    if arguments.action == "init":
+        return _init(system, arguments)
+    return _audit(system, arguments.path, in_json=arguments.json)
 
 
 def _init(system: System, arguments: argparse.Namespace) -> int:

@@ -5,8 +5,8 @@ The request is YAML with the fields of the service's type; missing fields are ze
 
 import argparse
 
-from rbxcompose.commands.guest import Guest, add_server_verbs, visit, write_names
-from rbxcompose.commands.options import BUS, deferred
+from rbxcompose.commands.guest import add_server_verbs, visit_for_action
+from rbxcompose.commands.options import BUS
 
 GROUP = "data"
 ON_SYSTEM = BUS
@@ -16,20 +16,9 @@ _VERB = ("call", "send a request and print the response")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    add_server_verbs(
-        parser,
-        "service",
-        _VERB,
-        "request",
-        "/battery/set_level",
-        (_ls, deferred("rbxcompose.commands.messages", "call")),
-    )
+    add_server_verbs(parser, "service", _VERB, "request", "/battery/set_level")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    return visit(arguments, lambda guest: int(arguments.do(guest, arguments)))
-
-
-def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
-    return write_names(guest.graph().services, ("servers", "clients"), arguments)
+    return visit_for_action(arguments)

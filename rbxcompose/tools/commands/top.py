@@ -6,9 +6,7 @@ messages; the share of a process is that of one processor. Of a system, it shows
 
 import argparse
 import json
-import subprocess
 import sys
-import threading
 import time
 from collections.abc import Mapping
 from functools import partial
@@ -17,7 +15,7 @@ from typing import Any
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import NotDoneError, emit, has_colour
 from rbxcompose.commands.guest import Guest
-from rbxcompose.commands.hosts import Remote, Shares, SystemCommand
+from rbxcompose.commands.hosts import Remote, Running, Shares, SystemCommand
 from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, place_of
 from rbxcompose.commands.messages import to_json
 from rbxcompose.commands.options import EACH, add_json_option, add_system_options
@@ -110,48 +108,33 @@ class LiveShare:
         self._host, self._robot = host, robot
         self._command = remote.rbxcompose(["top", robot, "--json", "--follow"])
         self._answer: Mapping[str, Any] | None = None
-        self._since = self._ended = time.monotonic()
+        self._since = time.monotonic()
+        self._ended: float | None = None
         self._problem = self._last = ""
-        self._started()
+        self._running = Running(self._command, self._take)
 
-    def _started(self) -> None:
-        self._process = process = subprocess.Popen(
-            self._command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            start_new_session=True,  # an interrupt is for us
-        )
-        self._thread = threading.Thread(target=self._read, args=(process,), daemon=True)
-        self._thread.start()
-
-    def _read(self, process: subprocess.Popen[str]) -> None:
-        for line in process.stdout or ():
-            try:
-                answer = json.loads(line)
-            except ValueError:
-                self._last = self._last or plain(line.strip())
-                continue
-            if isinstance(answer, dict) and "components" in answer:
-                self._answer, self._since, self._problem, self._last = answer, time.monotonic(), "", ""
-        if process.stdout is not None:
-            process.stdout.close()
-        process.wait()
-        self._problem, self._ended, self._last = self._last or "it has ended", time.monotonic(), ""
+    def _take(self, line: str) -> None:
+        try:
+            answer = json.loads(line)
+        except ValueError:
+            self._last = self._last or plain(line.strip())
+            return
+        if isinstance(answer, dict) and "components" in answer:
+            self._answer, self._since, self._problem, self._last = answer, time.monotonic(), "", ""
 
     def view(self) -> ShareView:
         """Return what is known now."""
         now = time.monotonic()
-        if not self._thread.is_alive() and now - self._ended > _AGAIN:
-            self._started()
+        if self._running.is_over and self._ended is None:
+            self._problem, self._ended, self._last = self._last or "it has ended", now, ""
+        if self._ended is not None and now - self._ended > _AGAIN:
+            self._ended, self._running = None, Running(self._command, self._take)
         return ShareView(self._robot, self._host, self._answer, now - self._since, self._problem)
 
     def close(self) -> None:
         """End the command."""
-        self._process.terminate()
-        self._thread.join()
+        self._running.end()
+        self._running.wait()
 
 
 def show_system(name: str, shares: Shares) -> int:

@@ -16,7 +16,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.bus.graph import GraphEnd
 from rbxcompose.commands import options
 from rbxcompose.commands.console import emit, table
-from rbxcompose.commands.guest import Guest, described, visit, wanted, write_names
+from rbxcompose.commands.guest import Guest, described, visit_for_action, wanted, write_names
 from rbxcompose.commands.lookup import add_bus_options
 
 GROUP = "data"
@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    return visit(arguments, lambda guest: int(arguments.do(guest, arguments)))
+    return visit_for_action(arguments)
 
 
 def _ls(guest: Guest, arguments: argparse.Namespace) -> int:

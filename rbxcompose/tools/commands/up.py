@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rbxcompose.base.units import TIME, UnitError, to_si
 from rbxcompose.commands import targets
-from rbxcompose.commands.console import FINDINGS, misused, refuse, write_report
+from rbxcompose.commands.console import FINDINGS, misused, refuse
 from rbxcompose.commands.formats.json_ import render_json
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.runtime.folder import RunOptions
@@ -56,12 +56,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.host or arguments.robot:
         return misused("up", "--host and --robot are for systems")
     compilation = targets.compiled(path, arguments)
-    write_report(compilation.report, compilation.sources)
-    if compilation.plan is None or compilation.robot is None or compilation.report.has_errors:
-        return 1
-    if compilation.plan.follows_clock and arguments.rate.is_stepped:
+    robot, plan = targets.without_errors(compilation)
+    if plan.follows_clock and arguments.rate.is_stepped:
         return misused("up", "the robot follows /clock ('bus.clock'), so --rate cannot be given with it")
-    if arguments.rate.is_stepped and (names := real_time_only(compilation.robot)):
+    if arguments.rate.is_stepped and (names := real_time_only(robot)):
         runs = "runs a program, which keeps" if len(names) == 1 else "run programs, which keep"
         words = ", ".join(f"'{name}'" for name in names)
         return misused("up", f"{words} {runs} real time, so --rate cannot be given")
@@ -70,15 +68,15 @@ def run(arguments: argparse.Namespace) -> int:
         return misused("up", "--record needs --rate; a run in real time is recorded by 'rbxcompose record'")
     if options.record is not None and (problem := _write_problem(options.record)):
         return refuse(UNWRITABLE.at(None, problem))
-    if options.is_stepped and options.rate is None and options.duration is None and compilation.plan.start is None:
+    if options.is_stepped and options.rate is None and options.duration is None and plan.start is None:
         return misused("up", "without 'start:' nothing ends a run at --rate max: give --for")
-    if not is_fit(compilation.robot, compilation.sources):
+    if not is_fit(robot, compilation.sources):
         return FINDINGS
     reload = None
     if arguments.watch:
         reload = LiveReload(lambda: targets.compiled(path, arguments), compilation, options.layers)
     findings = render_json(compilation.report, compilation.sources)
-    return run_plan(compilation.plan, options, LiveRules(compilation.robot), reload, findings)
+    return run_plan(plan, options, LiveRules(robot), reload, findings)
 
 
 def _options(arguments: argparse.Namespace) -> RunOptions:

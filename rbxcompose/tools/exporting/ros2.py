@@ -11,8 +11,7 @@ from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.packages import OWN, own_packages, package_files
-from rbxcompose.tools.exporting.rviz import rviz_config
-from rbxcompose.tools.exporting.viewed_topics import sent
+from rbxcompose.tools.exporting.viewers import rviz_config, sent
 
 LICENCE = "Apache-2.0"
 _LAUNCH = '''"""View {robot}: `ros2 launch {package} view.launch.py`; with `viewer:=foxglove` for Foxglove."""

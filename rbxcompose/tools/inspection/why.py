@@ -6,25 +6,94 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
+from rbxcompose.base.config import COMPONENT
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Span
+from rbxcompose.base.findings import Finding, Span, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import UNITS, Dimension, Quantity, UnitError, format_number, parse_quantity, to_si
+from rbxcompose.compiler.composition.layers import in_section
 from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_manifest import ROBOT_LAYER, HistoryStep, RobotManifest
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, resolve
 from rbxcompose.compiler.plan.model import BusPlan
 from rbxcompose.compiler.schema.guide import Guide
 from rbxcompose.compiler.schema.robot import robot_schema
+from rbxcompose.compiler.sections.composition import include
 from rbxcompose.domains.muxes.sections.muxes import muxes
-from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode, at, key_span
+from rbxcompose.manifest.registry import naming, robot_keys
+from rbxcompose.manifest.section import SetScope
+from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at, key_span
 from rbxcompose.missions.engine.value_text import show as show_value
 from rbxcompose.missions.program.machines import Input
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Serves, ServesAction, ServesTopic
 from rbxcompose.tools.inspection.diagram import does, keys_of, qos_of
-from rbxcompose.tools.inspection.expand import expand_below
-from rbxcompose.tools.inspection.origin import Origin, as_data, origin_of, shown
-from rbxcompose.tools.inspection.paths import found_at, is_known, no_such_path, path_of, short, tree_of
+from rbxcompose.tools.inspection.origin import Origin, as_data, expand_below, origin_of, shown
+
+NO_SUCH_PATH = kind("RBX9011")
+
+
+def path_of(robot: Robot, text: str) -> KeyPath:
+    """Return the path from the root that a text means; list items are counted from 0."""
+    names: list[str | int] = list(text.strip().split("."))
+    manifest = robot.manifest
+    if names[0] not in robot_keys():
+        names.insert(0, _section_of(manifest, str(names[0])))
+    for index, name in enumerate(names):
+        above = found_at(manifest, tuple(names[:index]))
+        if isinstance(above, SequenceNode) and str(name).isdecimal():
+            names[index] = int(name)
+    return tuple(names)
+
+
+def _section_of(manifest: RobotManifest, name: str) -> str:
+    """Return the section that names something that runs; that of the components if no section does."""
+    running = sorted(naming(COMPONENT), key=lambda one: one.scope is SetScope.BARE)
+    return next(
+        (declaration.name for declaration in running if name in declaration.names_in(manifest.root)), running[-1].name
+    )
+
+
+def short(path: KeyPath) -> str:
+    """Return a path as people write it."""
+    return ".".join(map(str, path[1:] if path[0] == "components" and len(path) > 1 else path))
+
+
+def tree_of(manifest: RobotManifest, path: KeyPath) -> MappingNode:
+    """Return the tree that a path belongs to: the section `include` is read before the rest, and kept beside it."""
+    return manifest.include if path[:1] == (include.name,) else manifest.root
+
+
+def found_at(manifest: RobotManifest, path: KeyPath) -> TreeNode | None:
+    """Return the node at a path of the composed robot, or None."""
+    return at(tree_of(manifest, path), path)
+
+
+def no_such_path(robot: Robot, path: KeyPath, guide: Guide) -> Finding:
+    """Return the finding for a path that does not exist, with the probable meaning of its first wrong name."""
+    if path[0] == "profiles":
+        return NO_SUCH_PATH.at(None, "profiles have no value of their own", help="'--profile NAME' applies one")
+    length = next(n for n in range(1, len(path) + 1) if not is_known(robot.manifest, guide, path[:n]))
+    above, name = path[: length - 1], str(path[length - 1])
+    node = found_at(robot.manifest, above)
+    valid = {*guide.keys(above), *(node.entries if isinstance(node, MappingNode) else ())}
+    place = f"'{short(above)}'" if above else ""
+    if above in ((), ("components",)):
+        place = f"robot '{robot.manifest.name}'"
+        valid |= {*robot.components, *(key for key in robot_keys() if key in robot.manifest.root)}
+    elif len(above) == 2 and str(above[1]) in robot.components:
+        valid |= {end.name for end in robot.components[str(above[1])].ends}
+    if isinstance(node, SequenceNode):
+        valid = {str(index) for index in range(len(node.items))}
+    message = f"{place} has no '{plain(name, 60)}'"
+    if above == ("components",) and (hint := in_section([str(key) for key in path[1:]], robot.manifest.root)):
+        return NO_SUCH_PATH.at(None, message, help=hint)
+    return NO_SUCH_PATH.misspelt(None, message, name, sorted(valid), "what it has")
+
+
+def is_known(manifest: RobotManifest, guide: Guide, path: KeyPath) -> bool:
+    """Return whether a path exists, or is a key that could be written there."""
+    return found_at(manifest, path) is not None or str(path[-1]) in guide.keys(path[:-1])
+
 
 LABEL = 15  # width of the labels
 _OTHER = {  # the first one that matches a port counts

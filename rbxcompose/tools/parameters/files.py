@@ -40,8 +40,7 @@ from rbxcompose.runtime.plan_requests import AdoptSaved, ComparePlan
 from rbxcompose.sdk.parameters import UnsettableError, changed, dimension_of, from_message, settings, to_message
 from rbxcompose.tools.inspection.origin import origin_of
 from rbxcompose.tools.live_rules import compiled_with
-from rbxcompose.tools.parameters.changes import PIPED, change_values, message_of, write_values
-from rbxcompose.tools.parameters.history import changes_of
+from rbxcompose.tools.parameters.changes import PIPED, change_values, changes_of, message_of, write_values
 from rbxcompose.tools.parameters.nodes import ParameterNodes, listed
 from rbxcompose.tools.project_texts import difference as difference_of
 from rbxcompose.tools.project_texts import hash_of
