@@ -275,7 +275,7 @@ class _Run:
         return None
 
     def _search(self, attempt: int, margin: float) -> Generator[int, None, Array]:
-        """Return the search: by OMPL, whose constrained spaces find less (see `constrained_search`), or by ours."""
+        """Return the search: by OMPL, whose constrained spaces find less (see `search`), or by ours."""
         space, kept, start, goal = self._space, self._kept, self.start, self.goal
         settings, is_fit = self._planner.settings, self._fitness(attempt)
         seed = settings.seed + attempt
