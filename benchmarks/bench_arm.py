@@ -23,6 +23,7 @@ from rbxcompose.domains.arms.motion.compiled_collisions import matrix_of
 from rbxcompose.domains.arms.motion.figures import (
     NO_TRIES,
     MotionProblem,
+    SecondChecker,
     Tries,
     call_time,
     free_pairs,
@@ -34,7 +35,6 @@ from rbxcompose.domains.arms.motion.figures import (
 from rbxcompose.domains.arms.motion.groups import ArmJoint, JointSpace, chain, interpolated
 from rbxcompose.domains.arms.motion.inverse_kinematics import SolverSettings
 from rbxcompose.domains.arms.motion.planner import first_bad
-from rbxcompose.domains.arms.motion.second_checker import SecondChecker
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.link_pairs import pair_of
 from rbxcompose.domains.body.urdf import read_body

@@ -148,6 +148,12 @@ def conjugate(rotation: Quaternion) -> Quaternion:
     return (-x, -y, -z, w)
 
 
+def angle_between(a: Quaternion, b: Quaternion) -> float:
+    """Return by which angle [rad] one rotation differs from another."""
+    x, y, z, w = multiply(conjugate(a), b)
+    return 2.0 * math.atan2(math.hypot(x, y, z), abs(w))
+
+
 def rotate(rotation: Quaternion, vector: Vector3) -> Vector3:
     """Return `vector` turned by a unit quaternion."""
     x, y, z, w = rotation

@@ -3,7 +3,7 @@
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_faults import ServoFaults
 from rbxcompose.domains.servos.twins.servo_line import FakeLine
-from rbxcompose.domains.servos.twins.servo_port import FakePort
+from rbxcompose.domains.servos.twins.servo_twin import FakePort
 from rbxcompose.testing.bench import Bench, Ran, instance, run_robot
 from rbxcompose.testing.clocks import clock_uses
 from rbxcompose.testing.golden import Golden

@@ -11,7 +11,7 @@ import pytest
 from rbxcompose.base.clock import SteppedClock
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_line import FakeLine
-from rbxcompose.domains.servos.twins.servo_port import FakePort
+from rbxcompose.domains.servos.twins.servo_twin import FakePort
 
 Plugged = Callable[..., FakePort]
 

@@ -17,7 +17,7 @@ from rbxcompose.domains.servos.servo_cycle import ServoCycle
 from rbxcompose.domains.servos.transfers import BusLoad, cycle_load
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_line import FakeLine, FakeReply
-from rbxcompose.domains.servos.twins.servo_port import FakePort
+from rbxcompose.domains.servos.twins.servo_twin import FakePort
 from tests.soak import rare
 
 CYCLE = 0.01  # [s]

@@ -13,7 +13,7 @@ from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
 from rbxcompose.domains.servos.models import servo_models
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_line import FakeLine
-from rbxcompose.domains.servos.twins.servo_port import FakePort
+from rbxcompose.domains.servos.twins.servo_twin import FakePort
 from tests.actuation.conftest import Plugged
 from tests.devices.machine_tree import MachineTree
 

@@ -14,7 +14,7 @@ from rbxcompose.base.clock import SteppedClock
 from rbxcompose.commands.main import main
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_line import FakeLine
-from rbxcompose.domains.servos.twins.servo_port import FakePort
+from rbxcompose.domains.servos.twins.servo_twin import FakePort
 
 AX, XL, SLOW = "AX-12", "XL430-W250", 57_600
 

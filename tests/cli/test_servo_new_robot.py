@@ -15,7 +15,7 @@ from rbxcompose.commands.main import main
 from rbxcompose.domains.devices.serial_ports import SerialPort
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_line import FakeLine
-from rbxcompose.domains.servos.twins.servo_port import FakePort
+from rbxcompose.domains.servos.twins.servo_twin import FakePort
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.sdk.ports import Qos

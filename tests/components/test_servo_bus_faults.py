@@ -14,7 +14,7 @@ from rbxcompose.domains.servos.components.servo_bus import ServoBusDriver
 from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
 from rbxcompose.domains.servos.joint_states import JointMode
 from rbxcompose.domains.servos.models import servo_models
-from rbxcompose.domains.servos.twins.fault_script import InjectFault, ListFaults
+from rbxcompose.domains.servos.twins.servo_faults import InjectFault, ListFaults
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.msgs.std_srvs import SetBool

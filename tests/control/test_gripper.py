@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 
 from rbxcompose.domains.servos.gripper import (
     CalibratedGripper,
-    DualGripper,
     FingerGeometry,
+    FingerGripper,
     GripAttempt,
     GripOutcome,
     GripperModel,
     GripPolicy,
-    OneSidedGripper,
     ParallelGripper,
 )
 from rbxcompose.domains.servos.transmission import Calibration
@@ -25,8 +24,8 @@ from rbxcompose.domains.servos.transmission import Calibration
 FINGERS = FingerGeometry(0.004, 0.065, 0.0, 0.09)
 TABLE = ((0.0, 0.6), (0.01, 0.45), (0.02, 0.2), (0.03, -0.1), (0.042, -0.5))
 MODELS: dict[str, GripperModel] = {
-    "one_sided": OneSidedGripper(FINGERS, 0.1, invert=True),
-    "dual": DualGripper(FINGERS, (0.1, -0.2), (False, True)),
+    "one_sided": FingerGripper(FINGERS, (0.1,), (True,)),
+    "dual": FingerGripper(FINGERS, (0.1, -0.2), (False, True)),
     "parallel": ParallelGripper(-12.0, 0.3, 0.0, 0.06),
     "calibrated": CalibratedGripper(Calibration(TABLE)),
 }
@@ -57,7 +56,7 @@ def test_an_opening_outside_of_the_range_is_refused_with_the_reason(name: str, o
 
 
 def test_the_fingers_of_a_dual_gripper_turn_in_opposite_directions() -> None:
-    left, right = DualGripper(FINGERS).angles(0.05)
+    left, right = FingerGripper(FINGERS, (0.0, 0.0), (False, False)).angles(0.05)
     assert left == -right > 0.0
 
 

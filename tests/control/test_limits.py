@@ -35,11 +35,11 @@ def test_no_sequence_of_wishes_and_steps_breaks_a_limit(
     for wanted, velocity, dt in steps:
         before = limiter.position, limiter.velocity
         assert limiter.want(wanted, velocity) is None
-        now = limiter.step(dt)
-        assert limits.least <= now.position <= limits.greatest
-        assert abs(now.velocity) <= limits.speed + 1e-9
-        assert abs(now.velocity - before[1]) <= acceleration(limits) * dt + 1e-9
-        assert now.position - before[0] == pytest.approx(now.velocity * dt, abs=1e-9)
+        limiter.step(dt)
+        assert limits.least <= limiter.position <= limits.greatest
+        assert abs(limiter.velocity) <= limits.speed + 1e-9
+        assert abs(limiter.velocity - before[1]) <= acceleration(limits) * dt + 1e-9
+        assert limiter.position - before[0] == pytest.approx(limiter.velocity * dt, abs=1e-9)
 
 
 @given(RANGED, STEPS, st.floats(0.0, 1.0), st.floats(0.001, 0.2))
@@ -52,7 +52,8 @@ def test_it_converges_to_a_goal_in_range_without_overshoot(
     slowest = min(limits.speed, acceleration(limits), 1.0)
     limiter.want(goal)
     for _ in range(min(2000, int(3 * (10.0 / slowest + 1.0) / dt) + 10)):
-        if abs(limiter.step(dt).position - goal) < 1e-9:
+        limiter.step(dt)
+        if abs(limiter.position - goal) < 1e-9:
             break
         assert (limiter.position <= goal) == side
     else:
@@ -70,9 +71,9 @@ def test_a_path_within_the_limits_is_tracked_without_lag_if_its_velocity_is_give
     for index in range(1, 100):
         wanted = amplitude * (1.0 - math.cos(math.tau * index * dt / period))
         limiter.want(wanted, (wanted - before) / dt)
-        assert limiter.step(dt).position == pytest.approx(wanted, abs=1e-9)
+        limiter.step(dt)
+        assert limiter.position == pytest.approx(wanted, abs=1e-9)
         before = wanted
-    assert not limiter.clamps
 
 
 @given(STEPS)
@@ -98,21 +99,9 @@ def test_what_is_not_finite_is_rejected_with_the_reason_and_the_former_wish_hold
     reason = limiter.want(wanted, velocity)
     assert reason is not None
     assert "finite" in reason
-    assert limiter.rejected == 1
     for _ in range(300):
         limiter.step(0.01)
     assert limiter.position == pytest.approx(1.0)
-
-
-def test_clamps_are_said_and_counted() -> None:
-    limiter = Limiter(LIMITS, 0.0)
-    limiter.want(5.0)
-    assert limiter.step(0.01).clamped == ("position", "velocity", "acceleration")
-    for _ in range(200):
-        limiter.step(0.01)
-    assert limiter.position == pytest.approx(2.0)
-    assert limiter.clamps["position"] == 201
-    assert 0 < limiter.clamps["acceleration"] < limiter.clamps["velocity"] < 201
 
 
 @given(st.floats(2.0, 4.0), st.lists(st.floats(-9.0, 9.0), max_size=50))
@@ -122,7 +111,8 @@ def test_a_joint_that_was_put_outside_of_its_range_moves_inwards_only(start: flo
     for wanted in wishes:
         before = limiter.position
         limiter.want(wanted)
-        assert limiter.step(0.1).position <= max(2.0, before)
+        limiter.step(0.1)
+        assert limiter.position <= max(2.0, before)
     limiter.want(9.0)
     for _ in range(100):
         limiter.step(0.1)
@@ -135,7 +125,8 @@ def test_after_a_measurement_it_starts_at_rest_from_there() -> None:
     limiter.step(0.1)
     limiter.reseed(0.5)
     assert limiter.is_at_rest
-    assert limiter.step(0.1).position == 0.5
+    limiter.step(0.1)
+    assert limiter.position == 0.5
 
 
 def test_a_lower_limit_of_velocity_is_reached_by_braking() -> None:
@@ -146,7 +137,8 @@ def test_a_lower_limit_of_velocity_is_reached_by_braking() -> None:
     limiter.limits = MotionLimits(velocity=0.5, acceleration=3.0)
     for _ in range(100):
         before = limiter.velocity
-        assert before - limiter.step(0.01).velocity <= 0.03 + 1e-9
+        limiter.step(0.01)
+        assert before - limiter.velocity <= 0.03 + 1e-9
     assert limiter.velocity == 0.5
 
 

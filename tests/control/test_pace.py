@@ -93,7 +93,7 @@ def test_a_motion_that_is_held_can_be_cancelled_and_replaced_without_a_jump() ->
 def test_what_is_led_live_keeps_its_speed() -> None:
     arm = Arm(limits=SMOOTH)
     arm.follower.pace.share = 0.0
-    arm.follower.accept(ACROSS, arm.now, arm.measured, arm.commanded, is_live=True)
+    arm.follower.accept(ACROSS, arm.now, arm.commanded, is_live=True)
     assert arm.run(5.0) is not None
 
 

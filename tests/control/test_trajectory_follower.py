@@ -46,7 +46,7 @@ class Arm:
         return {name: JointSample(limiter.position, limiter.velocity) for name, limiter in self.limiters.items()}
 
     def send(self, trajectory_goal: TrajectoryGoal) -> TrajectoryPlan | TrajectoryRefusal:
-        return self.follower.accept(trajectory_goal, self.now, self.measured, self.commanded)
+        return self.follower.accept(trajectory_goal, self.now, self.commanded)
 
     def step(self) -> FollowStep:
         """Let a cycle pass."""
@@ -205,19 +205,18 @@ def test_a_refused_goal_leaves_the_running_one_alone() -> None:
     assert outcome.code == TrajectoryCode.SUCCESSFUL
 
 
-def test_a_trajectory_starts_from_the_command_or_from_the_measurement_as_wanted() -> None:
-    for policy, expected in ((POLICY, 0.0), (TrajectoryPolicy(start_from="measured"), 0.2)):
-        arm = Arm(policy)
-        arm.measured["pan"] = JointSample(0.2)
-        plan = arm.send(goal((2.0, (0.5, 0.5))))
-        assert isinstance(plan, TrajectoryPlan)
-        assert plan.curves["pan"].first == expected
+def test_a_trajectory_starts_from_the_command() -> None:
+    arm = Arm()
+    arm.measured["pan"] = JointSample(0.2)
+    plan = arm.send(goal((2.0, (0.5, 0.5))))
+    assert isinstance(plan, TrajectoryPlan)
+    assert plan.curves["pan"].first == 0.0
 
 
 def test_who_is_nowhere_does_not_start() -> None:
-    arm = Arm(TrajectoryPolicy(start_from="measured"))
-    arm.measured["pan"] = JointSample(math.nan)
-    answer = arm.send(goal((2.0, (0.5, 0.5))))
+    arm = Arm()
+    nowhere = arm.commanded | {"pan": JointSample(math.nan)}
+    answer = arm.follower.accept(goal((2.0, (0.5, 0.5))), arm.now, nowhere)
     assert isinstance(answer, TrajectoryRefusal)
     assert answer.message == "it is not known where joint 'pan' is"
 

@@ -18,7 +18,7 @@ from rbxcompose.domains.servos.models import servo_models
 from rbxcompose.domains.servos.servo_cycle import ServoCycle, prepare
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_line import FakeLine
-from rbxcompose.domains.servos.twins.servo_port import FakePort
+from rbxcompose.domains.servos.twins.servo_twin import FakePort
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from tests.controllers.wheels import DISTANCE, RADIUS, wheels
 from tests.soak import rare

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from rbxcompose.domains.arms.motion.collisions import coal_shape
-from rbxcompose.domains.arms.motion.second_checker import SecondChecker
-from rbxcompose.domains.arms.motion.sphere_model import triangles_of
+from rbxcompose.domains.arms.motion.figures import SecondChecker
+from rbxcompose.domains.arms.motion.sphere_checker import triangles_of
 from rbxcompose.domains.body.model import Geometry
 from tests.body.kinematics import description_of
 

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.domains.arms.motion.head_tracking import HeadTracker, HeadTrackingSettings, HeadTrackingState
+from rbxcompose.domains.arms.motion.gaze import HeadTracker, HeadTrackingState
+from rbxcompose.domains.arms.section_models import HeadTracking
 from rbxcompose.domains.servos.limits import MotionLimits
 
 LIMITS = {"pan": MotionLimits(-2.0, 2.0), "tilt": MotionLimits(-1.0, 1.0)}
@@ -22,7 +23,7 @@ class Follower:
     """Joints that are where they were told to be one cycle before."""
 
     def __init__(self, pan: MotionLimits = LIMITS["pan"], **settings: Any) -> None:
-        self.settings, self.tracker = HeadTrackingSettings(**settings), HeadTracker({**LIMITS, "pan": pan})
+        self.settings, self.tracker = HeadTracking(**settings), HeadTracker({**LIMITS, "pan": pan})
         self.at, self.time = {"pan": 0.0, "tilt": 0.0}, 0.0
 
     def cycle(self, pan: float | None = None, tilt: float = 0.0) -> dict[str, float] | None:
@@ -62,7 +63,7 @@ def test_it_comes_to_a_target_that_stands(mode: str, pan: float, tilt: float) ->
 
 @MODES
 def test_within_its_threshold_it_rests(mode: str) -> None:
-    follower = Follower(mode=mode, threshold=0.1)
+    follower = Follower(mode=mode, threshold="0.1 rad")
     for _ in range(20):
         follower.cycle(0.08)
     assert follower.at["pan"] == 0.0

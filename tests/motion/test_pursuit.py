@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import rotate
-from rbxcompose.domains.arms.motion.pursuit import Chase, Pursuit, PursuitSettings
+from rbxcompose.domains.arms.components.arm_tracker import Chase, Pursuit, PursuitSettings
 
 SHOULDER = (0.1, 0.0, 0.5)
 SETTINGS = PursuitSettings(length=0.4)

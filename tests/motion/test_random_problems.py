@@ -13,11 +13,10 @@ import pytest
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmPlannerConfig, ArmWorks
-from rbxcompose.domains.arms.motion.figures import ended
+from rbxcompose.domains.arms.motion.figures import ended, sampled
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest
 from rbxcompose.domains.arms.motion.scene import PlacedObject
-from rbxcompose.domains.arms.motion.second_checker import sampled
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 from rbxcompose.domains.body.model import Geometry
 from tests.motion.toy_arm import Array

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rbxcompose.domains.arms.motion.collisions import TOUCH
+from rbxcompose.domains.arms.motion.collisions import TOUCH, sampled_matrix, whole_space
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest
-from rbxcompose.domains.arms.motion.sampled_pairs import sampled_matrix, whole_space
 from rbxcompose.domains.body.link_pairs import CollisionMatrix
 from tests.body.kinematics import description_of
 from tests.motion.test_planner import LEFT, RIGHT, sampled

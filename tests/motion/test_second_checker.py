@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.collisions import adjacent_pairs
-from rbxcompose.domains.arms.motion.figures import NO_TRIES, Tries, motion_tries
+from rbxcompose.domains.arms.motion.figures import NO_TRIES, SecondChecker, Tries, motion_tries, sampled
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.scene import PlacedObject
-from rbxcompose.domains.arms.motion.second_checker import SecondChecker, sampled
 from rbxcompose.domains.body.model import Geometry
 from tests.body.kinematics import description_of
 from tests.motion.toy_arm import gap, planner, urdf

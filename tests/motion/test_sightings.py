@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3, quaternion_from_yaw
-from rbxcompose.domains.arms.motion.sightings import MOST_OBJECTS, Sighting, Sightings
+from rbxcompose.domains.arms.components.seen_objects import MOST_OBJECTS, Sighting, Sightings
 
 SIZE = (0.02, 0.02, 0.1)
 POINTS = st.tuples(*[st.floats(-1, 1)] * 3)

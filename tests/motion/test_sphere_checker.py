@@ -16,8 +16,7 @@ from rbxcompose.domains.arms.motion.collisions import TOUCH, MeshChecker, adjace
 from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, JointSpace, interpolated
 from rbxcompose.domains.arms.motion.planner import LINE, MotionPlan, MotionRequest, first_bad
 from rbxcompose.domains.arms.motion.scene import PlacedObject
-from rbxcompose.domains.arms.motion.sphere_checker import SphereChecker
-from rbxcompose.domains.arms.motion.sphere_model import Trees
+from rbxcompose.domains.arms.motion.sphere_checker import SphereChecker, Trees
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 from rbxcompose.domains.arms.section_models import FAST
 from rbxcompose.domains.body.model import Geometry

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rbxcompose.domains.arms.motion import sphere_trees as kept_trees
 from rbxcompose.domains.arms.motion.collisions import coal_shape
-from rbxcompose.domains.arms.motion.sphere_model import triangles_of
+from rbxcompose.domains.arms.motion.sphere_checker import triangles_of
 from rbxcompose.domains.arms.motion.sphere_trees import (
     FINEST,
     LEAVES,

@@ -17,12 +17,11 @@ from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import MeshChecker
-from rbxcompose.domains.arms.motion.figures import ended
+from rbxcompose.domains.arms.motion.figures import ended, sampled
 from rbxcompose.domains.arms.motion.groups import ArmGroup
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest
 from rbxcompose.domains.arms.motion.scene import PlacedObject
-from rbxcompose.domains.arms.motion.second_checker import sampled
-from rbxcompose.domains.arms.motion.sphere_model import Trees, compiled_model
+from rbxcompose.domains.arms.motion.sphere_checker import Trees, compiled_model
 from rbxcompose.domains.arms.section_models import FAST
 from rbxcompose.domains.body.description import covering, to_xml
 from rbxcompose.domains.body.model import Geometry, Shape

@@ -74,8 +74,10 @@ def fast_planner(
     wall: tuple[float, float, float] = WALL, things: Iterable[PlacedObject] = (), **settings: object
 ) -> MotionPlanner:
     """Return the same on the fast path."""
-    from rbxcompose.domains.arms.motion.sphere_checker import SphereChecker  # which imports numba
-    from rbxcompose.domains.arms.motion.sphere_model import Trees
+    from rbxcompose.domains.arms.motion.sphere_checker import (
+        SphereChecker,  # which imports numba
+        Trees,
+    )
 
     made = planner(wall, **settings)
     arm = kinematics(wall)

@@ -16,12 +16,18 @@ from rbxcompose.base.clock import SteppedClock
 from rbxcompose.base.requests import Refused
 from rbxcompose.domains.devices.serial_ports import LostPortError
 from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
-from rbxcompose.domains.servos.twins.fault_script import FaultScript, InjectFault, TwinFault
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
-from rbxcompose.domains.servos.twins.servo_faults import FAULTS, UNPLUG, FaultName, servo_faults
+from rbxcompose.domains.servos.twins.servo_faults import (
+    FAULTS,
+    UNPLUG,
+    FaultName,
+    FaultScript,
+    InjectFault,
+    TwinFault,
+    servo_faults,
+)
 from rbxcompose.domains.servos.twins.servo_line import FakeLine
-from rbxcompose.domains.servos.twins.servo_port import FakePort
-from rbxcompose.domains.servos.twins.servo_twin import TwinBus, twin_of
+from rbxcompose.domains.servos.twins.servo_twin import FakePort, TwinBus, twin_of
 from tests.loops import for_all
 
 MODELS = {1: "AX-12", 2: "XL430-W250", 3: "AX-12", 4: "XL430-W250"}

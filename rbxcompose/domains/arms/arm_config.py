@@ -15,13 +15,13 @@ from rbxcompose.base.geometry import Vector3
 from rbxcompose.base.units import ANGLE, LENGTH, Dimension
 from rbxcompose.domains.arms.motion import collisions
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
+from rbxcompose.domains.arms.motion.figures import SecondChecker
 from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, Array, JointSpace, interpolated
 from rbxcompose.domains.arms.motion.hand_task import PlanningHelper
 from rbxcompose.domains.arms.motion.inverse_kinematics import ANGLE_TOLERANCE, RESTARTS, TOLERANCE, SolverSettings
 from rbxcompose.domains.arms.motion.numba_cache import is_installed, keep_libraries
 from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
-from rbxcompose.domains.arms.motion.second_checker import SecondChecker
 from rbxcompose.domains.arms.section_models import AUTOMATIC, FAST, HandConfig
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.link_pairs import LinkPair
@@ -268,7 +268,6 @@ def _hastened() -> Callable[[collisions.MeshChecker], collisions.Checker]:
     Raises:
         ModuleNotFoundError: without numba, which is imported here and not before.
     """
-    from rbxcompose.domains.arms.motion.sphere_checker import SphereChecker
-    from rbxcompose.domains.arms.motion.sphere_model import Trees
+    from rbxcompose.domains.arms.motion.sphere_checker import SphereChecker, Trees
 
     return partial(SphereChecker, trees=Trees())

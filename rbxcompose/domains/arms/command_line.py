@@ -167,20 +167,26 @@ def chosen_robot(arguments: argparse.Namespace) -> Robot | None:
     return None if report.has_errors else compilation.robot
 
 
-def chosen_arm(arguments: argparse.Namespace, *, is_fast: bool = False) -> tuple[ArmOfRobot, ArmWorks] | None:
-    """Return the chosen arm, and what plans for it, for many motions if `is_fast`; None after errors."""
-    robot = chosen_robot(arguments)
-    if robot is None:
-        return None
-    found = robot.manifest.contents.of(arms)
-    name = arguments.arm or (next(iter(found)) if len(found) == 1 else "")
-    if name not in found:
-        words = clauses(f"there is no arm '{name}'", suggest(name, found, "arms")) if name else "name one with --arm"
-        raise NotDoneError(NO_MOTION.at(None, words if found else "this robot has no arms"))
-    config, description = robot.components[name].config, robot.manifest.contents.of(body)
-    if not isinstance(config, ArmConfig) or description is None:
-        return None
-    return found[name], works_of(robot, config, description, is_fast=is_fast)
+def with_arm(
+    do: Callable[[argparse.Namespace, ArmOfRobot, ArmWorks], int], *, is_fast: bool = False
+) -> Callable[[argparse.Namespace], int]:
+    """Return what a command does with the chosen arm, and with what plans for it: for many motions if `is_fast`."""
+
+    def run(arguments: argparse.Namespace) -> int:
+        if (robot := chosen_robot(arguments)) is None:
+            return 1
+        found = robot.manifest.contents.of(arms)
+        name = arguments.arm or (next(iter(found)) if len(found) == 1 else "")
+        if name not in found:
+            words = f"there is no arm '{name}'"
+            words = clauses(words, suggest(name, found, "arms")) if name else "name one with --arm"
+            raise NotDoneError(NO_MOTION.at(None, words if found else "this robot has no arms"))
+        config, description = robot.components[name].config, robot.manifest.contents.of(body)
+        if not isinstance(config, ArmConfig) or description is None:
+            return 1
+        return do(arguments, found[name], works_of(robot, config, description, is_fast=is_fast))
+
+    return run
 
 
 def works_of(robot: Robot, config: ArmConfig, description: Description, *, is_fast: bool) -> ArmWorks:

@@ -72,23 +72,19 @@ def hand_ports(config: ArmConfig) -> dict[str, Port[Any]]:
     outcomes = dict.fromkeys(GRASP_REASONS, "failure")
     shared: Any = {"claims": config.controller, "outcomes": outcomes, "ranges": RANGES}
     lengths = dict.fromkeys(("approach", "lift", "opening", "squeeze"), LENGTH) | SHARES
-    pick: ServesAction[Any, Any, Any] = ServesAction(
-        PickObject, f"{config.name}/pick", skill=f"pick_{config.name}", measures=lengths, **shared
-    )
-    place: ServesAction[Any, Any, Any] = ServesAction(
-        PlaceObject,
-        f"{config.name}/place",
-        skill=f"place_{config.name}",
-        measures=dict.fromkeys(("x", "y", "z", "tolerance", "approach", "retreat"), LENGTH) | SHARES,
-        choices={"spot": tuple(config.hand.spots)} if config.hand.spots else {},
-        **shared,
-    )
     return {
-        PICK: pick.named(PICK),
-        PLACE: place.named(PLACE),
-        GRIP: CallsAction(GripperCommand, config.hand.command).named(GRIP),
-        ATTACH: Calls(AttachObject, "scene/attach").named(ATTACH),
-        DETACH: Calls(DetachObject, "scene/detach").named(DETACH),
+        PICK: ServesAction(PickObject, f"{config.name}/pick", skill=f"pick_{config.name}", measures=lengths, **shared),
+        PLACE: ServesAction(
+            PlaceObject,
+            f"{config.name}/place",
+            skill=f"place_{config.name}",
+            measures=dict.fromkeys(("x", "y", "z", "tolerance", "approach", "retreat"), LENGTH) | SHARES,
+            choices={"spot": tuple(config.hand.spots)} if config.hand.spots else {},
+            **shared,
+        ),
+        GRIP: CallsAction(GripperCommand, config.hand.command),
+        ATTACH: Calls(AttachObject, "scene/attach"),
+        DETACH: Calls(DetachObject, "scene/detach"),
     }
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import Transform3
+from rbxcompose.base.geometry import Transform3, angle_between
 from rbxcompose.domains.worlds.physics.solids import quaternion_of, rotation_matrix
 
 Numbers = NDArray[np.float64]
@@ -169,8 +169,8 @@ def _vector(turn: Numbers) -> Numbers:
 
 
 def _is_within(one: Transform3, other: Transform3, bounds: tuple[float, float]) -> bool:
-    alike = abs(sum(a * b for a, b in zip(one.rotation, other.rotation, strict=True)))
-    return math.dist(one.translation, other.translation) <= bounds[0] and 2 * math.acos(min(1, alike)) <= bounds[1]
+    away, angle = math.dist(one.translation, other.translation), angle_between(one.rotation, other.rotation)
+    return away <= bounds[0] and angle <= bounds[1]
 
 
 def _mean(poses: Sequence[Transform3]) -> Transform3:

@@ -21,7 +21,6 @@ from rbxcompose.base.config import (
     Refers,
     Time,
 )
-from rbxcompose.domains.arms.motion.head_tracking import HeadTrackingSettings
 from rbxcompose.manifest.fields import TopicName
 
 AUTOMATIC, FAST = "automatic", "fast"
@@ -210,8 +209,3 @@ class HeadTracking(Config):
     """How long it looks around before that."""
     calm: Annotated[AngularSpeed, Live()] = Field(0.3, gt=0)
     """How fast it looks around, and back."""
-
-    @property
-    def settings(self) -> HeadTrackingSettings:
-        """Return how it follows."""
-        return HeadTrackingSettings(**self.model_dump(exclude={"frame", "topic"}))

@@ -24,7 +24,7 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.arm_config import ArmConfig
 from rbxcompose.domains.arms.command_line import whole_number, works_of
 from rbxcompose.domains.arms.drafts import manifest_of, proposed_arms
-from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pairs
+from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pairs, sampled_matrix
 from rbxcompose.domains.arms.sections.arms import arms
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.link_pairs import CollisionMatrix, LinkPair, read_matrix
@@ -125,8 +125,6 @@ def _checked(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
 
 
 def _sampled(description: Description, arguments: argparse.Namespace) -> CollisionMatrix | Finding:
-    from rbxcompose.domains.arms.motion.sampled_pairs import sampled_matrix  # its libraries are an extra
-
     try:
         sampling = sampled_matrix(description, arguments.samples, arguments.seed)
         while True:

@@ -34,10 +34,10 @@ def servo_ports(config: ArmConfig) -> dict[str, Port[Any]]:
     if not config.stream:
         return {}
     return {
-        TWIST: In(TwistStamped, f"{config.name}/servo/twist", qos="command", is_open=True).named(TWIST),
-        POSE: In(PoseStamped, f"{config.name}/servo/pose", qos="command", is_open=True).named(POSE),
-        STATUS: Out(String, f"{config.name}/servo/status", qos="latched").named(STATUS),
-        STREAM: Out(JointTrajectory, config.stream).named(STREAM),
+        TWIST: In(TwistStamped, f"{config.name}/servo/twist", qos="command", is_open=True),
+        POSE: In(PoseStamped, f"{config.name}/servo/pose", qos="command", is_open=True),
+        STATUS: Out(String, f"{config.name}/servo/status", qos="latched"),
+        STREAM: Out(JointTrajectory, config.stream),
     }
 
 

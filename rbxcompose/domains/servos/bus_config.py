@@ -14,7 +14,7 @@ from rbxcompose.domains.servos.limits import MotionLimits
 from rbxcompose.domains.servos.models import ServoModel, joint_effort, steepest
 from rbxcompose.domains.servos.servo_cycle import JointMimic, ServoItem
 from rbxcompose.domains.servos.transmission import Calibration, Gear, Measured
-from rbxcompose.domains.servos.twins.fault_script import TwinFault
+from rbxcompose.domains.servos.twins.servo_faults import TwinFault
 from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.msgs.std_srvs import SetBool, Trigger

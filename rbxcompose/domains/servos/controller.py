@@ -6,7 +6,7 @@ import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
-from typing import Any, ClassVar, Generic, Literal, Protocol, Self, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, Protocol, Self, TypeVar, get_args
 
 from pydantic import PrivateAttr
 
@@ -14,11 +14,13 @@ from rbxcompose.base.config import Config
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.plugins import Plugins
 from rbxcompose.base.units import ANGLE, LENGTH, Dimension
-from rbxcompose.domains.servos.curves import JointSample
-from rbxcompose.domains.servos.trajectory import JointRules
 from rbxcompose.sdk.bound import ActionServer, ServedGoal
 from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.ports import Port
+
+if TYPE_CHECKING:  # `check` needs neither
+    from rbxcompose.domains.servos.joint_drive import JointDrive
+    from rbxcompose.domains.servos.servo_cycle import ServoItem
 
 PLUGINS = Plugins("controller", "controllers")
 _TYPES: dict[str, type[Controller[Any]]] = {}
@@ -70,53 +72,6 @@ C = TypeVar("C", bound=ControllerConfig)
 T = TypeVar("T", bound="type[Controller[Any]]")
 
 
-class ControlledJoint(Protocol):
-    """A joint as a controller sees it; positions are [rad], or [m] if it slides."""
-
-    rules: JointRules
-    measured: JointSample
-    effort: float
-
-    @property
-    def commanded(self) -> JointSample:
-        """Return where it was commanded to be, within its limits."""
-
-    @property
-    def blocked(self) -> str:
-        """Return why it may not move; empty if it may."""
-
-    @property
-    def has_torque(self) -> bool:
-        """Return whether its servos hold or move it, and nobody has asked to relax it."""
-
-    @property
-    def measured_at(self) -> float:
-        """Return when it was measured [s], -inf if it never was."""
-
-    @property
-    def per_tick(self) -> float:
-        """Return how far it moves for one tick of its servo."""
-
-    def follow(self, sample: JointSample) -> None:
-        """Be at a position at the end of this cycle, and pass there with its velocity."""
-
-    def turn(self, velocity: float) -> None:
-        """Move with a velocity up to the end of this cycle."""
-
-    def hold(self) -> None:
-        """Come to rest within its limits, and stay there."""
-
-
-class ItemOfServo(Protocol):
-    """An item of a servo as a controller sees it."""
-
-    value: float
-    problem: str
-
-    def write(self, raw: int) -> None:
-        """Write a raw value in one of the next cycles; a newer one replaces it."""
-
-
 class ControllerHost(Protocol):
     """The component that runs controllers, as their sites see it."""
 
@@ -136,14 +91,14 @@ class ControllerHost(Protocol):
     def objection(self, controller: str) -> str:
         """Return why a controller may command nothing now, or nothing."""
 
-    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ItemOfServo:
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ServoItem:
         """Return an item of a servo."""
 
 
 class ControllerSite:
     """What a controller uses of the component that runs it."""
 
-    def __init__(self, bus: ControllerHost, name: str, joints: Mapping[str, ControlledJoint]) -> None:
+    def __init__(self, bus: ControllerHost, name: str, joints: Mapping[str, JointDrive]) -> None:
         self._bus, self._name, self.joints = bus, name, joints
 
     @property
@@ -161,7 +116,7 @@ class ControllerSite:
         """Return why nothing may be commanded now, or nothing."""
         return self._bus.objection(self._name)
 
-    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ItemOfServo:
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ServoItem:
         """Return an item of a servo; what it needs in other items is written before. Only `prepare` may ask."""
         return self._bus.item(actuator, name, is_read=is_read, setup=setup)
 

@@ -127,10 +127,9 @@ class GroupRead:
 
 
 class ServoReader:
-    """Carries out group reads on a port; `strays` counts replies that nobody waited for."""
+    """Carries out group reads on a port."""
 
     def __init__(self, packets: Mapping[int, Packets], clock: Callable[[], float]) -> None:
-        self.strays = 0
         self._packets, self._clock = packets, clock
 
     def attempt(
@@ -156,16 +155,10 @@ class ServoReader:
         for answer in answers:
             if answer is NoAnswer.CORRUPT:
                 read.corrupt |= missing.keys()
-            elif isinstance(answer, Answer) and self._is_wanted(answer, missing):
+            elif isinstance(answer, Answer) and answer.id in missing and len(answer.data) == missing[answer.id].length:
                 del missing[answer.id]
                 read.take(answer, self._clock())
         return [servo for servo in wanted if servo not in missing]
-
-    def _is_wanted(self, answer: Answer, missing: Mapping[int, Stretch]) -> bool:
-        if answer.id in missing and len(answer.data) == missing[answer.id].length:
-            return True
-        self.strays += 1
-        return False
 
 
 def _plain(port: BlockingPort, packets: Packets, missing: Mapping[int, Stretch]) -> Iterator[Answer | NoAnswer]:
@@ -262,11 +255,6 @@ class DynamixelBus:
     def statistics(self) -> Mapping[int, servo_bus.ServoStatistics]:
         """Return how well each servo answers, by id."""
         return self.attention.statistics
-
-    @property
-    def strays(self) -> int:
-        """Return the number of replies that nobody waited for."""
-        return self._reader.strays
 
     @property
     def is_open(self) -> bool:

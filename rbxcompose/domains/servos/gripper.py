@@ -68,12 +68,18 @@ class FingerGeometry:
 
 
 @dataclass(frozen=True, slots=True)
-class OneSidedGripper:
-    """One servo turns one finger; the other one is fixed. `center` is its angle with parallel fingers [rad]."""
+class FingerGripper:
+    """A servo turns a finger; a second one turns the other finger, if that is not fixed, in the opposite direction."""
 
     geometry: FingerGeometry
-    center: float = 0.0
-    invert: bool = False
+    centers: tuple[float, ...] = (0.0,)
+    """The angle of each servo with parallel fingers [rad]."""
+    inverts: tuple[bool, ...] = (False,)
+
+    @property
+    def _turns(self) -> tuple[float, ...]:
+        """Which way each servo turns as the gripper opens, 1 or -1."""
+        return tuple(-1.0 if invert != bool(side) else 1.0 for side, invert in enumerate(self.inverts))
 
     @property
     def openings(self) -> tuple[float, float]:
@@ -81,37 +87,14 @@ class OneSidedGripper:
         return self.geometry.least, self.geometry.greatest
 
     def angles(self, opening: float) -> tuple[float, ...]:
-        """Return the angle of the servo [rad]."""
-        return (self.center + _sign(self.invert) * self.geometry.angle(opening),)
+        """Return the angle of each servo [rad]."""
+        angle = self.geometry.angle(opening)
+        return tuple(center + turn * angle for center, turn in zip(self.centers, self._turns, strict=True))
 
     def opening(self, angles: Sequence[float]) -> float:
-        """Return the opening at the measured angle [m]."""
-        return self.geometry.opening(_sign(self.invert) * (angles[0] - self.center))
-
-
-@dataclass(frozen=True, slots=True)
-class DualGripper:
-    """Two servos, left and right, turn a finger each, in opposite directions."""
-
-    geometry: FingerGeometry
-    centers: tuple[float, float] = (0.0, 0.0)
-    inverts: tuple[bool, bool] = (False, False)
-
-    @property
-    def openings(self) -> tuple[float, float]:
-        """The least and the greatest opening [m]."""
-        return self.geometry.least, self.geometry.greatest
-
-    def angles(self, opening: float) -> tuple[float, ...]:
-        """Return the angles of the left and the right servo [rad]."""
-        angle, (left, right) = self.geometry.angle(opening), self.inverts
-        return self.centers[0] + _sign(left) * angle, self.centers[1] - _sign(right) * angle
-
-    def opening(self, angles: Sequence[float]) -> float:
-        """Return the opening at the measured angles [m]: that of the mean of both fingers."""
-        left = _sign(self.inverts[0]) * (angles[0] - self.centers[0])
-        right = -_sign(self.inverts[1]) * (angles[1] - self.centers[1])
-        return self.geometry.opening((left + right) / 2.0)
+        """Return the opening at the measured angles [m]: that of the mean of the fingers."""
+        turned = [turn * (at - center) for at, center, turn in zip(angles, self.centers, self._turns, strict=False)]
+        return self.geometry.opening(sum(turned) / len(turned))
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,7 +217,3 @@ def _check_range(least: float, greatest: float) -> None:
 def _check_opening(opening: float, least: float, greatest: float) -> None:
     if not least <= opening <= greatest:
         raise ValueError(f"it opens from {least:g} m to {greatest:g} m, not by {opening:g} m")
-
-
-def _sign(invert: bool) -> float:
-    return -1.0 if invert else 1.0

@@ -13,7 +13,7 @@ from rbxcompose.domains.servos import joint_states
 from rbxcompose.domains.servos.bus import ServoReading
 from rbxcompose.domains.servos.curves import JointSample
 from rbxcompose.domains.servos.limits import Limiter, MotionLimits
-from rbxcompose.domains.servos.models import HARDWARE_ERRORS, ONE_ERRORS, ServoModel
+from rbxcompose.domains.servos.models import ONE_ERRORS, ServoModel, hardware_errors
 from rbxcompose.domains.servos.trajectory import JointRules
 from rbxcompose.domains.servos.transmission import Gear, Transmission
 
@@ -206,7 +206,8 @@ class JointDrive(ABC):
         if (raw := values.get("present_voltage")) is not None:
             self.voltage = model.to_si("present_voltage", raw)
         if model.protocol == 1 or "hardware_error" in values:  # in 2.0, not each reading has errors
-            self._errors[id] = ", ".join(_faults(servo, reading))
+            bits = reading.alert & ONE_ERRORS if model.protocol == 1 else values["hardware_error"]
+            self._errors[id] = ", ".join(hardware_errors(bits))
 
     def _measure(self, servo: JointServo, raw: int, speed: int, stamp: float) -> None:
         if self.joint.mode == "velocity":
@@ -322,11 +323,6 @@ class JointDrive(ABC):
         """Yield the next goal, if its command changes; the joint has torque."""
 
 
-def _faults(servo: JointServo, reading: ServoReading) -> Iterator[str]:
-    bits = reading.alert & ONE_ERRORS if servo.model.protocol == 1 else reading.values.get("hardware_error", 0)
-    yield from (words for bit, words in HARDWARE_ERRORS.items() if bits & bit)
-
-
 class PositionDrive(JointDrive):
     """Leads a joint to positions, along paths or by itself; `speed` is how fast it goes by itself [rad/s or m/s]."""
 
@@ -362,7 +358,8 @@ class PositionDrive(JointDrive):
         if limiter is None or limiter.is_settled:
             return
         before = self.joint.raws(limiter.position)
-        goal = self.joint.raws(limiter.step(dt).position)
+        limiter.step(dt)
+        goal = self.joint.raws(limiter.position)
         if goal != before:
             yield {id_: {"goal_position": raw} for id_, raw in goal.items()}
 
@@ -395,7 +392,8 @@ class VelocityDrive(JointDrive):
         limiter = self.limiter
         if limiter is None:
             return
-        velocity = limiter.step(dt).velocity
+        limiter.step(dt)
+        velocity = limiter.velocity
         limiter.position = self.measured.position
         limiter.want(limiter.position)  # unless it is repeated
         raws = self.joint.wheel_raws(velocity, self.measured.position)

@@ -7,7 +7,6 @@ times are robot time [s].
 from __future__ import annotations
 
 import math
-from collections import Counter
 from dataclasses import fields
 
 from rbxcompose.base.dataclass import dataclass
@@ -106,18 +105,6 @@ def stopping_speed(distance: float, dt: float, acceleration: float | None) -> fl
     return 2.0 * distance / (dt + math.hypot(dt, math.sqrt(2.0 * distance / acceleration)))
 
 
-@dataclass(frozen=True, slots=True)
-class LimitedCommand:
-    """The next command of a joint."""
-
-    position: float
-    """[rad or m]."""
-    velocity: float
-    """With which it was reached from the last command [rad/s or m/s]."""
-    clamped: tuple[str, ...] = ()
-    """Which limits held the joint back in this step: `position`, `velocity`, `acceleration`."""
-
-
 class Limiter:
     """Leads the command of a joint from the LAST COMMAND towards a wanted position within its limits.
 
@@ -128,8 +115,6 @@ class Limiter:
 
     def __init__(self, limits: MotionLimits, position: float) -> None:
         self.limits = limits
-        self.clamps: Counter[str] = Counter()  # steps in which a limit held the joint back, by its word
-        self.rejected = 0  # wanted positions that were no finite numbers
         self.reseed(position)
 
     def reseed(self, position: float) -> None:
@@ -164,7 +149,6 @@ class Limiter:
         joint that must be able to stop at each wanted position lags behind by v^2 / (2 a).
         """
         if not (math.isfinite(position) and math.isfinite(velocity)):
-            self.rejected += 1
             return f"position {position} and velocity {velocity} are not both finite numbers"
         self._wanted, self._wanted_velocity = position, velocity
         return None
@@ -175,21 +159,14 @@ class Limiter:
         way = 0.0 if acceleration is None else self.velocity * abs(self.velocity) / (2.0 * acceleration)
         self._wanted, self._wanted_velocity = self.limits.clamped(self.position + way), 0.0
 
-    def step(self, dt: float) -> LimitedCommand:
-        """Return the command after `dt` [s]. ValueError if `dt` is not a finite number above 0."""
+    def step(self, dt: float) -> None:
+        """Go on to the command after `dt` [s]. ValueError if `dt` is not a finite number above 0."""
         if not (math.isfinite(dt) and dt > 0.0):
             raise ValueError(f"a step of {dt} s is no step")
-        inside = self.limits.clamped(self._wanted)
-        clamped = ["position"] if inside != self._wanted else []
-        wished = self._velocity_towards(inside, dt)
+        wished = self._velocity_towards(self.limits.clamped(self._wanted), dt)
         velocity = max(-self.limits.speed, min(self.limits.speed, wished))
-        clamped += ["velocity"] if velocity != wished else []
-        reachable = self._reachable(velocity, dt)
-        clamped += ["acceleration"] if reachable != velocity else []
-        self._move(reachable, dt)
-        self.clamps.update(clamped)
+        self._move(self._reachable(velocity, dt), dt)
         self._wanted_velocity = 0.0
-        return LimitedCommand(self.position, self.velocity, tuple(clamped))
 
     def _velocity_towards(self, wanted: float, dt: float) -> float:
         """Return the velocity that leads to `wanted`, as seen by an observer that moves with the wanted velocity."""

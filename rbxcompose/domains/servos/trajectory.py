@@ -82,15 +82,7 @@ class TrajectoryPolicy:
     """What to do with positions outside of the limits."""
     too_fast: Literal["refuse", "stretch"] = "refuse"
     """What to do with a trajectory above the limits of velocity: `stretch` takes more time."""
-    allow_partial: bool = True
-    """Whether a goal may leave out joints; they hold."""
-    allow_final_velocity: bool = False
-    """Whether the last point may be passed with a velocity."""
-    start_from: Literal["commanded", "measured"] = "commanded"
-    """Where a trajectory starts when none is running."""
     tolerance: TrajectoryTolerance = TrajectoryTolerance()
-    tolerances: Mapping[str, TrajectoryTolerance] = field(default_factory=dict)
-    """Of single joints, in place of `tolerance`."""
     goal_time: float = 1.0
     """How long after its end the joints may take to arrive [s]; inf waits for ever."""
 
@@ -104,15 +96,14 @@ class TrajectoryRefusal:
     joint: str = ""
 
 
-def mistake_in(goal: TrajectoryGoal, known: Collection[str], policy: TrajectoryPolicy) -> TrajectoryRefusal | None:
+def mistake_in(goal: TrajectoryGoal, known: Collection[str]) -> TrajectoryRefusal | None:
     """Return what is wrong with the goal, whatever the limits and the state of the `known` joints are."""
-    return next(itertools.chain(_joints(goal, known, policy), _shapes(goal), _times(goal), _fields(goal, policy)), None)
+    return next(itertools.chain(_joints(goal, known), _shapes(goal), _times(goal), _fields(goal)), None)
 
 
-def _joints(goal: TrajectoryGoal, known: Collection[str], policy: TrajectoryPolicy) -> Iterator[TrajectoryRefusal]:
+def _joints(goal: TrajectoryGoal, known: Collection[str]) -> Iterator[TrajectoryRefusal]:
     twice = next((name for name, count in Counter(goal.joints).items() if count > 1), None)
     unknown = next((name for name in goal.joints if name not in known), None)
-    missing = next((name for name in known if name not in goal.joints), None)
     code = TrajectoryCode.INVALID_JOINTS
     if not goal.joints:
         yield TrajectoryRefusal(code, "it names no joints")
@@ -120,8 +111,6 @@ def _joints(goal: TrajectoryGoal, known: Collection[str], policy: TrajectoryPoli
         yield TrajectoryRefusal(code, f"joint '{twice}' is named twice", twice)
     if unknown is not None:
         yield TrajectoryRefusal(code, f"joint '{unknown}' is unknown; there are {', '.join(known)}", unknown)
-    if missing is not None and not policy.allow_partial:
-        yield TrajectoryRefusal(code, f"joint '{missing}' is missing", missing)
 
 
 def _shapes(goal: TrajectoryGoal) -> Iterator[TrajectoryRefusal]:
@@ -151,7 +140,7 @@ def _times(goal: TrajectoryGoal) -> Iterator[TrajectoryRefusal]:
             yield _invalid(f"point {index} is at {after.time:g} s, before the point in front of it")
 
 
-def _fields(goal: TrajectoryGoal, policy: TrajectoryPolicy) -> Iterator[TrajectoryRefusal]:
+def _fields(goal: TrajectoryGoal) -> Iterator[TrajectoryRefusal]:
     for name in ("velocities", "accelerations"):
         lacking = [index for index, point in enumerate(goal.points) if not getattr(point, name)]
         if lacking and len(lacking) < len(goal.points):
@@ -160,7 +149,7 @@ def _fields(goal: TrajectoryGoal, policy: TrajectoryPolicy) -> Iterator[Trajecto
     if first.accelerations and not first.velocities:
         yield _invalid("it has accelerations without velocities")
     for joint, velocity in zip(goal.joints, last.velocities, strict=False):
-        if velocity and not policy.allow_final_velocity:
+        if velocity:
             yield _invalid(f"joint '{joint}' has a velocity of {velocity:g} at the end, not 0", joint)
 
 
@@ -226,7 +215,7 @@ def plan_trajectory(
     They keep the limits of position and velocity. Accelerations that a goal demands are left to the limiter of each
     joint, and to the tolerance of its path.
     """
-    mistake = mistake_in(goal, joints, policy)
+    mistake = mistake_in(goal, joints)
     if mistake is not None:
         return mistake
     draft = _Draft(goal, start, joints, policy)

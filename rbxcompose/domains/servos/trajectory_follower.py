@@ -163,24 +163,26 @@ class TrajectoryFollower:
         return bool(self._motions)
 
     def accept(
-        self, goal: TrajectoryGoal, now: float, measured: Samples, commanded: Samples, *, is_live: bool = False
+        self, goal: TrajectoryGoal, now: float, commanded: Samples, *, is_live: bool = False
     ) -> TrajectoryPlan | TrajectoryRefusal:
         """Take over a goal, from now on or from its start on; return its plan, or why it is refused.
 
         It replaces what runs, whose joints it continues with position, velocity and acceleration; outcomes are its own
-        from now on. Joints which it leaves out come to rest when it begins. A refusal changes nothing. `measured` and
-        `commanded` have all joints of the goal that are known. What `is_live` passes at its own speed.
+        from now on. Joints which it leaves out come to rest when it begins. A refusal changes nothing. `commanded` has
+        all joints of the goal that are known; those that nothing leads start from there. What `is_live` passes at its
+        own speed.
         """
         begin = begin_of(goal, now)
-        idle = commanded if self.policy.start_from == "commanded" else measured
         names = [name for name in goal.joints if name in self.joints]
-        lost = next((name for name in names if name not in self._motions and not idle[name].is_finite), None)
+        lost = next((name for name in names if name not in self._motions and not commanded[name].is_finite), None)
         if lost is not None:
             return TrajectoryRefusal(TrajectoryCode.INVALID_GOAL, f"it is not known where joint '{lost}' is", lost)
-        waiting = {name: self._motions.get(name) or self._resting(name, idle[name], now) for name in names}
+        waiting = {name: self._motions.get(name) or self._resting(name, commanded[name], now) for name in names}
         is_led = {name: name in self._motions or begin > now for name in names}
         there = {name: self._sample(name, begin) for name in names if name in self._motions}
-        start = {name: there.get(name) or (waiting[name].at(begin) if is_led[name] else idle[name]) for name in names}
+        start = {
+            name: there.get(name) or (waiting[name].at(begin) if is_led[name] else commanded[name]) for name in names
+        }
         plan = plan_trajectory(goal, now, start, self.joints, self.policy)
         if isinstance(plan, TrajectoryPlan):
             self._motions |= waiting
@@ -308,7 +310,7 @@ class TrajectoryFollower:
         return None
 
     def _tolerance(self, run: _Run, joint: str) -> TrajectoryTolerance:
-        return run.goal.tolerances.get(joint, self.policy.tolerances.get(joint, self.policy.tolerance))
+        return run.goal.tolerances.get(joint, self.policy.tolerance)
 
     def _error(self, joint: str, desired: JointSample, actual: JointSample) -> float:
         error = desired.position - actual.position

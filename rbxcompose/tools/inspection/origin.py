@@ -8,7 +8,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Span
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import Quantity
-from rbxcompose.compiler.composition.dump import dump, dump_robot, exact
+from rbxcompose.compiler.composition.dump import dump, dump_robot
 from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_manifest import ROBOT_LAYER, RobotManifest
 from rbxcompose.manifest.arguments import show

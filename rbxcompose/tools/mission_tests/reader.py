@@ -16,8 +16,7 @@ from rbxcompose.compiler.compile import Compilation, compile_robot, robot_for_mi
 from rbxcompose.compiler.model.robot import Robot, RobotMission, resolve
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.domains.servos.sections.faults import buses_of_joints
-from rbxcompose.domains.servos.twins.fault_script import InjectFault
-from rbxcompose.domains.servos.twins.servo_faults import FAULTS, UNPLUG
+from rbxcompose.domains.servos.twins.servo_faults import FAULTS, UNPLUG, InjectFault
 from rbxcompose.manifest import test_file as trials
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.files import PREFIX, PROFILE, shown_name

@@ -38,7 +38,6 @@ from rbxcompose.domains.arms.command_line import (
     NO_MOTION,
     KeepModel,
     TraceModel,
-    chosen_arm,
     chosen_robot,
     keys_of,
     positions_in,
@@ -47,6 +46,7 @@ from rbxcompose.domains.arms.command_line import (
     shown,
     values_of,
     whole_number,
+    with_arm,
     write_picture,
 )
 from rbxcompose.domains.arms.goals import goal_of
@@ -90,26 +90,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     setup = "find pairs of links that need not be watched, and write their file"
     bench = "measure kinematics, and motions, also those of published problems"
     plan = "plan a motion and print how long it takes, or why there is none"
+    picture_words = "draw where the tip gets, and how well, as PNG"
+    camera = "measure where a camera of a running robot is, by a tag on the hand"
+    go = "move an arm of a running robot, and print how that ends"
+    forward = "print where the tip is (forward kinematics)"
     actions = (
         options.Subcommand("ls", "list the arms of a robot with their joints and poses", _ls, shared),
-        options.Subcommand("fk", "print where the tip is (forward kinematics)", _fk, (goal, fk_picture, *of_arm)),
-        options.Subcommand("ik", ik, run_inverse, (add_inverse_options, start, *of_arm)),
-        options.Subcommand("plan", plan, _plan, (goal, picture, start, *of_arm, keep)),
-        options.Subcommand("trace", trace, _trace, (way, picture, start, *of_arm)),
-        options.Subcommand(
-            "picture", "draw where the tip gets, and how well, as PNG", _picture, (add_reach_options, *of_arm)
-        ),
-        options.Subcommand("bench", bench, _bench, (add_bench_options, *of_arm)),
+        options.Subcommand("fk", forward, with_arm(_fk), (goal, fk_picture, *of_arm)),
+        options.Subcommand("ik", ik, with_arm(run_inverse), (add_inverse_options, start, *of_arm)),
+        options.Subcommand("plan", plan, with_arm(_plan), (goal, picture, start, *of_arm, keep)),
+        options.Subcommand("trace", trace, with_arm(_trace), (way, picture, start, *of_arm)),
+        options.Subcommand("picture", picture_words, with_arm(run_reach), (add_reach_options, *of_arm)),
+        options.Subcommand("bench", bench, with_arm(run_bench, is_fast=True), (add_bench_options, *of_arm)),
         options.Subcommand("setup", setup, run_setup, (add_options, *shared)),
-        options.Subcommand(
-            "calibrate-camera",
-            "measure where a camera of a running robot is, by a tag on the hand",
-            run_camera,
-            (add_camera_options,),
-        ),
-        options.Subcommand(
-            "go", "move an arm of a running robot, and print how that ends", run_go, (add_go_options, keep)
-        ),
+        options.Subcommand("calibrate-camera", camera, run_camera, (add_camera_options,)),
+        options.Subcommand("go", go, run_go, (add_go_options, keep)),
     )
     options.add_actions(parser, actions)
 
@@ -145,16 +140,7 @@ def _described(robot: ArmOfRobot) -> dict[str, object]:
     return {"base": robot.group.base, "tip": robot.group.tip, "joints": list(robot.group.joints), "poses": poses}
 
 
-def _bench(arguments: argparse.Namespace) -> int:
-    made = chosen_arm(arguments, is_fast=True)
-    return 1 if made is None else run_bench(arguments, made[1])
-
-
-def _fk(arguments: argparse.Namespace) -> int:
-    made = chosen_arm(arguments)
-    if made is None:
-        return 1
-    robot, works = made
+def _fk(arguments: argparse.Namespace, robot: ArmOfRobot, works: ArmWorks) -> int:
     values = values_of(works, robot, arguments.goal)
     if arguments.picture and (failed := draw_motion(arguments, works, values, values, None)):
         return failed
@@ -169,11 +155,7 @@ def _fk(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _plan(arguments: argparse.Namespace) -> int:
-    made = chosen_arm(arguments)
-    if made is None:
-        return 1
-    robot, works = made
+def _plan(arguments: argparse.Namespace, robot: ArmOfRobot, works: ArmWorks) -> int:
     start, goal = values_of(works, robot, arguments.start), values_of(works, robot, arguments.goal)
     keep = goal_of(_goal(MoveArm.Goal, {"keep": read_written(KeepModel, arguments.keep or "{}").message()})).keep
     if words := keep.mistake(works.kinematics):
@@ -183,11 +165,7 @@ def _plan(arguments: argparse.Namespace) -> int:
     return _show_plan(works, works.planner.plan(request), arguments, start, goal)
 
 
-def _trace(arguments: argparse.Namespace) -> int:
-    made = chosen_arm(arguments)
-    if made is None:
-        return 1
-    robot, works = made
+def _trace(arguments: argparse.Namespace, robot: ArmOfRobot, works: ArmWorks) -> int:
     start, goal = values_of(works, robot, arguments.start), goal_of(_goal(TraceArm.Goal, _way(arguments.way)))
     links, wish = works.kinematics.poses(start), goal.trace
     words = "" if not goal.frame or goal.frame in links else f"there is no link '{goal.frame}'"
@@ -196,11 +174,6 @@ def _trace(arguments: argparse.Namespace) -> int:
     frame = links[goal.frame] if goal.frame else Transform3()
     planning = planned_trace(works.kinematics, works.planner, wish, start, frame)
     return _show_plan(works, planning, arguments, start)
-
-
-def _picture(arguments: argparse.Namespace) -> int:
-    made = chosen_arm(arguments)
-    return 1 if made is None else run_reach(arguments, made[1], values_of(made[1], made[0], arguments.start))
 
 
 def _way(written: str) -> dict[str, object]:
@@ -263,16 +236,12 @@ def add_inverse_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--prefer", metavar="GOAL", default="", help=words)
 
 
-def run_inverse(arguments: argparse.Namespace) -> int:
+def run_inverse(arguments: argparse.Namespace, robot: ArmOfRobot, works: ArmWorks) -> int:
     """Print solutions, the best first.
 
     Raises:
         NotDoneError: if there is none, or the arguments ask for nothing that there is.
     """
-    made = chosen_arm(arguments)
-    if made is None:
-        return 1
-    robot, works = made
     target = _target(arguments, works, start := values_of(works, robot, arguments.start))
     found = _found(arguments, works, robot, target, start)
     each = [dict(zip(works.space.names, values.tolist(), strict=True)) for values in found.free]
@@ -385,7 +354,7 @@ def add_bench_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--problems", type=Path, metavar="FOLDER", help=words)
 
 
-def run_bench(arguments: argparse.Namespace, works: ArmWorks) -> int:
+def run_bench(arguments: argparse.Namespace, robot: ArmOfRobot, works: ArmWorks) -> int:
     """Measure, and print the figures; return 1 if a plan collides by the second examination."""
     problems = list[measures.MotionProblem]()
     if arguments.problems is not None:
@@ -537,8 +506,9 @@ def add_reach_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run_reach(arguments: argparse.Namespace, works: ArmWorks, start: Array) -> int:
+def run_reach(arguments: argparse.Namespace, robot: ArmOfRobot, works: ArmWorks) -> int:
     """Try positions, draw the picture, print what is in it; return the exit code."""
+    start = values_of(works, robot, arguments.start)
     layer = "" if arguments.layer in ("", "all") else f", {arguments.layer}"
     wish = read_written(_ReachModel, f"{{cell: {arguments.cell}, time: {arguments.time}{layer}}}")
     if not (wish.cell >= LEAST_SIDE and 0.0 < wish.time <= MOST_TIME):

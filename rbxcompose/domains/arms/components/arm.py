@@ -85,7 +85,7 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
     def ports(cls, config: ArmConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports: its goals, and those of its controller."""
         shared: Any = {"claims": config.controller, "outcomes": dict.fromkeys(REASONS, "failure")}
-        return super().ports(config) | {
+        found: dict[str, sdk.Port[Any]] = {
             MOVE: sdk.ServesAction(
                 MoveArm,
                 f"{config.name}/move",
@@ -95,7 +95,7 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
                 ranges=arm_goals.RANGES,
                 choices={"pose": tuple(config.poses)} if config.poses else {},
                 **shared,
-            ).named(MOVE),
+            ),
             REACH: sdk.ServesAction(
                 ReachPose,
                 f"{config.name}/reach",
@@ -105,11 +105,9 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
                 choices={"prefer": tuple(config.poses)} if config.poses else {},
                 may_lack=True,
                 **shared,
-            ).named(REACH),
-            WAY: sdk.Out(Path, f"{config.name}/plan", qos="latched").named(WAY),
-            DISPLAY: sdk.Out(moveit_msgs.DisplayTrajectory, f"{config.name}/display_planned_path", qos="latched").named(
-                DISPLAY
             ),
+            WAY: sdk.Out(Path, f"{config.name}/plan", qos="latched"),
+            DISPLAY: sdk.Out(moveit_msgs.DisplayTrajectory, f"{config.name}/display_planned_path", qos="latched"),
             TRACE: sdk.ServesAction(
                 TraceArm,
                 f"{config.name}/trace",
@@ -117,13 +115,14 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
                 measures=arm_goals.TRACE_MEASURES,
                 ranges=arm_goals.TRACE_RANGES,
                 **shared,
-            ).named(TRACE),
+            ),
             **servo_ports(config),
             **moveit_ports(config),
-            LOCATE: sdk.Serves(LocateArm, f"{config.name}/locate", skill=f"locate_{config.name}").named(LOCATE),
-            FOLLOW: sdk.CallsAction(FollowJointTrajectory, config.follow).named(FOLLOW),
+            LOCATE: sdk.Serves(LocateArm, f"{config.name}/locate", skill=f"locate_{config.name}"),
+            FOLLOW: sdk.CallsAction(FollowJointTrajectory, config.follow),
             **hand_ports(config),
         }
+        return super().ports(config) | {name: port.named(name) for name, port in found.items()}
 
     @classmethod
     def capabilities(cls, config: ArmConfig) -> tuple[sdk.Capability, ...]:
@@ -482,7 +481,7 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
 def moveit_ports(config: ArmConfig) -> dict[str, sdk.Port[Any]]:
     """Return the ports that `move_group` passes on to what comes under the names of ROS 2."""
     claims = config.controller
-    found: dict[str, sdk.Port[Any]] = {
+    return {
         FORWARD: sdk.Serves(moveit_msgs.GetPositionFK, f"{config.name}/compute_fk", skill=None),
         INVERSE: sdk.Serves(moveit_msgs.GetPositionIK, f"{config.name}/compute_ik", skill=None),
         MOTION: sdk.ServesAction(
@@ -496,7 +495,6 @@ def moveit_ports(config: ArmConfig) -> dict[str, sdk.Port[Any]]:
             limits=SCENE_LIMITS,
         ),
     }
-    return {name: port.named(name) for name, port in found.items()}
 
 
 def is_turned_away(goal: AnyGoal) -> bool:

@@ -1,20 +1,89 @@
-"""Leads the tip of an arm, and perhaps a head, after a point that somebody tells."""
+"""Leads the tip of an arm, and perhaps a head, after a point that somebody tells.
+
+The four distances are those of `arm_tracker` in "ROS By Example, Volume 2" by R. Patrick Goebel. Points are in the
+frame of the link that carries the arm, lengths in [m], times are robot time [s].
+"""
 
 from __future__ import annotations
 
 import math
+from enum import StrEnum
 from typing import Any
 
 from rbxcompose import sdk
-from rbxcompose.base.geometry import Transform3, Vector3
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, quaternion_from_rpy
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import TIME
-from rbxcompose.domains.arms.motion.pursuit import Chase, Pursuit, PursuitSettings
 from rbxcompose.msgs.geometry_msgs import Point, PointStamped, PoseStamped
 from rbxcompose.msgs.poses import pose_message
 from rbxcompose.msgs.rbxcompose_msgs import FollowPoint, MoveArm
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.std_msgs import Header
+
+
+class Chase(StrEnum):
+    """What an arm does while it follows a point."""
+
+    WAITING = "waiting"  # no point has come yet, or lately
+    FOLLOWING = "following"
+    THERE = "there"
+    FAR = "far"  # the point is beyond what the arm cares for: it rests
+
+
+@dataclass(frozen=True, slots=True)
+class PursuitSettings:
+    """The distances: `length` of the arm from its shoulder, of which it uses a `share`."""
+
+    length: float
+    share: float = 0.9
+    moved: float = 0.01
+    """What moved by less is where it was."""
+    close: float = 0.025
+    """The tip is there when it is nearer than this."""
+    farthest: float = 1.2
+    """Beyond this, from the shoulder, the arm rests."""
+
+
+class Pursuit:
+    """Follows a point; `shoulder` is where the arm begins."""
+
+    def __init__(self, settings: PursuitSettings, shoulder: Vector3, now: float) -> None:
+        self.state, self.goal, self.distance = Chase.WAITING, shoulder, math.inf
+        self._settings, self._shoulder = settings, shoulder
+        self._seen: Vector3 | None = None
+        self._at = now
+
+    def see(self, now: float, point: Vector3) -> None:
+        """Take where the point is now."""
+        self._at = now
+        if self._seen is None or math.dist(self._seen, point) >= self._settings.moved:
+            self._seen = point
+            self.goal = self._within(point)
+            self.state = Chase.FAR if math.dist(point, self._shoulder) > self._settings.farthest else Chase.FOLLOWING
+
+    def is_lost(self, now: float, patience: float) -> bool:
+        """Return whether no point has come for so long."""
+        return now - self._at > patience
+
+    def next(self, tip: Vector3) -> tuple[Vector3, Quaternion] | None:
+        """Return where the tip should go, pointing away from the shoulder; None if it should not move."""
+        self.distance = math.dist(tip, self.goal)
+        if self.state is not Chase.FOLLOWING:
+            return None
+        if self.distance <= self._settings.close:
+            self.state = Chase.THERE
+            return None
+        x, y, z = (to - at for to, at in zip(self.goal, self._shoulder, strict=True))
+        return self.goal, quaternion_from_rpy(0.0, -math.atan2(z, math.hypot(x, y)), math.atan2(y, x))
+
+    def _within(self, point: Vector3) -> Vector3:
+        """Return the point, or the one in its direction that is as far as the arm should reach."""
+        away = math.dist(point, self._shoulder)
+        share = min(1.0, self._settings.share * self._settings.length / max(away, 1e-9))
+        x, y, z = (at + (to - at) * share for to, at in zip(point, self._shoulder, strict=True))
+        return (x, y, z)
+
 
 FOLLOW, TARGET, POSE, REST, HEAD = "follow", "target", "pose", "rest", "head"  # its ports
 SEEN, TIP = "seen", "tip"  # its looks
@@ -76,26 +145,25 @@ class ArmTracker(sdk.Component[ArmTrackerConfig]):
     @classmethod
     def ports(cls, config: ArmTrackerConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports: its goals, the point, those of the arm and of the head."""
-        follow: sdk.ServesAction[Any, Any, Any] = sdk.ServesAction(
-            FollowPoint,
-            f"{config.name}/follow",
-            claims=config.controller,
-            skill=f"follow_{config.name}",
-            outcomes={LOST: "failure"},
-            measures={"patience": TIME},
-        )
         found: dict[str, sdk.Port[Any]] = {
-            FOLLOW: follow.named(FOLLOW),
-            TARGET: sdk.In(PointStamped, config.target, qos="command", is_open=True, may_be_silent=True).named(TARGET),
-            POSE: sdk.Out(PoseStamped, f"{config.arm}/servo/pose", qos="command").named(POSE),
-            SEEN: sdk.Looks(source=config.frame, target=config.base).named(SEEN),
-            TIP: sdk.Looks(source=config.tip, target=config.base).named(TIP),
+            FOLLOW: sdk.ServesAction(
+                FollowPoint,
+                f"{config.name}/follow",
+                claims=config.controller,
+                skill=f"follow_{config.name}",
+                outcomes={LOST: "failure"},
+                measures={"patience": TIME},
+            ),
+            TARGET: sdk.In(PointStamped, config.target, qos="command", is_open=True, may_be_silent=True),
+            POSE: sdk.Out(PoseStamped, f"{config.arm}/servo/pose", qos="command"),
+            SEEN: sdk.Looks(source=config.frame, target=config.base),
+            TIP: sdk.Looks(source=config.tip, target=config.base),
         }
         if config.rest:
-            found[REST] = sdk.CallsAction(MoveArm, f"{config.arm}/move").named(REST)
+            found[REST] = sdk.CallsAction(MoveArm, f"{config.arm}/move")
         if config.head:
-            found[HEAD] = sdk.Out(PointStamped, f"{config.head}/target", qos="command").named(HEAD)
-        return found
+            found[HEAD] = sdk.Out(PointStamped, f"{config.head}/target", qos="command")
+        return {name: port.named(name) for name, port in found.items()}
 
     def configure(self) -> None:
         """Follow nothing yet."""

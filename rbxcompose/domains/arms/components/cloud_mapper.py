@@ -1,36 +1,158 @@
-"""What a sensor of distances sees, as a thing that arms plan around."""
+"""What a sensor of distances sees, as a thing that arms plan around: which points are new, which cells are occupied."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from rbxcompose import sdk
-from rbxcompose.base.geometry import Transform3, rotate
-from rbxcompose.domains.arms.motion.clouds import SeenCells, SpaceFilter
-from rbxcompose.domains.arms.motion.collisions import readers_of
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion.collisions import Shapes, readers_of
 from rbxcompose.domains.arms.motion.groups import Array
-from rbxcompose.domains.arms.motion.scene import SCENE_LIMITS, PlacedObject, mistake_among
+from rbxcompose.domains.arms.motion.scene import OCTREE, PLANE, SCENE_LIMITS, PlacedObject, mistake_among
 from rbxcompose.domains.arms.motion.scene_messages import object_message, placed_object
-from rbxcompose.domains.body.model import Geometry
+from rbxcompose.domains.body.model import Body, Geometry
 from rbxcompose.domains.body.urdf import body_of
+from rbxcompose.domains.worlds.physics.solids import apply, rotation_matrix
 from rbxcompose.msgs.clouds import CloudError, points_of
 from rbxcompose.msgs.rbxcompose_msgs import SceneObject, SceneObjects
 from rbxcompose.msgs.sensor_msgs import JointState, PointCloud2
 from rbxcompose.msgs.stamps import NANOSECONDS, to_nanoseconds
 from rbxcompose.sdk.updater import TaskStatus
 
+Keys = NDArray[np.int64]
+_BITS = 21  # of the number of a cell along each axis
+_HALF, _MASK = 1 << (_BITS - 1), (1 << _BITS) - 1
+
+
+class SeenCells:
+    """Cells with sides of `side` [m]; each is forgotten `forget` [s] after it was seen last."""
+
+    def __init__(self, side: float, forget: float) -> None:
+        self.side, self.forget = side, forget
+        self._keys: Keys = np.empty(0, dtype=np.int64)  # sorted
+        self._seen: Array = np.empty(0)
+
+    def __len__(self) -> int:
+        return len(self._keys)
+
+    def found(self, points: Array, least: int = 1) -> Array:
+        """Return the middles of the cells with at least so many of the points, of shape (n, 3); all in [m]."""
+        keys, counts = np.unique(self._key(points), return_counts=True)
+        return self._middles(keys[counts >= least])
+
+    def see(self, middles: Array, now: float) -> bool:
+        """Note that cells are seen at a time [s], and forget old ones; return whether others are there than before."""
+        new, before = np.unique(self._key(middles)), self._keys
+        is_kept = (self._seen > now - self.forget) & (self._seen <= now) & ~np.isin(before, new, assume_unique=True)
+        keys = np.concatenate((before[is_kept], new))
+        order = np.argsort(keys)
+        self._keys = keys[order]
+        self._seen = np.concatenate((self._seen[is_kept], np.full(len(new), now)))[order]
+        return not np.array_equal(before, self._keys)
+
+    def middles(self) -> Array:
+        """Return the middles of all cells [m], of shape (n, 3)."""
+        return self._middles(self._keys)
+
+    def _key(self, points: Array) -> Keys:
+        cells = np.floor(points / self.side).astype(np.int64) + _HALF
+        cells = cells[np.all((cells >= 0) & (cells <= _MASK), axis=1)]
+        return np.asarray(cells[:, 0] << 2 * _BITS | cells[:, 1] << _BITS | cells[:, 2])
+
+    def _middles(self, keys: Keys) -> Array:
+        cells = np.stack([keys >> 2 * _BITS, keys >> _BITS & _MASK, keys & _MASK], axis=1)
+        return (cells - _HALF + 0.5) * self.side
+
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class FilledSpace:
+    """A shape that moves with a link, at a pose in its frame; of a mesh the box around it, from `low` to `high`."""
+
+    link: str
+    shape: Geometry
+    pose: Transform3
+    low: Array
+    high: Array
+
+
+class SpaceFilter:
+    """Tells points that are within the collision shapes of a body, or of objects."""
+
+    def __init__(self, body: Body, meshes: Mapping[str, Path] = MappingProxyType({})) -> None:
+        """Measure the shapes of a body.
+
+        Raises:
+            ModuleNotFoundError: without the extra `arm`.
+            ValueError: if a mesh cannot be read.
+        """
+        self._shapes = Shapes(meshes)
+        self._objects: tuple[FilledSpace, ...] = ()
+        self._body = tuple(
+            self._space(link.name, shape.geometry, shape.origin)
+            for link in body.links.values()
+            for shape in link.collisions
+        )
+
+    def place(self, objects: Iterable[PlacedObject]) -> None:
+        """Tell points within these objects, too; an octree is none of them: it is made of points."""
+        self._objects = tuple(self._of_objects(objects))
+
+    def within(self, points: Array, poses: Mapping[str, Transform3], padding: float) -> Flags:
+        """Return which points, of shape (n, 3) in the root's frame, are less than `padding` [m] from a shape.
+
+        `poses` are those of links in the root's frame.
+        """
+        found = np.zeros(len(points), dtype=bool)
+        for space in (*self._body, *self._objects):
+            found |= _within(space, points, poses[space.link].compose(space.pose), padding)
+        return found
+
+    def _of_objects(self, objects: Iterable[PlacedObject]) -> Iterator[FilledSpace]:
+        for thing in objects:
+            for piece in thing.all_pieces:
+                if piece.shape.kind != OCTREE:
+                    yield self._space(thing.link, piece.shape, piece.pose)
+
+    def _space(self, link: str, shape: Geometry, pose: Transform3) -> FilledSpace:
+        if shape.kind == PLANE:
+            return FilledSpace(link, shape, pose, np.zeros(3), np.zeros(3))
+        coal = self._shapes.of(shape)
+        coal.computeLocalAABB()
+        box = coal.aabb_local
+        return FilledSpace(link, shape, pose, np.array(box.min_), np.array(box.max_))
+
+
+def _within(space: FilledSpace, points: Array, pose: Transform3, padding: float) -> Flags:
+    own = (points - pose.translation) @ rotation_matrix(pose.rotation)  # in the frame of the shape
+    if space.shape.kind == PLANE:
+        *normal, offset = space.shape.size
+        return np.asarray(own @ normal + offset <= padding)
+    inside: Flags = np.all((own >= space.low - padding) & (own <= space.high + padding), axis=1)
+    if space.shape.kind == "sphere":
+        inside &= np.einsum("ij,ij->i", own, own) <= (space.shape.size[0] + padding) ** 2
+    elif space.shape.kind in ("cylinder", "cone", "capsule"):
+        inside &= own[:, 0] ** 2 + own[:, 1] ** 2 <= (space.shape.size[0] + padding) ** 2
+    return inside
+
+
 CLOUD = "cloud"  # the port
 OLDEST, EARLIEST = 1.0, 0.2  # [s] by which the stamp of a cloud may be behind and ahead of now
 MOST_CELLS = 50_000  # of an octree; more would make each examination of a motion slow
 KNOWN = 200  # messages about joints that are remembered
 SOON = 1e-3  # [s]
-_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class CloudMapperConfig(sdk.Config):
@@ -82,10 +204,12 @@ class CloudMapper(sdk.Component[CloudMapperConfig]):
     def ports(cls, config: CloudMapperConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports: clouds, the octree, and a look at each frame outside of the body."""
         root = body_of(config.urdf).root
-        clouds = sdk.In(PointCloud2, config.topic, qos="bulk", is_open=True, max_rate=max(1.0, 2 * config.rate))
-        looks = {_look(frame): sdk.Looks(source=frame, target=root).named(_look(frame)) for frame in _outside(config)}
-        cells: sdk.Out[SceneObjects] = sdk.Out(SceneObjects, f"scene/{config.name}", qos="latched")
-        return super().ports(config) | {CLOUD: clouds.named(CLOUD), "cells": cells.named("cells"), **looks}
+        found: dict[str, sdk.Port[Any]] = {
+            CLOUD: sdk.In(PointCloud2, config.topic, qos="bulk", is_open=True, max_rate=max(1.0, 2 * config.rate)),
+            "cells": sdk.Out(SceneObjects, f"scene/{config.name}", qos="latched"),
+            **{_look(frame): sdk.Looks(source=frame, target=root) for frame in _outside(config)},
+        }
+        return super().ports(config) | {name: port.named(name) for name, port in found.items()}
 
     @classmethod
     def capabilities(cls, config: CloudMapperConfig) -> tuple[sdk.Capability, ...]:
@@ -179,8 +303,8 @@ class CloudMapper(sdk.Component[CloudMapperConfig]):
         away = np.einsum("ij,ij->i", points, points)
         points = points[(away <= self.config.range**2) & (away >= self.config.nearest**2)]
         kept = self.pose_of(self.config.frame, poses, stamp)
-        middles = self.seen.found(_moved(kept.inverse().compose(sensor), points), self.config.least)
-        own = self.filter.within(_moved(kept, middles), poses, self.config.padding + self.config.cell / 2)
+        middles = self.seen.found(apply(kept.inverse().compose(sensor), points), self.config.least)
+        own = self.filter.within(apply(kept, middles), poses, self.config.padding + self.config.cell / 2)
         if self.seen.see(middles[~own], stamp / NANOSECONDS):
             self.publish()
         return len(points)
@@ -220,11 +344,6 @@ class CloudMapper(sdk.Component[CloudMapperConfig]):
 def _outside(config: CloudMapperConfig) -> tuple[str, ...]:
     links = body_of(config.urdf).links
     return tuple(frame for frame in dict.fromkeys((*config.frames, config.frame)) if frame and frame not in links)
-
-
-def _moved(pose: Transform3, points: Array) -> Array:
-    turn = np.array([rotate(pose.rotation, axis) for axis in _AXES])
-    return np.asarray(points @ turn + pose.translation)
 
 
 def _look(frame: str) -> str:

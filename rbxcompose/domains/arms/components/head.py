@@ -16,8 +16,7 @@ from rbxcompose.base.geometry import Vector3
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import ANGLE, LENGTH, TIME
 from rbxcompose.domains.arms.arm_config import ArmJointConfig
-from rbxcompose.domains.arms.motion.gaze import NEAREST, Aiming, Gaze
-from rbxcompose.domains.arms.motion.head_tracking import HeadTracker
+from rbxcompose.domains.arms.motion.gaze import NEAREST, Aiming, Gaze, HeadTracker
 from rbxcompose.domains.arms.motion.scene import SCENE_LIMITS
 from rbxcompose.domains.arms.motion.scene_messages import placed_object
 from rbxcompose.domains.arms.reasons import REASONS, GraspReason, MotionReason
@@ -100,32 +99,29 @@ class Head(sdk.Component[HeadConfig]):
     @classmethod
     def ports(cls, config: HeadConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports: its goals, those of its controller, the scene, and a look at each frame outside."""
-        look: sdk.ServesAction[Any, Any, Any] = sdk.ServesAction(
-            LookAtPoint,
-            f"{config.name}/look_at",
-            claims=config.controller,
-            skill=config.skill,
-            outcomes=dict.fromkeys(OUTCOMES, "failure"),
-            measures=MEASURES,
-        )
         found: dict[str, sdk.Port[Any]] = {
-            LOOK: look.named(LOOK),
-            POINT: sdk.ServesAction(PointHead, f"{config.name}/point_head", claims=config.controller, skill=None).named(
-                POINT
+            LOOK: sdk.ServesAction(
+                LookAtPoint,
+                f"{config.name}/look_at",
+                claims=config.controller,
+                skill=config.skill,
+                outcomes=dict.fromkeys(OUTCOMES, "failure"),
+                measures=MEASURES,
             ),
-            FOLLOW: sdk.CallsAction(FollowJointTrajectory, config.follow).named(FOLLOW),
+            POINT: sdk.ServesAction(PointHead, f"{config.name}/point_head", claims=config.controller, skill=None),
+            FOLLOW: sdk.CallsAction(FollowJointTrajectory, config.follow),
         }
         if config.sees_scene:
-            found[SCENE] = sdk.In(SceneObjects, "scene", qos="latched", limits=SCENE_LIMITS).named(SCENE)
+            found[SCENE] = sdk.In(SceneObjects, "scene", qos="latched", limits=SCENE_LIMITS)
         if config.stream:
             topic = f"{config.name}/target"
-            found[TARGET] = sdk.In(PointStamped, topic, qos="command", is_open=True, may_be_silent=True).named(TARGET)
-            found[STREAM] = sdk.Out(JointTrajectory, config.stream).named(STREAM)
+            found[TARGET] = sdk.In(PointStamped, topic, qos="command", is_open=True, may_be_silent=True)
+            found[STREAM] = sdk.Out(JointTrajectory, config.stream)
             if (poses := config.tracks.topic) is not None:
-                found[POSE] = sdk.In(PoseStamped, poses, qos="command", may_be_silent=True).named(POSE)
+                found[POSE] = sdk.In(PoseStamped, poses, qos="command", may_be_silent=True)
         root = body_of(config.urdf).root
-        looks = {_look(frame): sdk.Looks(source=frame, target=root).named(_look(frame)) for frame in config.frames}
-        return super().ports(config) | found | looks
+        found |= {_look(frame): sdk.Looks(source=frame, target=root) for frame in config.frames}
+        return super().ports(config) | {name: port.named(name) for name, port in found.items()}
 
     def configure(self) -> None:
         """Read the body."""
@@ -193,7 +189,7 @@ class Head(sdk.Component[HeadConfig]):
             self.see((0.0, 0.0, 0.0), tracks.frame)
         if not self.limits.keys() <= self.positions.keys():
             return
-        told = self.tracker.update(tracks.settings, self.now, dt, self.positions)
+        told = self.tracker.update(tracks, self.now, dt, self.positions)
         if told is not None:
             self.bound[STREAM](trajectory(told, 0.0))
 

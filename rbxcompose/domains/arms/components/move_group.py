@@ -61,12 +61,11 @@ class MoveGroupServer(sdk.Component[MoveGroupConfig]):
     @classmethod
     def ports(cls, config: MoveGroupConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports: its own, and those of the arms."""
-        found: dict[str, sdk.Port[Any]] = super().ports(config)
+        found: dict[str, sdk.Port[Any]] = {}
         for name in config.arms:
-            move: sdk.CallsAction[Any, Any, Any] = sdk.CallsAction(MoveGroup, f"{name}/move_action")
-            execute: sdk.CallsAction[Any, Any, Any] = sdk.CallsAction(ExecuteTrajectory, f"{name}/execute_trajectory")
-            found |= {_move(name): move.named(_move(name)), _execute(name): execute.named(_execute(name))}
-        return found
+            found[_move(name)] = sdk.CallsAction(MoveGroup, f"{name}/move_action")
+            found[_execute(name)] = sdk.CallsAction(ExecuteTrajectory, f"{name}/execute_trajectory")
+        return super().ports(config) | {name: port.named(name) for name, port in found.items()}
 
     def configure(self) -> None:
         """Begin without goals."""

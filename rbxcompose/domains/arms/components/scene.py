@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from rbxcompose.base.findings import Finding
-from rbxcompose.base.geometry import Quaternion, Transform3, Vector3
+from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, angle_between
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.arms import scene_view
 from rbxcompose.domains.arms.motion.moveit import MoveItScene
@@ -127,14 +127,12 @@ class Scene(Component[SceneConfig]):
     def ports(cls, config: SceneConfig) -> dict[str, Port[Any]]:
         """Return the ports: its own, what sensors see, and a look at each frame outside of the body."""
         root = body_of(config.urdf).root
-        seen = {
-            item: In(SceneObjects, f"scene/{item}", qos="latched", limits=SCENE_LIMITS).named(f"cloud_{item}")
+        found: dict[str, Port[Any]] = {
+            f"cloud_{item}": In(SceneObjects, f"scene/{item}", qos="latched", limits=SCENE_LIMITS)
             for item in config.clouds
         }
-        clouds = {port.name: port for port in seen.values()}
-        looks = {_look(frame): Looks(source=frame, target=root).named(_look(frame)) for frame in config.frames}
-        seen = {name: port.named(name) for name, port in clouds.items()}
-        return super().ports(config) | seen | looks
+        found |= {_look(frame): Looks(source=frame, target=root) for frame in config.frames}
+        return super().ports(config) | {name: port.named(name) for name, port in found.items()}
 
     attach_object = Serves(AttachObject, "scene/attach")
     detach_object = Serves(DetachObject, "scene/detach")
@@ -361,9 +359,8 @@ def _look(frame: str) -> str:
 def _differs(before: Transform3 | None, now: Transform3 | None) -> bool:
     if before is None or now is None:
         return before is not now
-    turned = sum(value * other for value, other in zip(before.rotation, now.rotation, strict=True))
     moved = max(abs(value - other) for value, other in zip(before.translation, now.translation, strict=True))
-    return moved > MOVED or 1.0 - abs(turned) > TURNED**2 / 8
+    return moved > MOVED or angle_between(before.rotation, now.rotation) > TURNED
 
 
 def _placed(name: str, config: ObjectConfig) -> PlacedObject:

@@ -16,6 +16,7 @@ from rbxcompose.base.geometry import (
     Quaternion,
     Transform3,
     Vector3,
+    angle_between,
     conjugate,
     lerp,
     multiply,
@@ -823,9 +824,8 @@ class PickTask(HandTask):
         if thing is None:
             return True
         now = self.in_root(thing)
-        turned = abs(sum(part * other for part, other in zip(now.rotation, self._at.rotation, strict=True)))
         away = math.dist(now.translation, self._at.translation)
-        return away > MOVED or 2.0 * math.acos(min(1.0, turned)) > TURNED
+        return away > MOVED or angle_between(now.rotation, self._at.rotation) > TURNED
 
     def close(self) -> Work:
         """Close the gripper on the object."""

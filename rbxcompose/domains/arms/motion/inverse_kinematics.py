@@ -14,10 +14,14 @@ from typing import Any
 import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import Transform3
+from rbxcompose.base.geometry import Transform3, angle_between
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.damped_steps import DAMPING, LEAST_DAMPING, LONGEST, PATIENCE, PROGRESS
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace
+
+LEAST_DAMPING, DAMPING = 1e-6, 1e-2  # the second one times the square of the error
+LONGEST = 1.0  # [rad or m] that a joint moves in one iteration, at most
+PATIENCE, PROGRESS = 4, 0.8  # iterations without the error's square shrinking to this share, which end a descent
+
 
 TOLERANCE, ANGLE_TOLERANCE = 1e-3, math.radians(0.5)  # [m], [rad]
 RESTARTS = 60
@@ -60,10 +64,7 @@ class PoseTarget:
     def error(self, pose: Transform3) -> tuple[float, float]:
         """Return how far away a pose is [m, rad]; what does not count is 0."""
         away = 0.0 if self.any_position else math.dist(self.pose.translation, pose.translation)
-        if self.any_orientation:
-            return away, 0.0
-        x, y, z, w = self.pose.inverse().compose(pose).rotation
-        return away, 2.0 * math.atan2(math.hypot(x, y, z), abs(w))
+        return away, 0.0 if self.any_orientation else angle_between(self.pose.rotation, pose.rotation)
 
     def is_met(self, pose: Transform3) -> bool:
         """Return whether a pose is within both tolerances."""

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import Transform3, conjugate, multiply
+from rbxcompose.base.geometry import NO_ROTATION, Transform3, angle_between, multiply
 from rbxcompose.domains.arms.motion import scene as scenes
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.arm_task import ArmGoal, ArmSite, ArmTask, GivenTask
@@ -296,7 +296,8 @@ class RequestReader:
         region, offset = place.constraint_region, place.target_point_offset
         is_box = [primitive.type for primitive in region.primitives] == [SolidPrimitive.BOX]
         pose = pose_of(region.primitive_poses[0]) if region.primitive_poses else Transform3()
-        if not is_box or region.meshes or any((offset.x, offset.y, offset.z)) or _angle(pose.rotation) > AS_BEFORE:
+        is_turned = angle_between(NO_ROTATION, pose.rotation) > AS_BEFORE
+        if not is_box or region.meshes or any((offset.x, offset.y, offset.z)) or is_turned:
             words = "on the way, the tip is kept in one box along the axes of its frame"
             raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, words)
         sides = region.primitives[0].dimensions.tolist()
@@ -312,15 +313,15 @@ class RequestReader:
         self._require_tip(turn.link_name)
         frame, values = self._frame(turn.header.frame_id), [at[name] for name in self.kinematics.group.joints]
         links = self.kinematics.poses(np.array(values))
-        base = links[frame].rotation if frame else (0.0, 0.0, 0.0, 1.0)
+        base = links[frame].rotation if frame else NO_ROTATION
         wanted = multiply(base, _rotation(turn.orientation))
-        away = _angle(multiply(conjugate(wanted), links[self.kinematics.group.tip].rotation))
+        away = angle_between(wanted, links[self.kinematics.group.tip].rotation)
         tolerances = _tolerances(turn)
         if away > AS_BEFORE or min(tolerances) <= away:
             words = f"the tip is turned by {math.degrees(away):.1f} deg from the orientation to keep: it begins with it"
             raise RequestError(Codes.START_STATE_VIOLATES_PATH_CONSTRAINTS, words)
         a, b, c = (0.0 if tolerance >= math.pi else tolerance - away for tolerance in tolerances)  # 0 is any
-        return (a, b, c), _angle(_rotation(turn.orientation)) <= AS_BEFORE
+        return (a, b, c), angle_between(NO_ROTATION, _rotation(turn.orientation)) <= AS_BEFORE
 
     def _frame(self, name: str) -> str:
         """Return a frame of a goal: nothing for the root."""
@@ -394,12 +395,6 @@ def _rotation(message: Quaternion) -> tuple[float, float, float, float]:
         raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "an orientation is no rotation")
     x, y, z, w = found
     return x / length, y / length, z / length, w / length
-
-
-def _angle(rotation: Sequence[float]) -> float:
-    """Return by how much a rotation turns [rad]."""
-    *axis, w = rotation
-    return 2.0 * math.atan2(math.hypot(*axis), abs(w))
 
 
 TRIES = 20  # random positions that the search begins with

@@ -14,6 +14,7 @@ from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, conjugate,
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.groups import ArmJoint, Array, JointSpace, solid_link
 from rbxcompose.domains.body.model import Body, Geometry
+from rbxcompose.domains.worlds.physics.solids import rotation_matrix
 
 RADIUS, ANGLE = 0.01, math.radians(30)  # [m], [rad]; the usual ones
 LARGEST = 10.0  # [m], a radius
@@ -226,8 +227,8 @@ class KeptTip:
         self._aims = self._lower + inner, self._upper - inner
         if self._sight is not None:
             self._aims[0][-1] = 0.0  # an angle has no margin there
-        self._turn = _matrix(self._to_frame.rotation)
-        self._back = _matrix(multiply(conjugate(self._first), conjugate(self._to_frame.rotation)))
+        self._turn = rotation_matrix(self._to_frame.rotation)
+        self._back = rotation_matrix(multiply(conjugate(self._first), conjugate(self._to_frame.rotation)))
         self._shift = np.array(self._to_frame.translation)
 
     def beyond(self, values: Array) -> str:
@@ -236,7 +237,7 @@ class KeptTip:
 
     def _beyond(self, values: Array) -> Iterator[str]:
         tip = self._to_frame.compose(self._kinematics.tip_pose(values))
-        turn = _matrix(tip.rotation) @ self._back
+        turn = rotation_matrix(tip.rotation) @ self._back
         found = np.array((*tip.translation, *_angles(turn)))[self._rows]
         for index, value, low, high in zip(self._rows, found, self._lower, self._upper, strict=False):
             if not low - ROUNDING <= value <= high + ROUNDING:
@@ -288,17 +289,6 @@ class KeptTip:
 
 def _shown(index: int, value: float) -> str:
     return f"{math.degrees(value):.1f} deg" if index >= MEASURES.index("roll") else f"{value * 100:.1f} cm"
-
-
-def _matrix(rotation: tuple[float, float, float, float]) -> Array:
-    x, y, z, w = rotation
-    return np.array(
-        (
-            (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-            (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-            (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-        )
-    )
 
 
 def _angles(turn: Array) -> tuple[float, float, float]:

@@ -9,11 +9,10 @@ import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.arms.motion.collisions import Checker, SearchingChecker, can_search, pairs_shown
-from rbxcompose.domains.arms.motion.constrained_search import kept_path
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace, interpolated
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory, curve, jerks_of, speeds_of, timed
 from rbxcompose.domains.arms.motion.path_constraints import KeptTip
-from rbxcompose.domains.arms.motion.search import MARGIN, searched
+from rbxcompose.domains.arms.motion.search import MARGIN, kept_path, searched
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 from rbxcompose.domains.arms.section_models import AUTOMATIC, FAST, ompl_planner
 from rbxcompose.domains.body.link_pairs import LinkPair
@@ -276,7 +275,7 @@ class _Run:
         return None
 
     def _search(self, attempt: int, margin: float) -> Generator[int, None, Array]:
-        """Return the search: by OMPL, whose constrained spaces find less (see `constrained_search`), or by ours."""
+        """Return the search: by OMPL, whose constrained spaces find less (see `search`), or by ours."""
         space, kept, start, goal = self._space, self._kept, self.start, self.goal
         settings, is_fit = self._planner.settings, self._fitness(attempt)
         seed = settings.seed + attempt

@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.domains.arms.motion import damped_steps, inverse_kinematics
+from rbxcompose.domains.arms.motion import inverse_kinematics
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace
@@ -55,7 +55,7 @@ def slid(search: inverse_kinematics.PoseSearch, values: Array, posture: Posture)
         longest = share * float(np.abs(step).max())
         if longest < LEAST:
             break
-        first = np.clip(here + step * share * min(1.0, damped_steps.LONGEST / longest), *bounds)
+        first = np.clip(here + step * share * min(1.0, inverse_kinematics.LONGEST / longest), *bounds)
         moved = space.nearest_turns(inverse_kinematics.descended(kinematics, space, target, first)[0], values)
         left = posture.distance(space, moved)
         if left <= distance - LEAST and target.is_met(kinematics.tip_pose(moved)) and search.is_free(moved):
@@ -132,7 +132,7 @@ def _approached(
     size = float(error @ error)
     for _ in range(MOST_APPROACH_STEPS):
         step = _approach_step(jacobian, error, damping, values, bounds)
-        share = damped_steps.LONGEST / max(float(np.abs(step).max()), damped_steps.LONGEST)
+        share = inverse_kinematics.LONGEST / max(float(np.abs(step).max()), inverse_kinematics.LONGEST)
         moved = np.clip(values + share * step, *bounds)
         ahead, there = _weighed(kinematics, target, wanted, moved)
         left = float(ahead @ ahead)

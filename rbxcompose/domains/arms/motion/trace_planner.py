@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, conjugate, lerp, multiply, slerp
+from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, angle_between, conjugate, lerp, multiply, slerp
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace
@@ -152,12 +152,6 @@ class TipStretch:
                 return leg.at(min(1.0, max(0.0, length / leg.length)))
             length -= leg.length
         raise AssertionError("a stretch has legs")
-
-
-def angle_between(quaternion: Quaternion, other: Quaternion) -> float:
-    """Return by which angle two rotations differ [rad]."""
-    x, y, z, w = multiply(conjugate(quaternion), other)
-    return 2.0 * math.atan2(math.hypot(x, y, z), abs(w))
 
 
 def stretches(start: Transform3, points: Sequence[WayPoint], blend: float) -> tuple[TipStretch, ...]:

@@ -12,7 +12,7 @@ from rbxcompose import sdk
 from rbxcompose.base.config import AngularJerk, Config, Jerk, JointName, LinkName
 from rbxcompose.base.geometry import Velocity2
 from rbxcompose.domains.bases.driving import drives
-from rbxcompose.domains.bases.wheels import (
+from rbxcompose.domains.bases.wheels import (, BaseLimits, OdometryPolicy, WheelDrive, WheelGeometry, WheelOdometry
     BaseLimits,
     OdometryPolicy,
     WheelDrive,
@@ -22,6 +22,7 @@ from rbxcompose.domains.bases.wheels import (
     odometry_transform,
 )
 from rbxcompose.domains.servos.controller import ControlledJoint, Controller, ControllerConfig, controller
+from rbxcompose.domains.bases.odometry_messages import odometry_message, odometry_transform
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import Odometry
@@ -150,7 +151,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
     def prepare(self) -> None:
         """Set up limits and odometry."""
         config, joints = self.config, self.site.joints
-        self.wheels: tuple[ControlledJoint, ControlledJoint] = (joints[config.left], joints[config.right])
+        self.wheels = joints[config.left], joints[config.right]
         tick = self.wheels[0].per_tick
         radius = config.wheel_radius or 1.0 / ((config.ticks_per_metre or math.nan) * tick)
         rolling = WheelGeometry(config.wheel_distance, radius)

@@ -343,9 +343,9 @@ def model_of(config: GripperConfig) -> gripper.GripperModel:
         return gripper.ParallelGripper(0.5, 0.0, least, greatest)  # each finger goes half of the way
     fingers = gripper.FingerGeometry(config.pad_width or 0.0, config.finger_length or 0.0, least, greatest)
     if config.model == "one_sided":
-        return gripper.OneSidedGripper(fingers, center, invert)
+        return gripper.FingerGripper(fingers, (center,), (invert,))
     centers = (config.center_left or 0.0, config.center_right or 0.0)
-    return gripper.DualGripper(fingers, centers, (bool(config.invert_left), bool(config.invert_right)))
+    return gripper.FingerGripper(fingers, centers, (bool(config.invert_left), bool(config.invert_right)))
 
 
 def opening_of(port: str, goal: Any) -> float:

@@ -121,7 +121,7 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
     def cycle(self, now: float, dt: float) -> None:
         """Take over the newest goal, or its cancellation, and lead the joints."""
         joints = self.site.joints
-        self.goals.take(now, lambda goal: self.follower.accept(goal, now, self._measured(), self._commanded()))
+        self.goals.take(now, lambda goal: self.follower.accept(goal, now, self._commanded()))
         for name, joint in joints.items():
             if self.follower.is_moving and joint.blocked:
                 self._end(self.follower.lose(name, now, f"joint '{name}': {joint.blocked}"))
@@ -145,7 +145,7 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
             self.halt(self.site.now, "a trajectory without points")
             return
         wanted = self._trajectory(Follow.Goal(trajectory=message))
-        answer = self.follower.accept(wanted, self.site.now, self._measured(), self._commanded(), is_live=True)
+        answer = self.follower.accept(wanted, self.site.now, self._commanded(), is_live=True)
         if isinstance(answer, trajectory.TrajectoryRefusal):
             self.problem = f"a trajectory was refused: {answer.message}"
         else:
