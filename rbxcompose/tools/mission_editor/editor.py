@@ -26,7 +26,7 @@ from rbxcompose.tools.mission_editor.outline import MissionOutline, told
 from rbxcompose.tools.mission_editor.palette import palette
 from rbxcompose.tools.mission_editor.patch import path_of
 from rbxcompose.tools.mission_editor.patches import change
-from rbxcompose.tools.mission_editor.utf16 import Utf16
+from rbxcompose.tools.mission_editor.yaml_places import Utf16
 from rbxcompose.tools.project_texts import ProjectTexts, ReadText, hash_of, words_of
 
 MOST_FINDINGS = 200
@@ -207,7 +207,7 @@ class MissionEditor:
 
     def _finding(self, finding: Finding, units: Utf16) -> dict[str, Any]:
         span = finding.span or Span("", 1, 1, 1, 1)
-        start, end = units.place(span.line, span.column), units.place(span.end_line, span.end_column)
+        start, end = units.offset(span.line, span.column), units.offset(span.end_line, span.end_column)
         return {**words_of(finding), "from": start, "to": max(start, end), "line": span.line, "fix": None}
 
 

@@ -22,13 +22,11 @@ from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import project_of
 from rbxcompose.manifest.tree import KeyPath
-from rbxcompose.tools.mission_editor.patch import TextPatch
 from rbxcompose.tools.mission_editor.yaml_places import Path as TextPath
 from rbxcompose.tools.project_texts import ProjectTexts, ReadText, words_of
-from rbxcompose.tools.robot_editor.map_patches import with_entry, with_name, with_values, without_entry
+from rbxcompose.tools.robot_editor.map_patches import MapPatch, entry_at, file_of, value_at
 from rbxcompose.tools.robot_editor.parts import IncludedParts, OfferedPart, offered_parts
 from rbxcompose.tools.robot_editor.subjects import Muxes, Places, Subject
-from rbxcompose.tools.robot_editor.written_at import entry_at, file_of, value_at
 
 MOST_CHANGES = 100
 MOST_FINDINGS = 200
@@ -167,36 +165,37 @@ class RobotEditor:
         subject, path, texts = SUBJECTS[change["subject"]], tuple(change["path"]), dict(state.texts)
         if change["op"] not in subject.operations:
             raise Refused(f"of {subject.what}, only values can be changed here: change it in the file")
-        for file, patched in self._patches(state, subject, path, change):
+        for file, changed in self._patches(state, subject, path, change):
             text = self._text(state, file) if file not in texts else texts[file]
-            texts[file] = patched(text).applied(text)
+            patch = MapPatch(text)
+            changed(patch)
+            texts[file] = patch.done().applied(text)
         made = EditedRobot(texts, self._compiled(texts))
         _require_meant(subject, state.robot, made.robot, change)
         return made
 
     def _patches(
         self, state: EditedRobot, subject: Subject, path: KeyPath, change: RobotChange
-    ) -> list[tuple[Path, Callable[[str], TextPatch]]]:
+    ) -> list[tuple[Path, Callable[[MapPatch], None]]]:
         """Return which files a change changes, and how, one after the other."""
         op, manifest = change["op"], state.robot.manifest
         if op == "add":
             name, value = subject.new_entry(state.robot, path, {**change, "file": str(self._file)})
             self._require_writable(self._file)
-            return [(self._file, partial(with_entry, path=path[:1], key=name, value=value))]
+            return [(self._file, lambda patch: patch.add(path[:1], name, value))]
         if op == "set":
             maps: dict[tuple[Path, TextPath], dict[str, str]] = {}
             for keys, value in subject.written(state.robot, path, change).items():
                 file, place, key = value_at(manifest, (*path, *keys), lambda one: self._text(state, one))
                 self._require_writable(file)
                 maps.setdefault((file, place), {})[key] = value
-            return [(file, partial(with_values, path=place, values=values)) for (file, place), values in maps.items()]
+            return [(file, partial(MapPatch.set, path=place, values=values)) for (file, place), values in maps.items()]
         file, place = entry_at(manifest, path, lambda one: self._text(state, one))
         self._require_writable(file)
         if op == "remove":
-            return [(file, partial(without_entry, path=place))]
-        return [
-            (file, partial(with_name, path=place, name=subject.new_name(state.robot, path, str(place[-1]), change)))
-        ]
+            return [(file, lambda patch: patch.remove(place))]
+        new_name = subject.new_name(state.robot, path, str(place[-1]), change)
+        return [(file, lambda patch: patch.rename(place, new_name))]
 
     def _where(self, state: EditedRobot, path: KeyPath) -> dict[str, Any]:
         """Return where an entry stands, and why it cannot be changed, if it cannot."""
