@@ -11,8 +11,9 @@ from pygls.workspace.position_codec import ServerTextPosition
 from rbxcompose.base.findings import Finding, Severity, Span
 from rbxcompose.tools.lsp.answers import OutlineEntry
 from rbxcompose.tools.lsp.completion import CompletionItem
+from rbxcompose.tools.lsp.mentions import Mention
+from rbxcompose.tools.lsp.project_files import ScalarPlaces
 from rbxcompose.tools.lsp.rename import CodeAction, Renamed, TextChange
-from rbxcompose.tools.lsp.symbols import Mention, ScalarPlaces
 
 SOURCE = "rbxcompose"
 _SEVERITIES = {Severity.ERROR: types.DiagnosticSeverity.Error, Severity.WARNING: types.DiagnosticSeverity.Warning}

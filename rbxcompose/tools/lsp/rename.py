@@ -10,13 +10,13 @@ from rbxcompose.base.fixes import apply
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.registry import section_named
+from rbxcompose.manifest.section import ROBOT
 from rbxcompose.manifest.tree import NOWHERE, ScalarNode
 from rbxcompose.missions.language.value_reader import NAME, invalid_name
 from rbxcompose.missions.program.registry import kinds
-from rbxcompose.tools.lsp.mentions import SymbolIndex
+from rbxcompose.tools.lsp.mentions import Mention, SymbolIndex
 from rbxcompose.tools.lsp.project import Project
-from rbxcompose.tools.lsp.project_files import ROBOT, ProjectFiles
-from rbxcompose.tools.lsp.symbols import Mention, Symbol
+from rbxcompose.tools.lsp.project_files import ProjectFiles, Symbol
 
 
 @dataclass(frozen=True, slots=True)
