@@ -30,7 +30,7 @@ becomes a file that every later run tries again. [What the suites do](#what-the-
 - **Storms over simulated robots** (`tests/simulated_faults`): run the patrol robot with its real supervisor and
   processes, in virtual time, over a network that delays, loses, duplicates and reorders. Processes are killed and
   hang, links break, components raise, commands make no sense, people stop, release and set parameters, all from one
-  seed. `rbxcompose/testing/safety.py` defines what is safe and judges the record of the run.
+  seed. `tests/simulated_faults/safety.py` defines what is safe and judges the record of the run.
 - **Disks that fail** (`tests/io`): each system call of a writer fails once, in each way that a disk can
   fail. Existing data is never torn or lost, the failure is reported, and the next try works.
 - **Links that fail** (`tests/net`): a proxy before the router delays, slows down, cuts and freezes the links.

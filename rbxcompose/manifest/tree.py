@@ -108,6 +108,11 @@ def children(node: TreeNode) -> Iterable[tuple[Key, TreeNode]]:
             return enumerate(items)
 
 
+def entries_of(node: TreeNode | None) -> Iterable[tuple[str, Entry]]:
+    """Return the entries of a map; nothing of any other node."""
+    return node.entries.items() if isinstance(node, MappingNode) else ()
+
+
 def all_nodes(root: TreeNode) -> Iterator[TreeNode]:
     """Yield a node and all those below it, in the order in which they are written."""
     waiting = [root]
@@ -118,6 +123,11 @@ def all_nodes(root: TreeNode) -> Iterator[TreeNode]:
             waiting += [entry.value for entry in reversed(node.entries.values())]
         elif isinstance(node, SequenceNode):
             waiting += reversed(node.items)
+
+
+def scalars(root: TreeNode | None) -> Iterator[ScalarNode]:
+    """Yield the scalars of a tree, the keys of its maps excepted, in the order in which they are written."""
+    return (node for node in (all_nodes(root) if root is not None else ()) if isinstance(node, ScalarNode))
 
 
 def with_children(node: TreeNode, change: Callable[[Key, TreeNode], TreeNode]) -> TreeNode:

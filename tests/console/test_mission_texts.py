@@ -12,8 +12,7 @@ from rbxcompose.domains.console.access import OperationTarget, Role, needed
 from rbxcompose.domains.console.editor_process import MOST_WAITING, EditorProcess
 from rbxcompose.domains.console.protocol import MISSION_TEXTS, ROBOT_TEXTS, EditMission
 from rbxcompose.tools.mission_editor.editor import REQUESTS
-from rbxcompose.tools.robot_editor.editor import ROBOT_REQUESTS
-from rbxcompose.tools.robot_editor.live_robot import LIVE_REQUESTS
+from rbxcompose.tools.robot_editor.editor import LIVE_REQUESTS, ROBOT_REQUESTS
 from tests.console.clients import Room
 
 READ = {"mission": "patrol"}

@@ -15,7 +15,7 @@ from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.types import Message
 from rbxcompose.sdk.ports import Qos
-from rbxcompose.testing.safety import PlanarVelocity, SentVelocity
+from tests.simulated_faults.safety import PlanarVelocity, SentVelocity
 
 COMMAND, MOTION = "cmd_vel", "odom"
 PATIENCE = 60.0  # [s]

@@ -18,11 +18,11 @@ from typing import Self
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.log import NAME as LOG
 from rbxcompose.runtime.processes import Process, titled, wait_until_ended
-from rbxcompose.testing.safety import Base, Laws, violations
 from tests.commands import command
 from tests.conftest import ROOT
 from tests.faults.observer import COMMAND, LOOK, MOTION, PATIENCE, Observer
 from tests.forked import RBXCOMPOSE, Forked
+from tests.simulated_faults.safety import Base, Laws, violations
 
 NAME = f"turtlebot_with_faults_{os.getpid()}"
 TIMEOUT, CYCLE, SPEED = 0.5, 0.02, 0.5  # [s], [s], [m/s]

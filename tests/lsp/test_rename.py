@@ -13,16 +13,17 @@ from hypothesis import strategies as st
 
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.plan.dump import dump
+from rbxcompose.manifest.section import ROBOT
 from rbxcompose.tools.lsp.mentions import (
     ManifestMentions,
+    Mention,
     MissionMentions,
     SymbolIndex,
     TrialMentions,
     symbol_index_references,
 )
-from rbxcompose.tools.lsp.project_files import ROBOT, ProjectFiles
+from rbxcompose.tools.lsp.project_files import ProjectFiles, Symbol
 from rbxcompose.tools.lsp.rename import CannotRenameError, Renamed, compiler, prepare, rename
-from rbxcompose.tools.lsp.symbols import Mention, Symbol
 from tests.conftest import ROOT
 from tests.soak import Soak
 
@@ -319,5 +320,7 @@ def test_texts_that_are_being_typed_make_no_trouble(shipped: Names, data: st.Dat
 MENTIONS: dict[str, Callable[[ProjectFiles, Path], Iterable[Mention]]] = {
     "Robot": lambda files, path: ManifestMentions(files, path).all(),
     "Mission": lambda files, path: MissionMentions(files, path, {}).all(),
-    "Test": lambda files, path: TrialMentions(files, path, {}).all(),
+    "Test": lambda files, path: (
+        TrialMentions(files, path, robot, {}).all() if (robot := files.file_named(path, "robot")) else ()
+    ),
 }

@@ -9,8 +9,8 @@ import pytest
 from rbxcompose.base.requests import Refused
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.tools.mission_editor.editor import MissionEditor
+from rbxcompose.tools.mission_editor.form import example_of
 from rbxcompose.tools.mission_editor.outline import MissionOutline
-from rbxcompose.tools.mission_editor.palette import example_of
 from rbxcompose.tools.mission_editor.patches import change
 from tests.mission_editor.test_editor import FETCH, ask, editor, project
 

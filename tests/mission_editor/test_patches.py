@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.requests import Refused
 from rbxcompose.tools.mission_editor.outline import Block, MissionOutline
-from rbxcompose.tools.mission_editor.patch import TextPatch
 from rbxcompose.tools.mission_editor.patches import OPERATIONS, change
+from rbxcompose.tools.mission_editor.yaml_places import TextPatch
 from tests.loops import for_all
 
 HEAD = "# what it is for\nrbx: 1\nkind: Mission\nname: fetch\n"

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.requests import Refused
-from rbxcompose.tools.mission_editor.patch import TextPatch
-from rbxcompose.tools.robot_editor.map_patches import with_entry, with_name, with_values, without_entry
+from rbxcompose.tools.mission_editor.yaml_places import TextPatch
+from rbxcompose.tools.robot_editor.map_patches import MapPatch
 
 NAMES = ("dock", "table", "hall", "seat_2", "'quoted'")
 FLOWS = (
@@ -49,6 +49,12 @@ def robots(draw: st.DrawFn) -> str:
     return f"{draw(st.sampled_from(HEADS))}{chr(10).join(section)}{draw(st.sampled_from(TAILS))}"
 
 
+def changed(how: str, text: str, *arguments: object) -> TextPatch:
+    patch = MapPatch(text)
+    getattr(patch, how)(*arguments)
+    return patch.done()
+
+
 def tree(text: str) -> Any:
     return yaml.safe_load(text)
 
@@ -66,13 +72,13 @@ def changes(draw: st.DrawFn) -> tuple[str, str, str, TextPatch | None]:
     try:
         match op:
             case "set":
-                made = with_values(text, ("places", name), {"y": "7 m", "heading": "30 deg"})
+                made = changed("set", text, ("places", name), {"y": "7 m", "heading": "30 deg"})
             case "add":
-                made = with_entry(text, ("places",), "new", "{x: 3 m, y: 4 m}")
+                made = changed("add", text, ("places",), "new", "{x: 3 m, y: 4 m}")
             case "rename":
-                made = with_name(text, ("places", name), "other")
+                made = changed("rename", text, ("places", name), "other")
             case _:
-                made = without_entry(text, ("places", name))
+                made = changed("remove", text, ("places", name))
     except Refused:
         return text, op, name, None
     return text, op, name, made
@@ -140,29 +146,29 @@ include:
 
 
 def test_a_number_changes_where_it_stands_and_a_new_key_follows_the_others() -> None:
-    after = with_values(TEXT, ("places", "table"), {"x": "1.5 m", "heading": "90 deg"}).applied(TEXT)
+    after = changed("set", TEXT, ("places", "table"), {"x": "1.5 m", "heading": "90 deg"}).applied(TEXT)
     assert after == TEXT.replace("x: 1 m ", "x: 1.5 m ").replace("    y: 2 m\n", "    y: 2 m\n    heading: 90 deg\n")
 
 
 def test_an_entry_goes_with_its_comments() -> None:
-    after = without_entry(TEXT, ("places", "dock")).applied(TEXT)
+    after = changed("remove", TEXT, ("places", "dock")).applied(TEXT)
     assert after == TEXT.replace("  # where it charges\n  dock: {x: 0 m, y: 0 m}   # below the window\n", "")
 
 
 def test_the_last_entry_takes_its_section_along() -> None:
-    text = without_entry(TEXT, ("places", "dock")).applied(TEXT)
-    assert "places" not in tree(without_entry(text, ("places", "table")).applied(text))
+    text = changed("remove", TEXT, ("places", "dock")).applied(TEXT)
+    assert "places" not in tree(changed("remove", text, ("places", "table")).applied(text))
 
 
 @pytest.mark.parametrize("text", ["rbx: 1\n", "rbx: 1", "rbx: 1\nplaces:\n", "rbx: 1\nplaces: {}\n", "rbx: 1\nplaces:"])
 def test_a_section_is_made_if_there_is_none(text: str) -> None:
-    after = with_entry(text, ("places",), "dock", "{x: 1 m, y: 2 m}").applied(text)
+    after = changed("add", text, ("places",), "dock", "{x: 1 m, y: 2 m}").applied(text)
     assert tree(after) == {"rbx": 1, "places": {"dock": {"x": "1 m", "y": "2 m"}}}
 
 
 def test_a_new_section_stands_apart_if_the_others_do() -> None:
     text = "rbx: 1\n\nname: x\n"
-    assert with_entry(text, ("places",), "a", "{x: 1 m}").applied(text) == f"{text}\nplaces:\n  a: {{x: 1 m}}\n"
+    assert changed("add", text, ("places",), "a", "{x: 1 m}").applied(text) == f"{text}\nplaces:\n  a: {{x: 1 m}}\n"
 
 
 @pytest.mark.parametrize(
@@ -179,10 +185,10 @@ def test_a_new_section_stands_apart_if_the_others_do() -> None:
 )
 def test_what_others_have_a_part_in_is_left_alone(text: str, why: str) -> None:
     with pytest.raises(Refused, match=why):
-        with_values(text, ("places", "dock"), {"y": "7 m"})
+        changed("set", text, ("places", "dock"), {"y": "7 m"})
 
 
 @pytest.mark.parametrize("value", ["1 m\ny: 2", "1 m, y: 3", "*a", "{", "1 # no", ""])
 def test_a_value_cannot_bring_more_than_itself(value: str) -> None:
     with pytest.raises(Refused):
-        with_values("places:\n  dock: {x: 1 m}\n", ("places", "dock"), {"x": value})
+        changed("set", "places:\n  dock: {x: 1 m}\n", ("places", "dock"), {"x": value})

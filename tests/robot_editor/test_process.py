@@ -12,8 +12,7 @@ import pytest
 from rbxcompose.runtime.folder import ChosenLayers, RobotFolder
 from rbxcompose.tools.mission_editor.editor import MissionEditor
 from rbxcompose.tools.mission_editor.process import RobotEditors, Variables, answer_line, compile_with
-from rbxcompose.tools.robot_editor.editor import RobotEditor
-from rbxcompose.tools.robot_editor.live_robot import LiveRobot
+from rbxcompose.tools.robot_editor.editor import LiveRobot, RobotEditor
 
 ROBOT = "rbx: 1\nkind: Robot\nname: scout\nplaces:\n  dock: {x: 0 m, y: 0 m}\n"
 SYSTEM = """rbx: 1

@@ -13,7 +13,7 @@ from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.sdk.ports import Qos
-from rbxcompose.testing.safety import Laws, Violation, laws_of, violations
+from tests.simulated_faults.safety import Laws, Violation, laws_of, violations
 from tests.simulated_faults.whole_robot import Guest, WholeRobot
 
 RAGES, CALMS = 9.0, 4.0  # [s] of robot time

@@ -15,8 +15,8 @@ from rbxcompose.runtime.recording.reader import RecordingReader
 from rbxcompose.runtime.recording.topics import Recorded
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.testing import check_file
-from rbxcompose.testing.safety import SentVelocity, events_of, laws_of, violations
 from tests.simulated_faults.network import Calm
+from tests.simulated_faults.safety import SentVelocity, events_of, laws_of, violations
 from tests.simulated_faults.storms import Storm
 from tests.simulated_faults.whole_robot import WholeRobot
 from tests.soak import Soak, rare

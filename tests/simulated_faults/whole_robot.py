@@ -23,8 +23,8 @@ from rbxcompose.runtime.recording.topics import Recorded
 from rbxcompose.runtime.supervision.conductor import Conductor
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.sdk.component import MissionWaits
-from rbxcompose.testing.safety import ROBOT, ObservedEvent, Ordered, events_of, laws_of
 from tests.simulated_faults.network import Network, Weather
+from tests.simulated_faults.safety import ROBOT, ObservedEvent, Ordered, events_of, laws_of
 
 FORK = 0.01  # [s] until a process listens
 ROUTER = "tcp/127.0.0.1:7447"  # of elsewhere: in a simulated network nobody has to be found

@@ -10,7 +10,7 @@ import pytest
 
 from rbxcompose.bus.goals import GoalState
 from rbxcompose.testing import check_file
-from rbxcompose.testing.safety import (
+from tests.simulated_faults.safety import (
     ROBOT,
     ActionClaim,
     Base,

@@ -1,6 +1,6 @@
 """From the located tree of a mission file to its program; every error becomes a finding with its place."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from dataclasses import replace
 
 from rbxcompose.base.dataclass import dataclass
@@ -8,7 +8,7 @@ from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.base.expressions.types import UNKNOWN
 from rbxcompose.base.findings import Finding, Related, Report, Span
 from rbxcompose.manifest.documents import misspelt_keys, with_keys
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, all_nodes, count
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, count, scalars
 from rbxcompose.missions import codes
 from rbxcompose.missions.analysis.held_nodes import ITEM, PathPattern, matching, pattern_of, with_held
 from rbxcompose.missions.analysis.uses import TOO_MUCH
@@ -43,12 +43,12 @@ class Budget:
     def affords_held(self, node: TreeNode) -> bool:
         """Return whether a node in the data may be read once more, and count it."""
         if self.held >= 0:
-            self.held -= count(node) + sum(map(operators, _texts(node)))
+            self.held -= count(node) + sum(map(operators, scalars(node)))
         return self.held >= 0
 
     def unaffordable(self, root: TreeNode) -> ScalarNode | None:
         """Count the texts of a mission; return the first that is too much."""
-        for text in _texts(root):
+        for text in scalars(root):
             self.written -= operators(text)
             if self.written < 0:
                 return text
@@ -59,11 +59,6 @@ def operators(scalar: ScalarNode) -> int:
     """Return about how many names and operators a text has: reading it as an expression takes as many steps."""
     text = scalar.text
     return 0 if len(text) <= _SHORT else sum(map(text.count, _OPERATORS))
-
-
-def _texts(root: TreeNode) -> Iterator[ScalarNode]:
-    """Yield the texts of a tree, the keys of its maps excepted, in the order in which they are written."""
-    return (node for node in all_nodes(root) if isinstance(node, ScalarNode))
 
 
 BODIES = ("do", "machine")

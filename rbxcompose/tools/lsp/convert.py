@@ -11,8 +11,9 @@ from pygls.workspace.position_codec import ServerTextPosition
 from rbxcompose.base.findings import Finding, Severity, Span
 from rbxcompose.tools.lsp.answers import OutlineEntry
 from rbxcompose.tools.lsp.completion import CompletionItem
+from rbxcompose.tools.lsp.mentions import Mention
+from rbxcompose.tools.lsp.project_files import ScalarPlaces
 from rbxcompose.tools.lsp.rename import CodeAction, Renamed, TextChange
-from rbxcompose.tools.lsp.symbols import Mention, ScalarPlaces
 
 SOURCE = "rbxcompose"
 _SEVERITIES = {Severity.ERROR: types.DiagnosticSeverity.Error, Severity.WARNING: types.DiagnosticSeverity.Warning}
@@ -112,7 +113,7 @@ class Converter:
 
     def action(self, action: CodeAction) -> types.CodeAction:
         """Return a fix."""
-        changes = {self.uri(path): [self._edit(path, change)] for path, change in action.changes.items()}
+        changes = {self.uri(path): [self._edit(self.text(path), change)] for path, change in action.changes.items()}
         path = Path(action.finding.span.file).resolve() if action.finding.span else None
         return types.CodeAction(
             title=action.title,
@@ -122,8 +123,8 @@ class Converter:
             edit=types.WorkspaceEdit(changes=changes),
         )
 
-    def _edit(self, path: Path, change: TextChange) -> types.TextEdit:
-        return types.TextEdit(self.range(self.text(path), change.start, change.end), change.text)
+    def _edit(self, text: str, change: TextChange) -> types.TextEdit:
+        return types.TextEdit(self.range(text, change.start, change.end), change.text)
 
     def mention(self, text: str, mention: Mention) -> types.Location:
         """Return the place of a name in the text of its file."""
@@ -133,13 +134,10 @@ class Converter:
 
     def renamed(self, renamed: Renamed, text: Callable[[Path], str]) -> types.WorkspaceEdit:
         """Return the changes of a rename in the texts that it was made for."""
-        found = {
-            self.uri(path): [
-                types.TextEdit(self.range(text(path), change.start, change.end), change.text) for change in changes
-            ]
-            for path, changes in renamed.changes.items()
-        }
-        return types.WorkspaceEdit(changes=found)
+        found = renamed.changes.items()
+        return types.WorkspaceEdit(
+            {self.uri(path): [self._edit(text(path), one) for one in ones] for path, ones in found}
+        )
 
     def outlined(self, text: str, entry: OutlineEntry) -> types.DocumentSymbol:
         """Return a line of an outline, with those below it."""
@@ -149,5 +147,5 @@ class Converter:
             range=self._span(text, entry.span),
             selection_range=self._span(text, entry.key),
             detail=entry.detail or None,
-            children=[self.outlined(text, outline_entry) for outline_entry in entry.below],
+            children=[self.outlined(text, below) for below in entry.below],
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -17,7 +17,17 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.schema.documents import makers, schema_for
 from rbxcompose.compiler.schema.guide import Guide
 from rbxcompose.manifest.section import PART, ROBOT, SYSTEM, TEST
-from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
+from rbxcompose.manifest.tree import (
+    Entry,
+    KeyPath,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+    at,
+    entries_of,
+    with_children,
+)
 from rbxcompose.manifest.yaml_nodes import compose
 from rbxcompose.tools.lsp.names import KnownNames
 from rbxcompose.tools.lsp.project import MISSION, OVERLAY, kind_of
@@ -120,7 +130,12 @@ class Cursor:
     @property
     def around(self) -> MappingNode:
         """Return the tree without the key being written."""
-        tree = _without_key(self.root, self.path, self.text) if self.is_key else self.root
+
+        def without_key(node: TreeNode) -> TreeNode:
+            others = {name: entry for name, entry in entries_of(node) if name != self.text}
+            return replace(node, entries=others) if isinstance(node, MappingNode) else node
+
+        tree = _changed(self.root, self.path, without_key) if self.is_key else self.root
         return tree if isinstance(tree, MappingNode) else self.root
 
     @property
@@ -158,7 +173,7 @@ def _cursor(tree: MappingNode, path: KeyPath, scalar: ScalarNode, is_key: bool, 
     start, _, end = scalar.text.partition(MARK)
     above = at(tree, path)
     others = above.entries if is_key and isinstance(above, MappingNode) else {}
-    root = _without_mark(tree, path)
+    root = _changed(tree, path, _without_mark)
     begins = before.lstrip(" ").startswith("-") and _BEGINS_NODE.fullmatch(before) is not None
     return Cursor(
         root if isinstance(root, MappingNode) else tree,
@@ -172,42 +187,22 @@ def _cursor(tree: MappingNode, path: KeyPath, scalar: ScalarNode, is_key: bool, 
     )
 
 
-def _without_key(node: TreeNode, path: KeyPath, key: str) -> TreeNode:
-    """Return a tree without the key `key` of the map at `path`."""
-    match node:
-        case SequenceNode(items=items) if path:
-            changed = (
-                _without_key(item, path[1:], key) if index == path[0] else item for index, item in enumerate(items)
-            )
-            return replace(node, items=tuple(changed))
-        case MappingNode(entries=entries) if path:
-            entry = entries[str(path[0])]
-            inner = replace(entry, value=_without_key(entry.value, path[1:], key))
-            return replace(node, entries={**entries, str(path[0]): inner})
-        case MappingNode(entries=entries):
-            return replace(node, entries={name: entry for name, entry in entries.items() if name != key})
-    return node
+def _changed(node: TreeNode, path: KeyPath, change: Callable[[TreeNode], TreeNode]) -> TreeNode:
+    """Return a tree with `change` applied to what is at a path."""
+    if not path:
+        return change(node)
+    return with_children(node, lambda key, below: _changed(below, path[1:], change) if key == path[0] else below)
 
 
-def _without_mark(node: TreeNode, path: KeyPath) -> TreeNode:
-    """Return the tree as if the mark had never been in the scalar; `path` leads there."""
-    match node:
-        case ScalarNode(text=text):
-            return replace(node, text=text.replace(MARK, ""))
-        case SequenceNode(items=items) if path:
-            cleaned = (_without_mark(item, path[1:]) if index == path[0] else item for index, item in enumerate(items))
-            return replace(node, items=tuple(cleaned))
-        case MappingNode(entries=entries) if path:
-            entry = entries[str(path[0])]
-            inner = replace(entry, value=_without_mark(entry.value, path[1:]))
-            return replace(node, entries={**entries, str(path[0]): inner})
-        case MappingNode(entries=entries):
-            renamed: dict[str, Entry] = {}
-            for name, entry in entries.items():
-                own = name.replace(MARK, "")
-                renamed.setdefault(own, replace(entry, key=replace(entry.key, text=own)))
-            return replace(node, entries=renamed)
-    return node
+def _without_mark(node: TreeNode) -> TreeNode:
+    """Return a scalar, or a map whose keys are changed, as if the mark had never been in it."""
+    if isinstance(node, ScalarNode):
+        return replace(node, text=node.text.replace(MARK, ""))
+    renamed: dict[str, Entry] = {}
+    for name, entry in entries_of(node):
+        own = name.replace(MARK, "")
+        renamed.setdefault(own, replace(entry, key=replace(entry.key, text=own)))
+    return replace(node, entries=renamed) if isinstance(node, MappingNode) else node
 
 
 def _after_token(after: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cache
 from pathlib import Path
@@ -20,9 +20,9 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.sections.composition import PART_ARGUMENT, args, include, profiles, provides
 from rbxcompose.compiler.sections.missions import INPUT, missions
 from rbxcompose.manifest.registry import section_named
-from rbxcompose.manifest.section import Section
+from rbxcompose.manifest.section import PART, ROBOT, TEST, Section
 from rbxcompose.manifest.test_file import STEP_KEYS
-from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, all_nodes, at
+from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at, entries_of, scalars
 from rbxcompose.missions.language.asked import Asked, WrittenArgument
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.keys import keys_taking
@@ -33,10 +33,12 @@ from rbxcompose.missions.program.answers import DEEDS
 from rbxcompose.missions.program.machines import MACHINE_KEYS
 from rbxcompose.missions.program.program import Program, Skill
 from rbxcompose.missions.program.registry import kinds
-from rbxcompose.tools.lsp.project_files import MISSION as MISSION_DOCUMENT
-from rbxcompose.tools.lsp.project_files import NO_MEANING, OVERLAY, PART, ROBOT, TEST, Meanings, ProjectFiles
-from rbxcompose.tools.lsp.symbols import BRANCH, INTERRUPT, ITEM, NODE, STATE, VARIABLE, Mention, NamePiece, Symbol
+from rbxcompose.tools.lsp.project import MISSION as MISSION_DOCUMENT
+from rbxcompose.tools.lsp.project import OVERLAY
+from rbxcompose.tools.lsp.project_files import NO_MEANING, Meanings, NamePiece, ProjectFiles, Symbol
 
+VARIABLE, ITEM, STATE, NODE, BRANCH, INTERRUPT = "variable", "item", "state", "node", "branch", "interrupt"
+"""Sorts of names that missions define; those of other manifests are named like the section that defines them."""
 _FILL = re.compile(r"\$\$|\$\{(?P<body>[^}]*)\}")
 _ARGUMENT = "args."
 _UNNAMED = (ANYTHING, FILE, TOPIC, INPUT, PART_ARGUMENT)  # kinds that are looked up elsewhere, or have no names
@@ -49,27 +51,69 @@ _SORTS = {"for": ITEM, "save": VARIABLE, "name": NODE}
 _STEPS = (STATE, NODE, ITEM)
 
 
-class ManifestMentions:
-    """Finds the names in one file."""
+@dataclass(frozen=True, slots=True)
+class Mention:
+    """A place where the name of a symbol is written, as offsets in the text of a file.
+
+    Both are -1 if escapes or folded lines hide it.
+    """
+
+    symbol: Symbol
+    file: Path
+    start: int
+    end: int
+    is_definition: bool = False
+
+
+class _FileMentions:
+    """Finds the names in one file, which `robots` have."""
+
+    def __init__(self, files: ProjectFiles, path: Path, robots: Sequence[Path] = ()) -> None:
+        self.files, self.path, self.robots = files, path, robots
+        self.root = files.tree(path)
+        self.names: Mapping[str, list[Symbol]] = {}  # of the mission that it is, or that it is about
+
+    def _mention(self, scalar: ScalarNode, symbol: Symbol, start: int = 0, *, is_definition: bool = False) -> Mention:
+        place = self.files.places(self.path).of(scalar, start, start + len(symbol.name))
+        return Mention(symbol, self.path, *place, is_definition=is_definition)
+
+    def _meant(
+        self, scalar: ScalarNode, start: int, meanings: Meanings, *, is_definition: bool = False
+    ) -> Iterator[Mention]:
+        """Yield the places of a word, which begins at `start` of a scalar, under each of its meanings."""
+        for piece in {piece for meaning in meanings for piece in meaning}:
+            place = self.files.places(self.path).of(scalar, start + piece.start, start + piece.end)
+            is_own = is_definition and piece.start == 0 and all(len(meaning) == 1 for meaning in meanings)
+            yield Mention(piece.symbol, self.path, *place, is_definition=is_own)
+
+    def _own(self, scalar: ScalarNode, sorts: tuple[str, ...]) -> Iterator[Mention]:
+        yield from (self._mention(scalar, symbol) for symbol in self.names.get(scalar.text, ()) if symbol.sort in sorts)
+
+    def _of_robots(self, kind: str, scalar: ScalarNode, start: int = 0, word: str = "") -> Iterator[Mention]:
+        for robot in self.robots:
+            yield from self._meant(scalar, start, self.files.meanings(robot, kind, word or scalar.text))
+
+
+class ManifestMentions(_FileMentions):
+    """Finds the names in a robot, a part or an overlay."""
 
     def __init__(self, files: ProjectFiles, path: Path) -> None:
-        self.files, self.path = files, path
+        super().__init__(files, path)
         self.scopes = files.scopes(path)
 
     def all(self) -> Iterator[Mention]:
         """Yield every place where a name is written."""
-        yield from self._fills(self.files.tree(self.path))
+        yield from self._fills(self.root)
         for layer in self.files.layers(self.path):
             for name, entry in layer.entries.items():
                 if (section := section_named(name)) is not None:
                     yield from self._of_section(section, layer, entry.value)
 
     def _of_section(self, section: Section[Any, Any], layer: MappingNode, node: TreeNode) -> Iterator[Mention]:
-        named = at(layer, (section.name, *section.at)) if section.names else None
-        for name, entry in named.entries.items() if isinstance(named, MappingNode) else ():
+        for name, entry in entries_of(at(layer, (section.name, *section.at)) if section.names else None):
             for scope in self.scopes:
                 meanings = self.files.visible(scope, section.name).get(name, frozenset())
-                yield from self._mentions(entry.key, 0, meanings, is_definition=True)
+                yield from self._meant(entry.key, 0, meanings, is_definition=True)
         for kind, scalar in references(self.files, self.scopes[0], section, node):
             yield from self._reference(kind, scalar)
         if section.name == include.name:
@@ -79,69 +123,54 @@ class ManifestMentions:
         elif section.name == args.name:
             yield from self._defaults(node)
         elif section.name == provides.name:
-            for scalar in leaves(at(node, ("values",))):
+            for scalar in scalars(at(node, ("values",))):
                 yield from self._reference(VALUE, scalar)
 
     def _reference(self, kind: str, scalar: ScalarNode) -> Iterator[Mention]:
         for scope in self.scopes:
-            yield from self._mentions(scalar, 0, self.files.meanings(scope, kind, scalar.text))
+            yield from self._meant(scalar, 0, self.files.meanings(scope, kind, scalar.text))
 
     def _given_to_parts(self, node: TreeNode) -> Iterator[Mention]:
-        for instance, entry in _entries(node):
+        for instance, entry in entries_of(node):
             parts = [part for scope in self.scopes for part in self.files.parts(scope).get(instance, ())]
-            for name, given in _entries(at(entry.value, ("with",))):
+            for name, given in entries_of(at(entry.value, ("with",))):
                 for part in parts:
                     own = Symbol(part, args.name, name)
                     if own.name in self.files.visible(part, args.name):
-                        yield from self._mentions(given.key, 0, frozenset({(NamePiece(0, len(name), own),)}))
+                        yield from self._meant(given.key, 0, frozenset({(NamePiece(0, len(name), own),)}))
                     for kind in kinds_of_argument(self.files, part, name):
-                        for scalar in leaves(given.value):
+                        for scalar in scalars(given.value):
                             yield from self._reference(kind, scalar)
 
     def _given_to_missions(self, node: TreeNode) -> Iterator[Mention]:
         there = [one for scope in self.scopes for one in self.files.missions(scope)]
-        for mission, entry in _entries(node):
-            for name, given in _entries(at(entry.value, ("with",))):
+        for mission, entry in entries_of(node):
+            for name, given in entries_of(at(entry.value, ("with",))):
                 for file in dict.fromkeys(file for one, file in there if one == mission):
                     declared = at(self.files.tree(file), ("inputs", name))
                     if declared is None:
                         continue
                     piece = NamePiece(0, len(name), Symbol(file, VARIABLE, name))
-                    yield from self._mentions(given.key, 0, frozenset({(piece,)}))
+                    yield from self._meant(given.key, 0, frozenset({(piece,)}))
                     if is_placed(declared):
-                        for scalar in leaves(given.value):
+                        for scalar in scalars(given.value):
                             yield from self._reference(PLACE, scalar)
 
     def _defaults(self, node: TreeNode) -> Iterator[Mention]:
-        for name, entry in _entries(node):
+        for name, entry in entries_of(node):
             value = at(entry.value, ("default",)) or entry.value
             kinds = {kind for scope in self.scopes for kind in kinds_of_argument(self.files, scope, name)}
-            for scalar in leaves(value) if not isinstance(value, MappingNode) else ():
+            for scalar in scalars(value) if not isinstance(value, MappingNode) else ():
                 for kind in kinds:
                     yield from self._reference(kind, scalar)
 
     def _fills(self, node: TreeNode) -> Iterator[Mention]:
-        for scalar in leaves(node):
+        for scalar in scalars(node):
             for start, name in filled_arguments(scalar.text):
                 for scope in self.scopes:
                     if name in self.files.visible(scope, args.name):
                         piece = NamePiece(0, len(name), Symbol(scope, args.name, name))
-                        yield from self._mentions(scalar, start, frozenset({(piece,)}))
-
-    def _mentions(
-        self, scalar: ScalarNode, start: int, meanings: Meanings, is_definition: bool = False
-    ) -> Iterator[Mention]:
-        yield from mentions(self.files, self.path, scalar, start, meanings, is_definition)
-
-
-def mentions(
-    files: ProjectFiles, path: Path, scalar: ScalarNode, start: int, meanings: Meanings, is_definition: bool = False
-) -> Iterator[Mention]:
-    """Yield the places of a word, which begins at `start` of a scalar, under each of its meanings."""
-    for piece in {piece for meaning in meanings for piece in meaning}:
-        place = files.places(path).of(scalar, start + piece.start, start + piece.end)
-        is_own = is_definition and piece.start == 0 and all(len(meaning) == 1 for meaning in meanings)
-        yield Mention(piece.symbol, path, *place, is_definition=is_own)
+                        yield from self._meant(scalar, start, frozenset({(piece,)}))
 
 
 def references(
@@ -154,7 +183,7 @@ def references(
 
     def record(kind: str, value: TreeNode) -> TreeNode:
         if kind not in _UNNAMED:
-            found.extend((kind, scalar) for scalar in leaves(value))
+            found.extend((kind, scalar) for scalar in scalars(value))
         return value
 
     section.with_references(_with_types(files, scope, section, node), record)
@@ -171,8 +200,8 @@ def _with_types(files: ProjectFiles, scope: Path, section: Section[Any, Any], no
         if isinstance(entry.value, MappingNode) and "type" not in entry.value:
             for pieces in files.visible(scope, section.name).get(name, ()):
                 if isinstance(word := files.definition(pieces[-1].symbol, "type"), ScalarNode):
-                    entries = {**entry.value.entries, "type": Entry(word, word)}
-                    changed[name] = Entry(entry.key, replace(entry.value, entries=entries))
+                    entries = {**entry.value.entries, "type": replace(entry, key=word, value=word)}
+                    changed[name] = replace(entry, value=replace(entry.value, entries=entries))
     return replace(node, entries=changed)
 
 
@@ -189,8 +218,8 @@ def kinds_of_argument(files: ProjectFiles, part: Path, name: str, level: int = 0
             section = section_named(key)
             if section is not None:
                 found |= {kind for kind, node in references(files, part, section, entry.value) if node.text == filler}
-        for instance, entry in _entries(layer.get(include.name)):
-            for inner, given in _entries(at(entry.value, ("with",))):
+        for instance, entry in entries_of(layer.get(include.name)):
+            for inner, given in entries_of(at(entry.value, ("with",))):
                 if isinstance(given.value, ScalarNode) and given.value.text == filler:
                     for other in files.parts(part).get(instance, ()):
                         found |= kinds_of_argument(files, other, inner, level + 1)
@@ -216,16 +245,6 @@ def is_placed(declared: TreeNode | None) -> bool:
     return isinstance(word, ScalarNode) and word.text in PLACED
 
 
-def leaves(node: TreeNode | None) -> Iterator[ScalarNode]:
-    """Yield the words in a node, in lists and in the values of maps."""
-    found = all_nodes(node) if node is not None else ()
-    return (below for below in found if isinstance(below, ScalarNode))
-
-
-def _entries(node: TreeNode | None) -> list[tuple[str, Entry]]:
-    return list(node.entries.items()) if isinstance(node, MappingNode) else []
-
-
 Skills = Mapping[str, Skill]
 
 
@@ -242,20 +261,18 @@ class StepSurroundings:
         return StepSurroundings((*self.path, key), self.items, self.are_steps and are_steps)
 
 
-class MissionMentions:
+class MissionMentions(_FileMentions):
     """Finds the names in one mission; `skills` are those of a robot that has it, as far as they are known."""
 
     def __init__(self, files: ProjectFiles, path: Path, skills: Skills) -> None:
-        self.files, self.path, self.skills = files, path, skills
-        self.root = files.tree(path)
-        self.robots = files.robots_of(path)
+        super().__init__(files, path, files.robots_of(path))
+        self.skills = skills
         self.names = mission_names(files, path)
 
     def all(self) -> Iterator[Mention]:
         """Yield every place where a name is written."""
         for section in ("inputs", "data"):
-            named = self.root.get(section)
-            for name, entry in named.entries.items() if isinstance(named, MappingNode) else ():
+            for name, entry in entries_of(self.root.get(section)):
                 yield self._mention(entry.key, Symbol(self.path, VARIABLE, name), is_definition=True)
         for key in ("data", "interrupts", "outputs", *BODIES):
             if (node := self.root.get(key)) is not None:
@@ -269,16 +286,8 @@ class MissionMentions:
                     yield from self._walk(node, around)
         yield from self._places()
 
-    def _mention(self, scalar: ScalarNode, symbol: Symbol, start: int = 0, *, is_definition: bool = False) -> Mention:
-        place = self.files.places(self.path).of(scalar, start, start + len(symbol.name))
-        return Mention(symbol, self.path, *place, is_definition=is_definition)
-
-    def _of_robot(self, kind: str, scalar: ScalarNode, start: int, word: str) -> Iterator[Mention]:
-        for robot in self.robots:
-            yield from mentions(self.files, self.path, scalar, start, self.files.meanings(robot, kind, word))
-
     def _keys(self, node: TreeNode | None, sort: str, place: KeyPath) -> Iterator[Mention]:
-        for name, entry in node.entries.items() if isinstance(node, MappingNode) else ():
+        for name, entry in entries_of(node):
             yield self._mention(entry.key, Symbol(self.path, sort, name, place), is_definition=True)
 
     def _walk(self, node: TreeNode, around: StepSurroundings) -> Iterator[Mention]:
@@ -297,7 +306,7 @@ class MissionMentions:
                 yield from self._walk(entry.value, around.below(name, are_steps=False))
 
     def _walk_named(self, node: TreeNode, around: StepSurroundings) -> Iterator[Mention]:
-        for name, entry in node.entries.items() if isinstance(node, MappingNode) else ():
+        for name, entry in entries_of(node):
             yield from self._walk(entry.key, around)
             yield from self._walk(entry.value, around.below(name))
 
@@ -330,11 +339,9 @@ class MissionMentions:
 
     def _word(self, key: str, value: TreeNode, around: StepSurroundings) -> Iterator[Mention]:
         """Yield the name that a word of the language takes."""
-        if key == "set" and isinstance(value, MappingNode):
-            for name, entry in value.entries.items():
-                yield from (
-                    self._mention(entry.key, symbol) for symbol in self.names.get(name, ()) if symbol.sort == VARIABLE
-                )
+        if key == "set":
+            for _, entry in entries_of(value):
+                yield from self._own(entry.key, (VARIABLE,))
         if not isinstance(value, ScalarNode):
             return
         if key == "save":
@@ -342,17 +349,15 @@ class MissionMentions:
         elif key == "name":
             yield self._mention(value, Symbol(self.path, NODE, value.text), is_definition=True)
         elif key == "restart":
-            yield from (
-                self._mention(value, symbol) for symbol in self.names.get(value.text, ()) if symbol.sort in TARGETS
-            )
+            yield from self._own(value, TARGETS)
         elif key == "ends_with" and value.text in around.items:
             yield self._mention(value, around.items[value.text])
         elif key == "use":
-            yield from self._of_robot(MISSION, value, 0, value.text)
+            yield from self._of_robots(MISSION, value)
             yield from self._given(at(self.root, (*around.path, "with")), value.text)
 
     def _given(self, given: TreeNode | None, mission: str) -> Iterator[Mention]:
-        for name, entry in given.entries.items() if isinstance(given, MappingNode) else ():
+        for name, entry in entries_of(given):
             for file in self._files_of(mission):
                 if any(symbol.sort == VARIABLE for symbol in mission_names(self.files, file).get(name, ())):
                     yield self._mention(entry.key, Symbol(file, VARIABLE, name))
@@ -362,10 +367,10 @@ class MissionMentions:
 
     def _skill(self, key: ScalarNode, value: TreeNode, around: StepSurroundings) -> Iterator[Mention]:
         """Yield the names in the call of a skill: a controller is one, and its arguments are its joints."""
-        found = list(self._of_robot(CONTROLLER, key, 0, key.text))
+        found = list(self._of_robots(CONTROLLER, key))
         yield from found
-        for argument in value.entries.values() if found and isinstance(value, MappingNode) else ():
-            yield from self._of_robot(JOINT, argument.key, 0, argument.key.text)
+        for _, argument in entries_of(value) if found else ():
+            yield from self._of_robots(JOINT, argument.key)
         yield from self._walk(value, around.below("", are_steps=False))
 
     def _machine(self, node: TreeNode, around: StepSurroundings) -> Iterator[Mention]:
@@ -376,7 +381,7 @@ class MissionMentions:
         for name, entry in known.items():
             inner = around.below("states").below(name)
             leads = at(entry.value, ("next",))
-            targets += list(leaves(leads))
+            targets += list(scalars(leads))
             if isinstance(entry.value, MappingNode):
                 yield from self._step(entry.value, inner)
         for target in targets:
@@ -392,7 +397,7 @@ class MissionMentions:
             elif own := self.names.get(name.name):
                 yield from (self._mention(scalar, symbol, start) for symbol in own if symbol.sort in (VARIABLE, ITEM))
             else:
-                yield from self._of_robot(VALUE, scalar, start, name.name)
+                yield from self._of_robots(VALUE, scalar, start, name.name)
 
     def _places(self) -> Iterator[Mention]:
         program = read_program(self.root, Report(), list(self.skills))
@@ -413,29 +418,28 @@ class MissionMentions:
         """Return the types of the arguments of a skill or mission; the main one has no name."""
         if used is not None:
             inputs = (self.files.tree(file).get("inputs") for file in self._files_of(used.text))
-            named = [entry for input_ in inputs if isinstance(input_, MappingNode) for entry in input_.entries.values()]
-            return {entry.key.text: TypeKind.PLACE if is_placed(entry.value) else TypeKind.TEXT for entry in named}
+            named = (pair for input_ in inputs for pair in entries_of(input_))
+            return {name: TypeKind.PLACE if is_placed(entry.value) else TypeKind.TEXT for name, entry in named}
         known = self.skills.get(skill)
         types = {name: argument.kind for name, argument in known.arguments.items()} if known else {}
         return types | ({"": types[known.main]} if known and known.main in types else {})
 
     def _argument(self, argument: WrittenArgument) -> Iterator[Mention]:
-        for scalar in leaves(argument.value):
+        for scalar in scalars(argument.value):
             for word in words(scalar.text):
-                yield from self._of_robot(PLACE, scalar, word.start, word.name)
+                yield from self._of_robots(PLACE, scalar, word.start, word.name)
 
     def _words(self, asked: Asked) -> Iterator[Mention]:
         for word in asked.expression.words:
-            yield from self._of_robot(PLACE, asked.scalar, word.start, word.name)
+            yield from self._of_robots(PLACE, asked.scalar, word.start, word.name)
 
     def _known_places(self, section: str) -> Iterator[Mention]:
         """Yield the places in the values of inputs and data: a map or list that has nothing else, or a single word."""
-        named = self.root.get(section)
-        for entry in named.entries.values() if isinstance(named, MappingNode) else ():
+        for _, entry in entries_of(self.root.get(section)):
             value: TreeNode | None = entry.value
             if section == "inputs":
                 value = at(entry.value, ("default",)) if is_placed(entry.value) else None
-            keys = [one.key for one in value.entries.values()] if isinstance(value, MappingNode) else []
+            keys = [one.key for _, one in entries_of(value)]
             items = list(value.items) if isinstance(value, SequenceNode) else [value]
             for group in (keys, [item for item in items if isinstance(item, ScalarNode)]):
                 if group and (not isinstance(value, SequenceNode) or len(group) == len(items)):
@@ -448,7 +452,7 @@ class MissionMentions:
             ]
             if all(meanings != NO_MEANING for _, meanings in found):
                 for scalar, meanings in found:
-                    yield from mentions(self.files, self.path, scalar, 0, meanings)
+                    yield from self._meant(scalar, 0, meanings)
 
 
 def mission_names(files: ProjectFiles, path: Path) -> dict[str, list[Symbol]]:
@@ -475,8 +479,7 @@ def mission_names(files: ProjectFiles, path: Path) -> dict[str, list[Symbol]]:
 
     root = files.tree(path)
     for section in ("inputs", "data"):
-        named = root.get(section)
-        for name in named.entries if isinstance(named, MappingNode) else ():
+        for name, _ in entries_of(root.get(section)):
             add(VARIABLE, name)
     walk(root, ())
     return {name: list(symbols) for name, symbols in found.items()}
@@ -518,39 +521,38 @@ def _step_words() -> frozenset[str]:
     return frozenset((*options, *modifier_keys(), *own))
 
 
-class TrialMentions:
-    """Finds the names in one test; `skills` are those of its robot, as far as they are known."""
+class TrialMentions(_FileMentions):
+    """Finds the names in a test of a robot; `skills` are those of the robot, as far as they are known."""
 
-    def __init__(self, files: ProjectFiles, path: Path, skills: Skills) -> None:
-        self.files, self.path, self.skills = files, path, skills
-        self.root = files.tree(path)
-        self.robot = files.file_named(path, "robot")
+    def __init__(self, files: ProjectFiles, path: Path, robot: Path, skills: Skills) -> None:
+        super().__init__(files, path, (robot,))
+        self.skills = skills
         mission = self.root.get("mission")
         self.mission = mission if isinstance(mission, ScalarNode) else None
-        self.missions = mission_files(files, self.robot, self.mission.text) if self.robot and self.mission else set()
-        names = [mission_names(files, one) for one in self.missions]
+        missions = mission_files(files, robot, self.mission.text) if self.mission else set()
+        names = [mission_names(files, one) for one in missions]
         self.names = {name: [*one[name]] for one in names for name in one}
 
     def all(self) -> Iterator[Mention]:
         """Yield every place where a name is written."""
-        if self.robot is None or self.mission is None:
+        if self.mission is None:
             return
-        yield from self._of_robot(MISSION, self.mission)
-        for entry in _trial_entries(self.root.get("with")):
+        yield from self._of_robots(MISSION, self.mission)
+        for _, entry in entries_of(self.root.get("with")):
             yield from self._own(entry.key, (VARIABLE,))
             yield from self._values(entry.value)
-        for entry in _trial_entries(self.root.get("mocks")):
-            yield from self._of_robot(CONTROLLER, entry.key)
+        for _, entry in entries_of(self.root.get("mocks")):
+            yield from self._of_robots(CONTROLLER, entry.key)
             yield from self._set(at(entry.value, ("sets",)))
             if self._takes_places(entry.key.text, ""):
-                for scalar in leaves(at(entry.value, ("fails_for",))):
+                for scalar in scalars(at(entry.value, ("fails_for",))):
                     yield from self._values(scalar)
         events = self.root.get("events")
         for event in events.items if isinstance(events, SequenceNode) else ():
             yield from self._set(at(event, ("set",)))
             for key, kind in (("joint", JOINT), ("bus", SERVO_BUS)):
                 if isinstance(word := at(event, ("fault", key)), ScalarNode):
-                    yield from self._of_robot(kind, word)
+                    yield from self._of_robots(kind, word)
         yield from self._expected()
 
     def _expected(self) -> Iterator[Mention]:
@@ -558,26 +560,26 @@ class TrialMentions:
             listed = at(self.root, ("expect", key))
             for item in listed.items if isinstance(listed, SequenceNode) else ():
                 yield from self._step(item)
-        for entry in _trial_entries(at(self.root, ("expect", "count"))):
+        for _, entry in entries_of(at(self.root, ("expect", "count"))):
             yield from self._own(entry.key, _STEPS)
-            yield from self._of_robot(CONTROLLER, entry.key)
-        for entry in _trial_entries(at(self.root, ("expect", "data"))):
+            yield from self._of_robots(CONTROLLER, entry.key)
+        for _, entry in entries_of(at(self.root, ("expect", "data"))):
             yield from self._own(entry.key, (VARIABLE,))
             yield from self._values(entry.value)
 
     def _step(self, item: TreeNode) -> Iterator[Mention]:
         if isinstance(item, ScalarNode):
             yield from self._own(item, _STEPS)
-            yield from self._of_robot(CONTROLLER, item)
-        for entry in _trial_entries(item):
+            yield from self._of_robots(CONTROLLER, item)
+        for _, entry in entries_of(item):
             name = entry.key.text
             if name in STEP_KEYS:
                 continue
             yield from self._own(entry.key, _STEPS)
-            is_controller = list(self._of_robot(CONTROLLER, entry.key))
+            is_controller = list(self._of_robots(CONTROLLER, entry.key))
             yield from is_controller
-            for argument in _trial_entries(entry.value):
-                yield from self._of_robot(JOINT, argument.key) if is_controller else ()
+            for _, argument in entries_of(entry.value):
+                yield from self._of_robots(JOINT, argument.key) if is_controller else ()
                 if self._takes_places(name, argument.key.text):
                     yield from self._values(argument.value)
             if isinstance(entry.value, ScalarNode) and self._takes_places(name, ""):
@@ -589,35 +591,20 @@ class TrialMentions:
         return wanted is None or wanted.kind not in (TypeKind.TEXT, TypeKind.CHOICE)
 
     def _set(self, node: TreeNode | None) -> Iterator[Mention]:
-        for entry in _trial_entries(node):
-            yield from self._of_robot(VALUE, entry.key)
+        for _, entry in entries_of(node):
+            yield from self._of_robots(VALUE, entry.key)
             yield from self._values(entry.value)
 
     def _values(self, node: TreeNode) -> Iterator[Mention]:
         """Yield the places and `$names` in a value."""
-        for scalar in leaves(node):
+        for scalar in scalars(node):
             for word in words(scalar.text):
-                yield from self._of_robot(PLACE, scalar, word.start, word.name)
+                yield from self._of_robots(PLACE, scalar, word.start, word.name)
             for name in dollar_names(scalar.text):
                 own = self.names.get(name.name, ())
                 yield from (self._mention(scalar, symbol, name.start + 1) for symbol in own if symbol.sort == VARIABLE)
                 if not own:
-                    yield from self._of_robot(VALUE, scalar, name.start + 1, name.name)
-
-    def _own(self, scalar: ScalarNode, sorts: tuple[str, ...]) -> Iterator[Mention]:
-        yield from (self._mention(scalar, symbol) for symbol in self.names.get(scalar.text, ()) if symbol.sort in sorts)
-
-    def _mention(self, scalar: ScalarNode, symbol: Symbol, start: int = 0) -> Mention:
-        return Mention(symbol, self.path, *self.files.places(self.path).of(scalar, start, start + len(symbol.name)))
-
-    def _of_robot(self, kind: str, scalar: ScalarNode, start: int = 0, word: str = "") -> Iterator[Mention]:
-        if self.robot is not None:
-            meanings = self.files.meanings(self.robot, kind, word or scalar.text)
-            yield from mentions(self.files, self.path, scalar, start, meanings)
-
-
-def _trial_entries(node: TreeNode | None) -> list[Entry]:
-    return list(node.entries.values()) if isinstance(node, MappingNode) else []
+                    yield from self._of_robots(VALUE, scalar, name.start + 1, name.name)
 
 
 MentionPlace = tuple[Path, int, int]
@@ -648,7 +635,7 @@ class SymbolIndex:
         elif kind == MISSION_DOCUMENT:
             yield from MissionMentions(self.files, path, self._skills(self.files.robots_of(path))).all()
         elif kind == TEST and (robot := self.files.file_named(path, "robot")) is not None:
-            yield from TrialMentions(self.files, path, self._skills([robot])).all()
+            yield from TrialMentions(self.files, path, robot, self._skills([robot])).all()
 
     def _skills(self, robots: Iterable[Path]) -> Skills:
         found = (self._robot_of(robot) for robot in robots)

@@ -11,16 +11,80 @@ from functools import cached_property
 from pathlib import Path
 
 from rbxcompose.base.config import COMPONENT, JOINT, LINK, PORT, PREFIXED, RUNNING
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.compiler.sections.composition import include, profiles
 from rbxcompose.compiler.sections.missions import missions
 from rbxcompose.manifest.files import ROBOT_FILE, project_of, resolve
 from rbxcompose.manifest.registry import naming, section_named, sections
-from rbxcompose.manifest.tree import NOWHERE, MappingNode, ScalarNode, TreeNode, at
+from rbxcompose.manifest.section import PART, ROBOT
+from rbxcompose.manifest.tree import NOWHERE, KeyPath, MappingNode, ScalarNode, TreeNode, at, entries_of
 from rbxcompose.tools.lsp.document import quick_tree
-from rbxcompose.tools.lsp.project import kind_of
-from rbxcompose.tools.lsp.symbols import NamePiece, ScalarPlaces, Symbol
+from rbxcompose.tools.lsp.project import OVERLAY, kind_of
 
-ROBOT, PART, OVERLAY, MISSION, TEST = "Robot", "Part", "Overlay", "Mission", "Test"
+
+@dataclass(frozen=True, slots=True)
+class Symbol:
+    """A name, by the file that defines it and its sort; `at` is the place that bounds it, if that is not the file."""
+
+    file: Path
+    sort: str
+    name: str
+    at: KeyPath = ()
+
+
+@dataclass(frozen=True, slots=True)
+class NamePiece:
+    """A part of a word that is the name of a symbol: in `drive_battery`, an instance and a component of its part."""
+
+    start: int
+    end: int
+    symbol: Symbol
+
+    def shifted(self, offset: int) -> NamePiece:
+        """Return the piece in a word that begins `offset` characters earlier."""
+        return NamePiece(self.start + offset, self.end + offset, self.symbol)
+
+
+class ScalarPlaces:
+    """Finds the places of scalars in a text."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self._starts = [0]
+        for line in text.split("\n"):
+            self._starts.append(self._starts[-1] + len(line) + 1)
+
+    def offset(self, line: int, column: int) -> int:
+        """Return the offset of a position (from 0)."""
+        return self._starts[min(line, len(self._starts) - 1)] + column
+
+    def position(self, offset: int) -> tuple[int, int]:
+        """Return the line and column (from 0) of an offset."""
+        line = self.text.count("\n", 0, offset)
+        return line, offset - self._starts[line]
+
+    def of(self, scalar: ScalarNode, start: int, end: int) -> tuple[int, int]:
+        """Return the offsets of `scalar.text[start:end]`; (-1, -1) if escapes or folded lines hide it."""
+        span = scalar.span
+        first = self.offset(span.line - 1, span.column - 1)
+        raw = self.text[first : self.offset(span.end_line - 1, span.end_column - 1)]
+        word = scalar.text[start:end]
+        before, there = _finds(scalar.text, word), _finds(raw, word)
+        # The same word in the same order: what YAML changes between the two is none of it.
+        if len(before) != len(there) or start not in before:
+            return -1, -1
+        at = first + there[before.index(start)]
+        return at, at + len(word)
+
+
+def _finds(text: str, word: str) -> list[int]:
+    found, at = [], text.find(word)
+    while word and at >= 0:
+        found.append(at)
+        at = text.find(word, at + 1)
+    return found
+
+
 FOLDERS = ("robots", "parts", "missions")  # of a project, where its manifests are
 _MOST_FILES = 1000
 _MOST_LEVELS = 8  # of parts in parts
@@ -100,8 +164,7 @@ class ProjectFiles:
         """Yield the maps of a file that have sections: the file itself, and its profiles."""
         root = self.tree(path)
         yield root
-        named = root.get(profiles.name)
-        for entry in named.entries.values() if isinstance(named, MappingNode) else ():
+        for _, entry in entries_of(root.get(profiles.name)):
             if isinstance(entry.value, MappingNode):
                 yield entry.value
 
@@ -123,8 +186,7 @@ class ProjectFiles:
             return self._parts[scope]
         found: dict[str, dict[Path, None]] = {}
         for layer in self._all_layers(scope):
-            named = layer.get(include.name)
-            for name, entry in named.entries.items() if isinstance(named, MappingNode) else ():
+            for name, entry in entries_of(layer.get(include.name)):
                 file = self._file(at(entry.value, ("part",)) or entry.value, scope)
                 if file is not None and file != scope:
                     found.setdefault(name, {})[file] = None
@@ -139,8 +201,7 @@ class ProjectFiles:
 
     def _listed(self, scope: Path) -> Iterator[tuple[str, Path]]:
         for layer in self._all_layers(scope):
-            named = layer.get(missions.name)
-            for name, entry in named.entries.items() if isinstance(named, MappingNode) else ():
+            for name, entry in entries_of(layer.get(missions.name)):
                 if (file := self._file(at(entry.value, ("file",)) or entry.value, scope)) is not None:
                     yield name, file
 

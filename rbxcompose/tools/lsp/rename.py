@@ -10,13 +10,13 @@ from rbxcompose.base.fixes import apply
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.registry import section_named
+from rbxcompose.manifest.section import ROBOT
 from rbxcompose.manifest.tree import NOWHERE, ScalarNode
 from rbxcompose.missions.language.value_reader import NAME, invalid_name
 from rbxcompose.missions.program.registry import kinds
-from rbxcompose.tools.lsp.mentions import SymbolIndex
+from rbxcompose.tools.lsp.mentions import Mention, SymbolIndex
 from rbxcompose.tools.lsp.project import Project
-from rbxcompose.tools.lsp.project_files import ROBOT, ProjectFiles
-from rbxcompose.tools.lsp.symbols import Mention, Symbol
+from rbxcompose.tools.lsp.project_files import ProjectFiles, ScalarPlaces, Symbol
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +59,8 @@ def change_of(before: str, after: str) -> TextChange:
     most = shortest - start
     tail = next((size for size in range(most) if before[-1 - size] != after[-1 - size]), most)
     end = len(before) - tail
-    return TextChange(_position(before, start), _position(before, end), after[start : len(after) - tail])
-
-
-def _position(text: str, offset: int) -> tuple[int, int]:
-    return text.count("\n", 0, offset), offset - (text.rfind("\n", 0, offset) + 1)
+    position = ScalarPlaces(before).position
+    return TextChange(position(start), position(end), after[start : len(after) - tail])
 
 
 Compile = Callable[[Path, Mapping[Path, str]], Compilation]
@@ -185,9 +182,13 @@ def _where(index: SymbolIndex, symbols: list[Symbol]) -> str:
     for symbol in symbols:
         for mention in index.of(symbol):
             if seen.setdefault((mention.file, mention.start), symbol.sort) != symbol.sort and mention.start >= 0:
-                line, column = index.files.places(mention.file).position(mention.start)
-                return f" at {shown_name(mention.file)}:{line + 1}:{column + 1}"
+                return f" at {_place(index, mention)}"
     return ""
+
+
+def _place(index: SymbolIndex, mention: Mention) -> str:
+    line, column = index.files.places(mention.file).position(max(mention.start, 0))
+    return f"{shown_name(mention.file)}:{line + 1}:{column + 1}"
 
 
 def _refuse_name(new: str) -> None:
@@ -202,9 +203,7 @@ def _refuse_taken(index: SymbolIndex, symbol: Symbol, new: str) -> None:
     taken = Symbol(symbol.file, symbol.sort, new, symbol.at)
     definition = next((mention for mention in index.of(taken) if mention.is_definition), None)
     if definition is not None:
-        line, column = index.files.places(definition.file).position(max(definition.start, 0))
-        place = f"{shown_name(definition.file)}:{line + 1}:{column + 1}"
-        raise CannotRenameError(f"'{new}' is taken: {place}")
+        raise CannotRenameError(f"'{new}' is taken: {_place(index, definition)}")
 
 
 def _refuse_changed(files: ProjectFiles, texts: Mapping[Path, str], compiled: Compile) -> None:
@@ -218,27 +217,17 @@ def _refuse_changed(files: ProjectFiles, texts: Mapping[Path, str], compiled: Co
 
 def _refuse_other_meanings(index: SymbolIndex, after: SymbolIndex, symbols: Collection[Symbol], new: str) -> None:
     """Refuse what makes a word mean the new name that meant something else before, or the other way round."""
-    was = Counter(
-        (
-            mention.file,
-            mention.symbol.file,
-            mention.symbol.sort,
-            new if mention.symbol in symbols else mention.symbol.name,
-        )
-        for mention in index.mentions
-    )
-    now = {
-        (mention.file, mention.symbol.file, mention.symbol.sort, mention.symbol.name): mention
-        for mention in after.mentions
-    }
-    found = Counter(
-        (mention.file, mention.symbol.file, mention.symbol.sort, mention.symbol.name) for mention in after.mentions
-    )
+
+    def key_of(mention: Mention, name: str) -> tuple[Path, Path, str, str]:
+        return mention.file, mention.symbol.file, mention.symbol.sort, name
+
+    was = Counter(key_of(old, new if old.symbol in symbols else old.symbol.name) for old in index.mentions)
+    now = {key_of(mention, mention.symbol.name): mention for mention in after.mentions}
+    found = Counter(key_of(mention, mention.symbol.name) for mention in after.mentions)
     for key in (found - was) | (was - found):
         place = ""
         if (one := now.get(key)) and one.start >= 0:
-            line, column = after.files.places(one.file).position(one.start)
-            place = f", as at {shown_name(one.file)}:{line + 1}:{column + 1}"
+            place = f", as at {_place(after, one)}"
         raise CannotRenameError(f"'{new}' has another meaning already{place}")
 
 

@@ -4,7 +4,7 @@ import logging
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, TypeVar
 
 from lsprotocol import types
 from pygls.exceptions import JsonRpcException
@@ -26,6 +26,9 @@ P = TypeVar("P")
 R = TypeVar("R")
 SWITCH = 0.001  # [s] that an answer waits for the other thread, which may be compiling
 TRIGGERS = (" ", ":", "$", "{", ".", "-", "[", ",")
+
+
+_Notice = types.DidOpenTextDocumentParams | types.DidSaveTextDocumentParams | types.DidChangeTextDocumentParams
 
 
 class RefusedRenameError(JsonRpcException):
@@ -54,19 +57,19 @@ class Session:
             self._converter = Converter(lambda path: self.project.text(path), self.server.workspace.position_codec)
         return self._converter
 
-    def opened(self, uri: str, pause: float = 0.0) -> None:
+    def opened(self, params: _Notice, pause: float = 0.0) -> None:
         """Check a document."""
-        path, text = self._read(uri)
+        path, text = self._read(params.text_document.uri)
         if path is not None and (self.newest.has(path) or self.project.has(path, text)):
             self.newest.change(path, text, pause)
 
-    def changed(self, uri: str) -> None:
+    def changed(self, params: types.DidChangeTextDocumentParams) -> None:
         """Check a document after a short pause in typing."""
-        self.opened(uri, PAUSE)
+        self.opened(params, PAUSE)
 
-    def closed(self, uri: str) -> None:
+    def closed(self, params: types.DidCloseTextDocumentParams) -> None:
         """Use the saved text again."""
-        path = self.convert.path(uri)
+        path = self.convert.path(params.text_document.uri)
         if path is not None and self.newest.has(path):
             self.newest.change(path, None)
 
@@ -126,11 +129,9 @@ class Session:
     def document_symbol(self, params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
         """Return the outline of a document."""
         document = self.document(params.text_document.uri)
-        return (
-            [self.convert.outlined(document.text, outline_entry) for outline_entry in outline(document.text)]
-            if document
-            else []
-        )
+        if document is None:
+            return []
+        return [self.convert.outlined(document.text, entry) for entry in outline(document.text)]
 
     def references(self, params: types.ReferenceParams) -> list[types.Location]:
         """Return where the name at a position is written."""
@@ -147,14 +148,12 @@ class Session:
         document = self.document(params.text_document.uri)
         if document is None:
             return None
+        index, place = self._index(document), self.convert.position(document.text, params.position)
         try:
-            found = prepare(
-                self._index(document), document.path, *self.convert.position(document.text, params.position)
-            )
+            found = prepare(index, document.path, *place)
         except CannotRenameError as error:
             raise RefusedRenameError(str(error)) from None
-        place = self.convert.mention(document.text, found).range
-        return types.PrepareRenamePlaceholder(place, found.symbol.name)
+        return types.PrepareRenamePlaceholder(self.convert.mention(document.text, found).range, found.symbol.name)
 
     def rename(self, params: types.RenameParams) -> types.WorkspaceEdit | None:
         """Rename what is at a position, in all files of the project."""
@@ -198,43 +197,35 @@ def make_server(environment: Mapping[str, str]) -> LanguageServer:
     server = LanguageServer("rbxcompose", rbxcompose.__version__)
     session = Session(server, environment)
 
-    for notice, take in (
-        (types.TEXT_DOCUMENT_DID_OPEN, session.opened),
-        (types.TEXT_DOCUMENT_DID_SAVE, session.opened),
-        (types.TEXT_DOCUMENT_DID_CHANGE, session.changed),
-        (types.TEXT_DOCUMENT_DID_CLOSE, session.closed),
-    ):
-        server.feature(notice)(_of_document(take))
-    server.feature(types.INITIALIZED)(_function(session.begun))
-    server.feature(types.SHUTDOWN)(_function(session.ended))
-    triggers = types.CompletionOptions(trigger_characters=list(TRIGGERS))
-    fixes = types.CodeActionOptions(code_action_kinds=[types.CodeActionKind.QuickFix])
-    server.feature(types.TEXT_DOCUMENT_COMPLETION, triggers)(_function(session.completion))
-    server.feature(types.TEXT_DOCUMENT_DEFINITION)(_function(session.definition))
-    server.feature(types.TEXT_DOCUMENT_HOVER)(_function(session.hover))
-    server.feature(types.TEXT_DOCUMENT_DOCUMENT_SYMBOL)(_function(session.document_symbol))
-    server.feature(types.TEXT_DOCUMENT_REFERENCES)(_function(session.references))
-    server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)(_function(session.prepare_rename))
-    server.feature(types.TEXT_DOCUMENT_RENAME, types.RenameOptions(prepare_provider=True))(_function(session.rename))
-    server.feature(types.TEXT_DOCUMENT_CODE_ACTION, fixes)(_function(session.code_action))
+    handlers: Mapping[str, Callable[[Any], object]] = {
+        types.TEXT_DOCUMENT_DID_OPEN: session.opened,
+        types.TEXT_DOCUMENT_DID_SAVE: session.opened,
+        types.TEXT_DOCUMENT_DID_CHANGE: session.changed,
+        types.TEXT_DOCUMENT_DID_CLOSE: session.closed,
+        types.INITIALIZED: session.begun,
+        types.SHUTDOWN: session.ended,
+        types.TEXT_DOCUMENT_COMPLETION: session.completion,
+        types.TEXT_DOCUMENT_DEFINITION: session.definition,
+        types.TEXT_DOCUMENT_HOVER: session.hover,
+        types.TEXT_DOCUMENT_DOCUMENT_SYMBOL: session.document_symbol,
+        types.TEXT_DOCUMENT_REFERENCES: session.references,
+        types.TEXT_DOCUMENT_PREPARE_RENAME: session.prepare_rename,
+        types.TEXT_DOCUMENT_RENAME: session.rename,
+        types.TEXT_DOCUMENT_CODE_ACTION: session.code_action,
+    }
+    options = {
+        types.TEXT_DOCUMENT_COMPLETION: types.CompletionOptions(trigger_characters=list(TRIGGERS)),
+        types.TEXT_DOCUMENT_RENAME: types.RenameOptions(prepare_provider=True),
+        types.TEXT_DOCUMENT_CODE_ACTION: types.CodeActionOptions([types.CodeActionKind.QuickFix]),
+    }
+    for feature, handle in handlers.items():
+        server.feature(feature, options.get(feature))(_function(handle))
     return server
 
 
 def _is_no_refusal(record: logging.LogRecord) -> bool:
     """Return whether a line belongs in the log: pygls takes every refusal for an exception of ours."""
     return not (record.exc_info and isinstance(record.exc_info[1], RefusedRenameError))
-
-
-class _Notice(Protocol):
-    """A notification about one document."""
-
-    @property
-    def text_document(self) -> types.TextDocumentItem | types.TextDocumentIdentifier: ...
-
-
-def _of_document(take: Callable[[str], None]) -> Callable[[_Notice], None]:
-    """Return a handler that passes on the document that a notification is about."""
-    return lambda params: take(params.text_document.uri)
 
 
 def _function(method: Callable[[P], R]) -> Callable[[P], R]:

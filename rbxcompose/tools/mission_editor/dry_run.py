@@ -1,21 +1,25 @@
 """A mission on the simulated robot and the stepped clock, as tests of missions run it: what came of it, and the story.
 
-Nothing of the robot that is up takes part: its bus, its devices and its mission are not touched.
+Nothing of the robot that is up takes part: its bus, its devices and its mission are not touched. A dry run can become a
+test of the mission: it must end in the same way, by the same steps.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from rbxcompose.base.expressions.values import is_named_pose
 from rbxcompose.base.findings import Severity, Span
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Refused
+from rbxcompose.commands.new_files import write_new
 from rbxcompose.compiler.compile import Compilation, robot_for_mission
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.missions.engine.inputs import bind_texts
@@ -29,7 +33,7 @@ from rbxcompose.tools.mission_editor.yaml_places import Path as TextPath
 from rbxcompose.tools.mission_tests.coverage import SeenWays
 from rbxcompose.tools.mission_tests.finding_files import tests_of
 from rbxcompose.tools.mission_tests.model import RUNS, Expectations, Trial
-from rbxcompose.tools.mission_tests.record import TrialRecord
+from rbxcompose.tools.mission_tests.record import Done, TrialRecord
 from rbxcompose.tools.mission_tests.runner import RobotRun
 
 LONGEST = 600.0  # [s] of robot time
@@ -39,6 +43,8 @@ TESTING = 80.0  # [s]
 SAMPLE = 0.25  # [s] of robot time between two poses
 MOST_CHANGES = 4000  # of statuses that are told
 SAMPLER = "dry run"
+MOST_STEPS = 20  # of a test
+TESTS = "missions/tests"
 TARGET_FRAME, ROBOT_FRAME = "map", "base_footprint"
 
 
@@ -183,3 +189,36 @@ def _text(file: Path) -> str:
         return file.read_text(encoding="utf-8", errors="replace")
     except OSError:
         return ""
+
+
+def make_test(project: Path, robot: Path, mission: str, record: TrialRecord) -> Path:
+    """Write a test of a mission into a project, and return its file.
+
+    Raises:
+        Refused: if the run has not come to an end, or there is such a file.
+    """
+    if record.outcome == RUNS or record.trouble:
+        raise Refused("a test needs a run that has ended: the mission runs on")
+    path = project / f"{TESTS}/{mission}.test.yaml"
+    if not robot.is_relative_to(project):
+        raise Refused("the robot belongs to the library: make one of your own with 'rbxcompose new robot NAME'")
+    text = "\n".join(_lines_of_test(Path(os.path.relpath(robot, path.parent)).as_posix(), mission, record))
+    if (finding := write_new(project, {f"{TESTS}/{mission}.test.yaml": f"{text}\n"})) is not None:
+        raise Refused(finding.message)
+    return path
+
+
+def _lines_of_test(robot: str, mission: str, record: TrialRecord) -> Iterator[str]:
+    yield from ("rbx: 1", "kind: Test", f"name: {mission}", "about: As in a dry run.")
+    yield from (f"robot: {robot}", f"mission: {mission}", "expect:", f"  outcome: {record.outcome}")
+    steps = [step for step in record.steps if step.ended != RUNS]
+    if steps:
+        yield "  steps:"
+        for step in steps[:MOST_STEPS]:
+            yield from (f"    - {step.name}:{_argument(step)}", f"      ended: {step.ended}")
+
+
+def _argument(step: Done) -> str:
+    """Return the place to which a step went; other arguments may differ from run to run."""
+    values = [*step.arguments.values()]
+    return f" {values[0].name}" if len(values) == 1 and is_named_pose(values[0]) and values[0].name else ""

@@ -17,16 +17,17 @@ from rbxcompose.base.findings import Finding, Severity, Span
 from rbxcompose.base.fixes import places
 from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.base.requests import Refused
-from rbxcompose.compiler.compile import Compilation, look_at_mission
+from rbxcompose.compiler.compile import Compilation, look_at_mission, with_text_of_mission
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import project_of, shown_name
-from rbxcompose.tools.mission_editor.form import form
+from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.view.picture import Drawn, picture_of
+from rbxcompose.tools.mission_editor.form import form, palette
 from rbxcompose.tools.mission_editor.new_mission import make_mission, templates
-from rbxcompose.tools.mission_editor.outline import MissionOutline, told
-from rbxcompose.tools.mission_editor.palette import palette
+from rbxcompose.tools.mission_editor.outline import INTERRUPTS, Block, MissionOutline, told
 from rbxcompose.tools.mission_editor.patch import path_of
 from rbxcompose.tools.mission_editor.patches import change
-from rbxcompose.tools.mission_editor.utf16 import Utf16
+from rbxcompose.tools.mission_editor.yaml_places import Utf16
 from rbxcompose.tools.project_texts import ProjectTexts, ReadText, hash_of, words_of
 
 MOST_FINDINGS = 200
@@ -115,16 +116,13 @@ class MissionEditor:
 
     def _aloud(self, request: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Return what a text says, in sentences."""
-        from rbxcompose.tools.mission_editor.sentences import read_aloud
-
         path = self._path(request["mission"])
         with paused_collection():
             return read_aloud(self._known, request["mission"], path, request["text"])
 
     def _test_new(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Write a test of a mission as it is on disk, from a dry run."""
-        from rbxcompose.tools.mission_editor.dry_run import tried
-        from rbxcompose.tools.mission_editor.new_test import make_test
+        from rbxcompose.tools.mission_editor.dry_run import make_test, tried
 
         mission = request["mission"]
         self._path(mission)
@@ -207,7 +205,7 @@ class MissionEditor:
 
     def _finding(self, finding: Finding, units: Utf16) -> dict[str, Any]:
         span = finding.span or Span("", 1, 1, 1, 1)
-        start, end = units.place(span.line, span.column), units.place(span.end_line, span.end_column)
+        start, end = units.offset(span.line, span.column), units.offset(span.end_line, span.end_column)
         return {**words_of(finding), "from": start, "to": max(start, end), "line": span.line, "fix": None}
 
 
@@ -228,3 +226,42 @@ REQUESTS: Mapping[str, Callable[[MissionEditor, Mapping[str, Any]], Any]] = Mapp
         "try": MissionEditor._try,
     }
 )
+
+
+def read_aloud(robot: Robot, mission: str, path: Path, text: str) -> list[dict[str, Any]]:
+    """Return the sentences of a text as `mission show` has them: `place`, what it says, and the `path` of its block.
+
+    That is None for what another mission says.
+
+    Raises:
+        Refused: if the text has mistakes.
+    """
+    changed, report, _ = with_text_of_mission(robot, mission, os.environ, {path: text})
+    errors = [one for one in report if one.severity is Severity.ERROR]
+    if changed is None or errors:
+        raise Refused(f"it cannot be read aloud yet: {errors[0].message}" if errors else "it cannot be read aloud yet")
+    program, names = changed.missions[mission].program, changed.names
+    picture, linked = picture_of(program, names), link(program, names.missions)
+    outline, file = MissionOutline(text), shown_name(path)
+
+    def written(drawn: Drawn) -> Block | None:
+        if drawn.number is None:
+            return outline.at((INTERRUPTS, drawn.name))
+        span = linked.nodes[drawn.number].span
+        return outline.written_at(span.line, span.column) if span.file == file else None
+
+    def block_of(drawn: Drawn) -> Block | None:
+        block = written(drawn)
+        if block is None or not drawn.children or written(drawn.children[0]) is not block:
+            return block
+        return outline.at(block.path[:-1])  # a list begins where its first step does
+
+    return [
+        {
+            "place": drawn.place,
+            "text": f"{drawn.sentence}{':' if drawn.children else ''}",
+            "path": list(block.path) if (block := block_of(drawn)) is not None else None,
+        }
+        for root in picture.roots
+        for drawn in root.all()
+    ]

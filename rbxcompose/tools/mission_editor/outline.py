@@ -324,16 +324,7 @@ def told(outline: MissionOutline, at: Callable[[int], int]) -> dict[str, Any]:
 
 
 def _slot(slot: Slot) -> dict[str, Any]:
-    return {
-        "path": list(slot.path),
-        "holds": slot.holds,
-        "of": slot.of,
-        "part": slot.part,
-        "is_there": slot.is_there,
-        "has_names": slot.has_names,
-        "start": slot.start,
-        "is_optional": slot.is_optional,
-    }
+    return {name: getattr(slot, name) for name in Slot.__slots__} | {"path": list(slot.path)}
 
 
 def _block(block: Block, at: Callable[[int], int]) -> dict[str, Any]:

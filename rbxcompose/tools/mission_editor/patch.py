@@ -4,42 +4,27 @@ from __future__ import annotations
 
 import json
 from copy import deepcopy
-from itertools import pairwise
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import Refused
-from rbxcompose.tools.mission_editor.outline import INTERRUPTS, MissionOutline, Slot
-from rbxcompose.tools.mission_editor.yaml_places import Path, PlacedNode, PlainTree, placed
+from rbxcompose.tools.mission_editor.outline import INTERRUPTS, MissionOutline
+from rbxcompose.tools.mission_editor.yaml_places import (
+    BLOCK_MARK,
+    INDENT,
+    SCALAR_MARK,
+    Path,
+    PlacedNode,
+    PlainTree,
+    TextPatch,
+    YamlPatch,
+    placed,
+    put_into,
+    take_out,
+    tree_at,
+)
 
-INDENT = 2
 BY_HAND = "change it in the text"
-_PLAIN = PlacedNode("scalar", 0, 0, "", (None, None, "")).plain()
-SCALAR_MARK = _PLAIN[2]  # the mark of a scalar without quotes
-BLOCK_MARK = (None, None)  # of a list or a map
-
-
-@dataclass(frozen=True, slots=True)
-class TextEdit:
-    """Replaces what is between two offsets of a text."""
-
-    start: int
-    end: int
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class TextPatch:
-    """Edits that do not overlap, in the order of the text, and the path of what is chosen afterwards."""
-
-    edits: tuple[TextEdit, ...]
-    chosen: Path
-
-    def applied(self, text: str) -> str:
-        """Return a text with the edits."""
-        for edit in reversed(self.edits):
-            text = f"{text[: edit.start]}{edit.text}{text[edit.end :]}"
-        return text
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,15 +44,15 @@ class Written:
         return f"{' ' if self.head else ''}{self.head}" + (f"\n{self.below(column + INDENT)}" if self.lines else "")
 
 
-class Patch:
-    """Collects the edits of one operation, and what the tree is to be afterwards."""
+class Patch(YamlPatch):
+    """Makes one change of a mission's outline."""
+
+    BY_HAND = BY_HAND
+    OVERLAP = "what is moved and where it goes overlap"
 
     def __init__(self, outline: MissionOutline, root: PlacedNode) -> None:
+        super().__init__(outline.lines, root)
         self.outline = outline
-        self.lines = outline.lines
-        self.edits: list[TextEdit] = []
-        self.root = root
-        self.tree: PlainTree = root.plain()
 
     def node(self, path: Path) -> PlacedNode:
         """Return the node at a path.
@@ -100,33 +85,11 @@ class Patch:
 
     def takes_names(self, path: Path) -> bool:
         """Return whether what is in a slot has names, as it is written."""
-        return any(slot.path == path and slot.has_names for slot in self.slots())
-
-    def slots(self) -> list[Slot]:
-        """Return all places for blocks."""
-        return self.outline.all_slots()
-
-    def length(self, path: Path) -> int:
-        """Return how many steps are in a slot."""
-        node = self.node(path)
-        return len(node.items) if node.form == "list" else 1
+        return any(slot.path == path and slot.has_names for slot in self.outline.all_slots())
 
     def text_of(self, first: int, last: int) -> str:
         """Return lines of the text."""
         return "\n".join(self.lines.lines[first:last])
-
-    def cut(self, first: int, last: int) -> None:
-        """Take lines away."""
-        start, end = self.lines.starts[first], self.lines.place(last)
-        if last >= self.lines.count and self.lines.is_open and start > 0:
-            start -= 1  # with the end of the line before
-        self.edits.append(TextEdit(start, end, ""))
-
-    def paste(self, line: int, block: str) -> None:
-        """Write lines before another one."""
-        at = self.lines.place(line)
-        is_behind = line >= self.lines.count and self.lines.is_open
-        self.edits.append(TextEdit(at, at, f"\n{block}" if is_behind else f"{block}\n"))
 
     def place(self, path: Path, to: Path, index: int) -> TextPatch:
         """Move a block into a slot."""
@@ -141,7 +104,7 @@ class Patch:
         above = self.node(path[:-1])
         if len(above.items) == 1:
             raise Refused("this is the only one here: what is around it would be empty")
-        if not any(slot.path == to and slot.of == "step" for slot in self.slots()):
+        if not any(slot.path == to and slot.of == "step" for slot in self.outline.all_slots()):
             raise Refused("no step can be there")
         if self.root.at(to) is None:
             raise Refused(f"nothing is there yet: add '{to[-1]}' first")
@@ -213,10 +176,10 @@ class Patch:
     def wrap(self, node: PlacedNode) -> int:
         """Make the only step of a slot the first item of a list; return the column of its dash."""
         column, first = self.lines.column(node.start), self.lines.of(node.start)
-        self.edits.append(TextEdit(node.start, node.start, "- "))
+        self.replace(node.start, node.start, "- ")
         for line in range(first + 1, self.lines.of(max(node.end - 1, node.start)) + 1):
             if self.lines.lines[line].strip():
-                self.edits.append(TextEdit(self.lines.starts[line], self.lines.starts[line], " " * INDENT))
+                self.replace(self.lines.starts[line], self.lines.starts[line], " " * INDENT)
         return column
 
     def wrap_word(self, node: PlacedNode, path: Path) -> int:
@@ -225,7 +188,7 @@ class Patch:
         if key is None or "\n" in self.lines.text[key.start : node.end] or node.start == node.end:
             raise Refused(f"it cannot become a list: {BY_HAND}")
         column = self.lines.column(key.start) + INDENT
-        self.edits.append(TextEdit(key.end + 1, node.start, f"\n{' ' * column}- "))
+        self.replace(key.end + 1, node.start, f"\n{' ' * column}- ")
         return column
 
     def insert_entry(self, path: Path, index: int, name: str, snippet: str, plain: PlainTree) -> TextPatch:
@@ -268,7 +231,7 @@ class Patch:
             if not node.pairs:
                 raise Refused(f"the map is empty: {BY_HAND}")
             end = max(node.pairs[-1][1].end, node.pairs[-1][0].end + 1)
-            self.edits.append(TextEdit(end, end, f", {key}: {made.head}"))
+            self.replace(end, end, f", {key}: {made.head}")
             tree_at(self.tree, path)[1].append(pair)
             return self.done(chosen)
         if node.form == "map":
@@ -288,7 +251,7 @@ class Patch:
             raise Refused(f"this step has no keys: {BY_HAND}")
         if not lines.text[lines.starts[lines.of(node.start)] : node.start].strip(" -") == "":
             raise Refused(f"this step is written behind its key: {BY_HAND}")
-        self.edits.append(TextEdit(node.end, node.end, ":"))
+        self.replace(node.end, node.end, ":")
         column = lines.column(node.start)
         self.paste(lines.of(node.start) + 1, f"{' ' * column}{key}:{made.behind(column)}")
         step = ["map", [[("scalar", node.text, node.mark), ("scalar", "", SCALAR_MARK)], pair], BLOCK_MARK]
@@ -307,60 +270,20 @@ class Patch:
             if old.form != "scalar" or "\n" in self.lines.text[old.start : old.end]:
                 raise Refused(f"'{key}' is the word of the step: {BY_HAND}")
             start = node.pairs[0][0].end + 1
-            self.edits.append(TextEdit(start, old.end, ""))
+            self.replace(start, old.end, "")
             put_into(tree_at(self.tree, path), key, ("scalar", "", SCALAR_MARK))
             return self.done(chosen)
         if node.is_flow:
             if at == 0:
-                self.edits.append(TextEdit(node.pairs[0][0].start, node.pairs[1][0].start, ""))
+                self.replace(node.pairs[0][0].start, node.pairs[1][0].start, "")
             else:
                 before = node.pairs[at - 1]
-                self.edits.append(TextEdit(max(before[1].end, before[0].end + 1), old.end, ""))
+                self.replace(max(before[1].end, before[0].end + 1), old.end, "")
         else:
             first, last, _ = self.region((*path, key))
             self.cut(first, last)
         take_out(tree_at(self.tree, path), key)
         return self.done(chosen)
-
-    def done(self, chosen: Path) -> TextPatch:
-        """Return the change, if it does what was meant and nothing else."""
-        edits = sorted(self.edits, key=lambda edit: (edit.start, edit.end))
-        if any(other.start < one.end for one, other in pairwise(edits)):
-            raise Refused(f"what is moved and where it goes overlap: {BY_HAND}")
-        made = TextPatch(tuple(edits), chosen)
-        root = placed(made.applied(self.lines.text))
-        if root is None or root.plain() != self.tree:
-            raise Refused(f"this cannot be done without changing something else: {BY_HAND}")
-        return made
-
-
-# Trees without places
-
-
-def tree_at(tree: PlainTree, path: Path) -> PlainTree:
-    """Return what is at a path of a tree."""
-    for key in path:
-        tree = tree[1][key] if isinstance(key, int) else next(value for name, value in tree[1] if name[1] == key)
-    return tree
-
-
-def put_into(tree: PlainTree, key: str | int, value: PlainTree) -> None:
-    """Replace a value of a list or a map."""
-    if isinstance(key, int):
-        tree[1][key] = value
-    else:
-        next(pair for pair in tree[1] if pair[0][1] == key)[1] = value
-
-
-def take_out(tree: PlainTree, key: str | int) -> None:
-    """Take a value out of a list or a map."""
-    if isinstance(key, int):
-        del tree[1][key]
-    else:
-        tree[1].remove(next(pair for pair in tree[1] if pair[0][1] == key))
-
-
-# Texts
 
 
 def path_of(given: Any) -> Path:

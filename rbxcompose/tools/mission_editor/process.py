@@ -26,8 +26,7 @@ from rbxcompose.compiler.systems.model import System
 from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.tools.mission_editor.editor import Compile, MissionEditor
-from rbxcompose.tools.robot_editor.editor import PREFIX, RobotEditor
-from rbxcompose.tools.robot_editor.live_robot import LIVE_REQUESTS, LiveRobot
+from rbxcompose.tools.robot_editor.editor import LIVE_REQUESTS, PREFIX, LiveRobot, RobotEditor
 
 _NAMED = re.compile(r"\benv\.(\w+)")
 _OF_PROGRAMS = re.compile(

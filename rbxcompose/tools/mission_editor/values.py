@@ -8,22 +8,19 @@ from typing import Any
 
 from rbxcompose.base.requests import Refused
 from rbxcompose.manifest.yaml_nodes import compose
-from rbxcompose.tools.mission_editor.patch import (
+from rbxcompose.tools.mission_editor.patch import BY_HAND, Patch, Written, path_of, scalar_text, shifted
+from rbxcompose.tools.mission_editor.yaml_places import (
     BLOCK_MARK,
-    BY_HAND,
     INDENT,
     SCALAR_MARK,
-    Patch,
-    TextEdit,
+    Path,
+    PlacedNode,
+    TextLines,
     TextPatch,
-    Written,
-    path_of,
+    placed,
     put_into,
-    scalar_text,
-    shifted,
     tree_at,
 )
-from rbxcompose.tools.mission_editor.yaml_places import Path, PlacedNode, TextLines, placed
 
 LINE, LINES, TEXT, FIXED = "line", "lines", "text", "fixed"
 """How a value is edited: in a line of YAML, in several, as a text of several lines, or not in a form."""
@@ -84,7 +81,7 @@ def set_value(patch: Patch, operation: Mapping[str, Any]) -> TextPatch:
 def _after_word(patch: Patch, path: Path, step: PlacedNode, made: Written) -> TextPatch:
     """Give a step that is only a word its value."""
     column = patch.lines.column(step.start)
-    patch.edits.append(TextEdit(step.end, step.end, f": {made.head}" if made.head else ":"))
+    patch.replace(step.end, step.end, f": {made.head}" if made.head else ":")
     if made.lines:
         patch.paste(patch.lines.of(step.start) + 1, made.below(column + INDENT))
     entry = [("scalar", step.text, step.mark), made.plain]
@@ -109,15 +106,15 @@ def _replace(patch: Patch, node: PlacedNode, key: PlacedNode, old: PlacedNode, m
         if any(map(lines.is_comment, range(first, last))):
             raise Refused(f"'{key.text}' has comments in it: {BY_HAND}")
         patch.cut(first, last)
-        patch.edits.append(TextEdit(colon, colon, f" {made.head}"))
+        patch.replace(colon, colon, f" {made.head}")
         if made.lines:
             patch.paste(first, made.below(column + INDENT))
         return
     gap = " " if old.start == old.end and text[old.start - 1 : old.start] == ":" else ""
     if not made.lines:
-        patch.edits.append(TextEdit(old.start, old.end, f"{gap}{made.head}"))
+        patch.replace(old.start, old.end, f"{gap}{made.head}")
         return
-    patch.edits.append(TextEdit(old.start if made.head else colon, old.end, f"{gap}{made.head}" if made.head else ""))
+    patch.replace(old.start if made.head else colon, old.end, f"{gap}{made.head}" if made.head else "")
     below = lines.of(max(old.end - 1, old.start)) + 1
     patch.paste(below, made.below(column + INDENT))
 

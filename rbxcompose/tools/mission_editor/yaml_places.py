@@ -1,20 +1,29 @@
-"""YAML text as nodes that know exactly where they are written, so that parts of the text can be moved as they are."""
+"""YAML text as nodes that know exactly where they are written, and changes of it.
+
+Parts of the text can be moved as they are: every byte that does not belong to a change stays. What comes of a change is
+parsed again, and refused if it is not exactly the tree that was meant.
+"""
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import field
+from itertools import pairwise
 from typing import Any
 
 import yaml
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.requests import Refused
 from rbxcompose.manifest.yaml_nodes import compose
 
 Path = tuple[str | int, ...]
 PlainTree = Any
 """A tree without places, in lists that can be changed: `["list", [...]]`, `["map", [[key, value], ...]]`, scalars."""
+INDENT = 2
+SCALAR_MARK = (None, None, "")  # the mark of a scalar without quotes
+BLOCK_MARK = (None, None)  # of a list or a map
 
 
 @dataclass(slots=True)
@@ -161,3 +170,118 @@ class TextLines:
     def place(self, line: int) -> int:
         """Return the offset of a line, or of the end of the text."""
         return self.starts[line] if line < self.count else len(self.text)
+
+
+class Utf16(TextLines):
+    """Places of a text in the units of a browser, which counts what is beyond 16 bits as two."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._wide = [index for index, one in enumerate(text) if one > "\uffff"] if not text.isascii() else []
+
+    def at(self, offset: int) -> int:
+        """Return an offset as a browser counts it."""
+        return offset + bisect_left(self._wide, offset)
+
+    def offset(self, line: int, column: int) -> int:
+        """Return the offset, for a browser, of a line and a column that count from 1."""
+        line = min(max(line, 1), len(self.lines))
+        return self.at(min(self.starts[line - 1] + column - 1, self.starts[line] - 1, len(self.text)))
+
+
+@dataclass(frozen=True, slots=True)
+class TextEdit:
+    """Replaces what is between two offsets of a text."""
+
+    start: int
+    end: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class TextPatch:
+    """Edits that do not overlap, in the order of the text, and the path of what is chosen afterwards."""
+
+    edits: tuple[TextEdit, ...]
+    chosen: Path
+
+    def applied(self, text: str) -> str:
+        """Return a text with the edits."""
+        for edit in reversed(self.edits):
+            text = f"{text[: edit.start]}{edit.text}{text[edit.end :]}"
+        return text
+
+
+class YamlPatch:
+    """Collects the edits of one change of a text, and what its tree is to be afterwards.
+
+    `BY_HAND` is what people can do if that is impossible, `OVERLAP` what it means that two edits meet.
+    """
+
+    BY_HAND = ""
+    OVERLAP = ELSE = "this cannot be done without changing something else"
+
+    def __init__(self, lines: TextLines, root: PlacedNode) -> None:
+        self.lines, self.root = lines, root
+        self.tree: PlainTree = root.plain()
+        self.edits: list[TextEdit] = []
+
+    def replace(self, start: int, end: int, text: str) -> None:
+        """Write a text in place of what is between two offsets."""
+        self.edits.append(TextEdit(start, end, text))
+
+    def cut(self, first: int, last: int) -> None:
+        """Take lines away."""
+        start, end = self.lines.starts[first], self.lines.place(last)
+        if last >= self.lines.count and self.lines.is_open and start > 0:
+            start -= 1  # with the end of the line before
+        self.replace(start, end, "")
+
+    def paste(self, line: int, block: str) -> None:
+        """Write lines before another one."""
+        at = self.lines.place(line)
+        is_behind = line >= self.lines.count and self.lines.is_open
+        self.replace(at, at, f"\n{block}" if is_behind else f"{block}\n")
+
+    def done(self, chosen: Path = ()) -> TextPatch:
+        """Return the change, if it does what was meant and nothing else.
+
+        Raises:
+            Refused: if it does not.
+        """
+        edits = sorted(self.edits, key=lambda edit: (edit.start, edit.end))
+        if any(other.start < one.end for one, other in pairwise(edits)):
+            raise Refused(f"{self.OVERLAP}: {self.BY_HAND}")
+        made = TextPatch(tuple(edits), chosen)
+        root = placed(made.applied(self.lines.text))
+        if root is None or root.plain() != self.tree:
+            raise Refused(f"{self.ELSE}: {self.BY_HAND}")
+        return made
+
+
+def tree_at(tree: PlainTree, path: Path) -> PlainTree:
+    """Return what is at a path of a tree."""
+    for key in path:
+        tree = tree[1][key] if isinstance(key, int) else pair_in(tree, key)[1]
+    return tree
+
+
+def pair_in(tree: PlainTree, key: str | int) -> PlainTree:
+    """Return the key and the value of an entry of a map, which can be replaced there."""
+    return next(pair for pair in tree[1] if pair[0][1] == key)
+
+
+def put_into(tree: PlainTree, key: str | int, value: PlainTree) -> None:
+    """Replace a value of a list or a map."""
+    if isinstance(key, int):
+        tree[1][key] = value
+    else:
+        pair_in(tree, key)[1] = value
+
+
+def take_out(tree: PlainTree, key: str | int) -> None:
+    """Take a value out of a list or a map."""
+    if isinstance(key, int):
+        del tree[1][key]
+    else:
+        tree[1].remove(pair_in(tree, key))

@@ -32,6 +32,7 @@ from rbxcompose.manifest.tree import (
     SequenceNode,
     TreeNode,
     at,
+    entries_of,
     key_span,
     value_span,
 )
@@ -82,14 +83,31 @@ class TrialContext:
     facts: MissionFacts
     report: Report
 
+    def knows(self, place: Span, name: str, known: Iterable[str], message: str, what: str) -> bool:
+        """Return whether a name is a known one; if not, report the `message`, with the nearest of `what` there are."""
+        if name in known:
+            return True
+        self.report.add(codes.UNKNOWN.misspelt(place, message, name, known, what))
+        return False
+
+    def knows_step(self, key: ScalarNode) -> bool:
+        """Return whether the mission has a step of this name, and report it if it has none."""
+        message = f"the mission '{self.program.name}' has no step '{key.text}'"
+        return self.knows(key.span, key.text, self.facts.steps, message, "its steps")
+
+    def value(self, node: TreeNode, wanted: Type, what: str) -> Value:
+        """Return an expected value, and report what is wrong with it."""
+        value, findings = read_value(node, wanted, self.names, what)
+        self.report.extend(findings)
+        return value
+
     def settings(self, node: TreeNode | None, known: Mapping[str, Type]) -> dict[str, ValueSetting]:
         """Return the settings by name; besides the robot's values, expressions see what is `known`."""
         found: dict[str, ValueSetting] = {}
         valid = names_of(self.names)
         for name, entry in entries_of(node):
-            if name not in valid:
-                message = f"the robot has no value '{name}'"
-                self.report.add(codes.UNKNOWN.misspelt(entry.key.span, message, name, valid, "values of this robot"))
+            message = f"the robot has no value '{name}'"
+            if not self.knows(entry.key.span, name, valid, message, "values of this robot"):
                 continue
             inputs = {key: input_.type for key, input_ in self.program.inputs.items()}
             findings = list(check_setting(entry.value, valid[name], self.program, self.names, {**inputs, **known}))
@@ -105,33 +123,21 @@ class TrialContext:
         return UNKNOWN if name in self.program.saved else None
 
 
-def entries_of(node: TreeNode | None) -> Iterator[tuple[str, Entry]]:
-    """Yield the entries of a map; nothing for any other node, which has its finding already."""
-    if isinstance(node, MappingNode):
-        yield from node.entries.items()
-
-
 def contradictions(expect: Expectations) -> Iterator[Finding]:
     """Yield what contradicts something else that is expected."""
     for count in expect.count:
-        other = next(
-            (
-                expected_step
-                for expected_step in expect.never
-                if _bars_all(expected_step) and expected_step.name == count.name and count.value
-            ),
-            None,
-        )
+        barred = (step for step in expect.never if _bars_all(step) and step.name == count.name and count.value)
+        other = next(barred, None)
         if other is not None:
             message = f"'{count.name}' can begin never, or as often as 'count' says, but not both"
             related = [Related(count.span, "it is to begin here")]
             yield codes.NEVER.at(other.span, message, help=_REMOVE, related=related)
     for step in expect.steps:
-        barred = next((expected_step for expected_step in expect.never if _bars(expected_step, step)), None)
-        if barred is not None:
-            message = f"'{barred.text}' must never be, but it is one of the expected 'steps'"
+        other = next((never for never in expect.never if _bars(never, step)), None)
+        if other is not None:
+            message = f"'{other.text}' must never be, but it is one of the expected 'steps'"
             related = [Related(step.span, "it is expected here")]
-            yield codes.NEVER.at(barred.span, message, help=_REMOVE, related=related)
+            yield codes.NEVER.at(other.span, message, help=_REMOVE, related=related)
     yield from _too_many(expect)
     yield from _turned_round(expect)
 
@@ -184,16 +190,18 @@ def read_mocks(context: TrialContext, node: TreeNode | None, models: Mapping[str
 
 
 def _mock(context: TrialContext, name: str, entry: Entry, model: trials.MockModel) -> Mock:
-    report, names, value = context.report, context.names, entry.value
-    if name not in names.skills and name not in names.services:
-        message, valid = f"the robot has no skill or service '{name}'", {**names.skills, **names.services}
-        report.add(codes.UNKNOWN.misspelt(entry.key.span, message, name, valid, "skills of this robot"))
-    elif name not in context.facts.skills and name not in context.facts.services:
+    names, value = context.names, entry.value
+    message, there = f"the robot has no skill or service '{name}'", {**names.skills, **names.services}
+    is_there = context.knows(entry.key.span, name, there, message, "skills of this robot")
+    if is_there and name not in context.facts.skills and name not in context.facts.services:
         message = f"the mission '{context.program.name}' does not use '{name}'"
-        report.add(codes.UNUSED_MOCK.at(entry.key.span, message))
+        context.report.add(codes.UNUSED_MOCK.at(entry.key.span, message))
     skill = names.skills.get(name, Skill(name))
     outcomes = {SUCCEEDS: SUCCEEDS, FAILS: FAILS, **skill.outcomes}
-    report.extend(_outcomes(value, model, outcomes))
+    written: dict[KeyPath, str] = {("result",): model.result}
+    written |= {("outcome_at", call): outcome for call, outcome in model.outcome_at.items()}
+    for path, outcome in written.items():
+        context.knows(value_span(value, path), outcome, outcomes, f"there is no outcome '{outcome}'", "outcomes")
     return Mock(
         name,
         entry.key.span,
@@ -209,16 +217,6 @@ def _mock(context: TrialContext, name: str, entry: Entry, model: trials.MockMode
     )
 
 
-def _outcomes(value: TreeNode, model: trials.MockModel, outcomes: Mapping[str, str]) -> Iterator[Finding]:
-    """Yield the findings on the outcomes."""
-    written: dict[KeyPath, str] = {("result",): model.result}
-    written |= {("outcome_at", call): outcome for call, outcome in model.outcome_at.items()}
-    for path, outcome in written.items():
-        if outcome not in outcomes:
-            message = f"there is no outcome '{outcome}'"
-            yield codes.UNKNOWN.misspelt(value_span(value, path), message, outcome, outcomes, "outcomes")
-
-
 def _values(context: TrialContext, skill: Skill, node: TreeNode | None) -> list[Value]:
     """Return the values of the main argument for which calls fail."""
     if not isinstance(node, SequenceNode):
@@ -227,21 +225,15 @@ def _values(context: TrialContext, skill: Skill, node: TreeNode | None) -> list[
         what = "single value" if skill.arguments else "argument"
         context.report.add(codes.NEVER.at(node.span, f"'{skill.name}' takes no {what}"))
         return []
-    found: list[Value] = []
-    for item in node.items:
-        wanted = skill.arguments.get(skill.main, UNKNOWN)
-        value, findings = read_value(item, wanted, context.names, f"the argument '{skill.main}'")
-        context.report.extend(findings)
-        found.append(value)
-    return found
+    wanted = skill.arguments.get(skill.main, UNKNOWN)
+    return [context.value(item, wanted, f"the argument '{skill.main}'") for item in node.items]
 
 
 def read_fault(context: TrialContext, node: TreeNode, model: trials.InjectedModel) -> EventDeed | None:
     """Return the fault as a request to the driver of a bus, None after a finding."""
     driven, report = buses_of_joints(context.robot.manifest.contents), context.report
     words, span = (*FAULTS, UNPLUG), value_span(node, (FAULT, FAULT))
-    if model.fault not in words:
-        report.add(codes.UNKNOWN.misspelt(span, f"no fault is called '{model.fault}'", model.fault, words, "faults"))
+    if not context.knows(span, model.fault, words, f"no fault is called '{model.fault}'", "faults"):
         return None
     if (model.joint is None) == (model.bus is None):
         report.add(codes.NEVER.at(key_span(node, (FAULT,)), "a fault is of one joint, or of one bus"))
@@ -249,14 +241,16 @@ def read_fault(context: TrialContext, node: TreeNode, model: trials.InjectedMode
     if model.joint is not None and model.fault == UNPLUG:
         report.add(codes.NEVER.at(span, f"'{model.joint}' cannot be unplugged", help="give 'bus' instead of 'joint'"))
         return None
-    known, name, key = (driven, model.joint, "joint") if model.bus is None else (set(driven.values()), model.bus, "bus")
-    if name is None or name not in known:
-        message = f"no servo drives '{name}'" if key == "joint" else f"no joint is driven by the bus '{name}'"
-        what = "joints with a servo" if key == "joint" else "buses of this robot"
-        report.add(codes.UNKNOWN.misspelt(value_span(node, (FAULT, key)), message, name or "", known, what))
+    joint, bus = model.joint or "", model.bus or ""
+    if model.bus is None:
+        place, message = value_span(node, (FAULT, "joint")), f"no servo drives '{joint}'"
+        is_known = context.knows(place, joint, driven, message, "joints with a servo")
+    else:
+        place, message = value_span(node, (FAULT, "bus")), f"no joint is driven by the bus '{bus}'"
+        is_known = context.knows(place, bus, set(driven.values()), message, "buses of this robot")
+    if not is_known:
         return None
-    request = InjectFault(model.fault, model.joint or "", model.for_)
-    return EventDeed(FAULT, request=request, component=model.bus or driven[name])
+    return EventDeed(FAULT, request=InjectFault(model.fault, joint, model.for_), component=bus or driven[joint])
 
 
 def read_expect(context: TrialContext, node: TreeNode | None, model: trials.ExpectModel) -> Expectations:
@@ -282,14 +276,13 @@ def read_expect(context: TrialContext, node: TreeNode | None, model: trials.Expe
 
 
 def _check_outcome(context: TrialContext, root: TreeNode, model: trials.ExpectModel) -> None:
-    report, ends = context.report, {**context.facts.ends, RUNS: RUNS}
-    if model.outcome is not None and model.outcome not in ends:
+    if model.outcome is not None:
         message = f"the mission '{context.program.name}' has no outcome '{model.outcome}'"
-        span = value_span(root, ("outcome",))
-        report.add(codes.UNKNOWN.misspelt(span, message, model.outcome, ends, "its outcomes"))
+        ends = {**context.facts.ends, RUNS: RUNS}
+        context.knows(value_span(root, ("outcome",)), model.outcome, ends, message, "its outcomes")
     if model.outcome == RUNS and model.for_ is None:
         help_text = "write 'for: 60 s' beside it: how long the mission is watched"
-        report.add(codes.NEVER.at(key_span(root, ("outcome",)), "every test of a mission ends", help=help_text))
+        context.report.add(codes.NEVER.at(key_span(root, ("outcome",)), "every test of a mission ends", help=help_text))
 
 
 def _steps(context: TrialContext, node: TreeNode | None) -> list[ExpectedStep]:
@@ -307,18 +300,17 @@ def _step(context: TrialContext, node: TreeNode) -> ExpectedStep | None:
         message = "this is not a step" if not names else f"a step has one name, this has {len(names)}"
         context.report.add(codes.NO_STEP.at(node.span, message, help=STEP_HELP))
         return None
-    name, steps = names[0], context.facts.steps
+    name = names[0]
     entry = entries[name]
-    if name not in steps:
-        message = f"the mission '{context.program.name}' has no step '{name}'"
-        context.report.add(codes.UNKNOWN.misspelt(entry.key.span, message, name, steps, "its steps"))
+    if not context.knows_step(entry.key):
         return None
     when = validate(Time, entries["at"].value, ("at",), context.report) if "at" in entries else None
     arguments = _arguments(context, name, entry.value)
     text = name if isinstance(entry.value, ScalarNode) and not entry.value.text else f"{name} {brief(entry.value)}"
     if isinstance(entry.value, MappingNode):
         text = " ".join([name, *(f"{key} {brief(one.value)}" for key, one in entry.value.entries.items())])
-    return ExpectedStep(name, entry.key.span, arguments, _ended(context, name, entries), when, text, steps[name])
+    counts_as = context.facts.steps[name]
+    return ExpectedStep(name, entry.key.span, arguments, _ended(context, name, entries), when, text, counts_as)
 
 
 def _ended(context: TrialContext, name: str, entries: Mapping[str, Entry]) -> str:
@@ -327,9 +319,8 @@ def _ended(context: TrialContext, name: str, entries: Mapping[str, Entry]) -> st
         return ""
     word = node.text if isinstance(node, ScalarNode) else ""
     known = {**ENDS, RUNS: RUNS, **context.facts.steps[name]}
-    if word not in known:
-        message = f"'{name}' does not end with '{word}'" if word else "'ended' needs a word"
-        context.report.add(codes.UNKNOWN.misspelt(node.span, message, word, known, "how it may end"))
+    message = f"'{name}' does not end with '{word}'" if word else "'ended' needs a word"
+    context.knows(node.span, word, known, message, "how it may end")
     return word
 
 
@@ -341,29 +332,22 @@ def _arguments(context: TrialContext, name: str, node: TreeNode) -> dict[str, Va
     if skill is None:
         context.report.add(codes.NO_STEP.at(node.span, f"'{name}' is not a skill, so it has no arguments"))
         return {}
-    written = (
-        {key: entry.value for key, entry in entries_of(node)} if isinstance(node, MappingNode) else {skill.main: node}
-    )
+    is_map, nothing = isinstance(node, MappingNode), "single value" if skill.arguments else "argument"
+    written = {key: entry.value for key, entry in entries_of(node)} if is_map else {skill.main: node}
     found: dict[str, Value] = {}
     for key, value in written.items():
-        if key not in skill.arguments:
-            nothing = "single value" if skill.arguments else "argument"
-            message = f"the skill '{name}' has no argument '{key}'" if key else f"the skill '{name}' takes no {nothing}"
-            span = key_span(node, (key,))
-            context.report.add(codes.UNKNOWN.misspelt(span, message, key, skill.arguments, "its arguments"))
-            continue
-        found[key], findings = read_value(value, skill.arguments[key], context.names, f"the argument '{key}'")
-        context.report.extend(findings)
+        message = f"the skill '{name}' has no argument '{key}'" if key else f"the skill '{name}' takes no {nothing}"
+        if context.knows(key_span(node, (key,)), key, skill.arguments, message, "its arguments"):
+            found[key] = context.value(value, skill.arguments[key], f"the argument '{key}'")
     return found
 
 
 def _counts(context: TrialContext, node: TreeNode | None, counts: Mapping[str, int]) -> list[ExpectedValue]:
     found = []
     for name, entry in entries_of(node):
-        if name not in context.facts.steps:
-            message = f"the mission '{context.program.name}' has no step '{name}'"
-            context.report.add(codes.UNKNOWN.misspelt(entry.key.span, message, name, context.facts.steps, "its steps"))
-        elif counts.get(name, -1) < 0:
+        if not context.knows_step(entry.key):
+            continue
+        if counts.get(name, -1) < 0:
             context.report.add(codes.NEVER.at(entry.value.span, "a count cannot be below 0"))
         else:
             found.append(ExpectedValue(name, counts[name], entry.key.span))
@@ -378,8 +362,7 @@ def _data(context: TrialContext, node: TreeNode | None) -> list[ExpectedValue]:
             message, known = f"the mission '{context.program.name}' has no datum '{name}'", context.program.data
             context.report.add(codes.UNKNOWN.misspelt(entry.key.span, message, name, known, "its data"))
             continue
-        value, findings = read_value(entry.value, wanted or UNKNOWN, context.names, f"the datum '{name}'")
-        context.report.extend(findings)
+        value = context.value(entry.value, wanted, f"the datum '{name}'")
         found.append(ExpectedValue(name, value, entry.key.span))
     return found
 
@@ -387,18 +370,16 @@ def _data(context: TrialContext, node: TreeNode | None) -> list[ExpectedValue]:
 def _published(
     context: TrialContext, node: TreeNode | None, models: Sequence[trials.SentModel]
 ) -> list[ExpectedMessage]:
-    found = []
+    found, root = [], node or MappingNode()
+    known = {topic.strip("/"): topic for topic in context.facts.topics}
     for index, model in enumerate(models):
-        span: Span = value_span(node or MappingNode(), (index, "topic"))
-        known = {topic.strip("/"): topic for topic in context.facts.topics}
-        if model.topic.strip("/") not in known:
+        span: Span = value_span(root, (index, "topic"))
+        topic = known.get(model.topic.strip("/"))
+        if topic is None:
             message = f"the mission '{context.program.name}' does not publish on '{model.topic}'"
             context.report.add(codes.UNKNOWN.misspelt(span, message, model.topic, known, "its topics"))
             continue
-        topic = known[model.topic.strip("/")]
-        found.append(
-            ExpectedMessage(topic, _fields(context, topic, at(node or MappingNode(), (index, "message"))), span)
-        )
+        found.append(ExpectedMessage(topic, _fields(context, topic, at(root, (index, "message"))), span))
     return found
 
 
@@ -409,9 +390,9 @@ def _fields(context: TrialContext, topic: str, node: TreeNode | None) -> dict[st
     fields = registry.message(context.names.topics[topic]).FIELDS
     value = literal(node).value
     written = value if isinstance(value, dict) else {next(iter(fields)): value}
-    for name in written.keys() - fields.keys():
+    for name in written:
         message = f"the messages on '{topic}' have no field '{name}'"
-        context.report.add(codes.UNKNOWN.misspelt(key_span(node, (name,)), message, name, fields, "their fields"))
+        context.knows(key_span(node, (name,)), name, fields, message, "their fields")
     return written
 
 
@@ -582,23 +563,20 @@ class TrialReader:
         key = name, chosen.text if chosen is not None else ""
         if key not in self._robots:
             profiles = [chosen.text] if chosen is not None else []
-            self._robots[key] = compile_robot(
-                shown, profiles=profiles, environment=self.environment, unsaved=self.unsaved
-            )
-            self.report.extend(finding for finding in self._robots[key].report if not _is_of_profile(finding))
-            self.sources.update(self._robots[key].sources)
-        if (robot := self._robots[key].robot) is not None:
-            registry.choose(robot.manifest.messages)
-        if chosen is not None and (
-            lost := [finding for finding in self._robots[key].report if _is_of_profile(finding)]
-        ):
-            help_text = "remove it: the robot has no profiles"
-            report.extend(
-                replace(finding, span=chosen.span, help=finding.help or help_text, fix=None) for finding in lost
-            )
+            made = compile_robot(shown, profiles=profiles, environment=self.environment, unsaved=self.unsaved)
+            self._robots[key] = made
+            self.report.extend(finding for finding in made.report if not _is_of_profile(finding))
+            self.sources.update(made.sources)
+        made = self._robots[key]
+        if made.robot is not None:
+            registry.choose(made.robot.manifest.messages)
+        lost = [finding for finding in made.report if _is_of_profile(finding)]
+        if chosen is not None and lost:
+            none = "remove it: the robot has no profiles"
+            report.extend(replace(finding, span=chosen.span, help=finding.help or none, fix=None) for finding in lost)
             return None
         mission = root.get("mission")
-        found = robot_for_mission(self._robots[key], mission.text if isinstance(mission, ScalarNode) else "")
+        found = robot_for_mission(made, mission.text if isinstance(mission, ScalarNode) else "")
         if found is None:
             why = codes.NEVER.at(written.span, _no_robot(shown, "the test"), help="see the findings of the robot")
             self._kept_back[why] = shown
@@ -723,9 +701,8 @@ def _faults_without_servos(events: tuple[TrialEvent, ...]) -> Iterator[Finding]:
 def _is_complete(facts: MissionFacts, mocks: Mapping[str, Mock], events: tuple[TrialEvent, ...]) -> bool:
     """Return whether the mission needs only what the test provides, and nothing is sent over the bus."""
     deeds = [deed for event in events for deed in event.deeds]
-    values = {name for deed in deeds for name in deed.settings} | {
-        name for entry in mocks.values() for name in entry.sets
-    }
+    values = {name for deed in deeds for name in deed.settings}
+    values |= {name for mock in mocks.values() for name in mock.sets}
     is_answered = {*facts.skills, *facts.services} <= mocks.keys()
     return is_answered and facts.values <= values and not any(deed.word == PUBLISH for deed in deeds)
 

@@ -1,9 +1,9 @@
 """Runs a test in the way that it needs, alone or on the whole robot, and judges the result."""
 
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import Protocol
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.values import NOT_ARRIVED, EvaluationError, NotArrived, NotArrivedError, Value
@@ -15,11 +15,10 @@ from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.scopes import RobotValues
 from rbxcompose.missions.engine.value_text import show_briefly
-from rbxcompose.missions.engine.world import Observer, Settings, World
+from rbxcompose.missions.engine.world import Settings, World
 from rbxcompose.missions.execution.requests import CancelMission, PauseMission, ResumeMission
 from rbxcompose.missions.execution.world import RobotWorld
 from rbxcompose.missions.program.outcomes import IDLE, RUNNING, Result
-from rbxcompose.missions.program.program import RobotNames
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.sdk.registry import declared
@@ -104,150 +103,96 @@ class Mocked:
 
 
 class SetValues:
-    """The values that a test has set, over those of the robot."""
+    """The values that a test has set, over those of the robot; what it sets is a line of the record."""
 
-    def __init__(self, robot: RobotNames, inputs: Mapping[str, Value], below: RobotValues | None = None) -> None:
-        self._robot = robot
-        self._inputs = inputs
-        self.below = below  # the robot's own values, if it runs
+    def __init__(self, trial: Trial, record: TrialRecord, now: Callable[[], float]) -> None:
+        self._trial, self._record, self._now = trial, record, now
+        self.below: RobotValues | None = None  # the robot's own values, if it runs
         self._set: dict[str, Value] = {}
         self._times: dict[str, float] = {}
         self._counts: dict[str, int] = {}
 
-    def set(self, settings: Mapping[str, ValueSetting], known: Mapping[str, Value], now: float) -> dict[str, Value]:
-        """Compute all values, then set and return them; raise what the expressions raise."""
-        scope = TrialScope({**self._inputs, **known}, self._robot.places, Now(self, now))
-        computed = {name: setting(scope) for name, setting in settings.items()}
+    def set(self, settings: Mapping[str, ValueSetting], known: Mapping[str, Value]) -> None:
+        """Compute all values, then set them; an expression without a value ends the test."""
+        now, names = self._now(), self._trial.names
+        scope = TrialScope({**self._trial.inputs, **known}, names.places, self)
+        try:
+            computed = {name: setting(scope) for name, setting in settings.items()}
+        except (EvaluationError, NotArrivedError) as error:
+            self._record.trouble = f"the test cannot set its values at {now:g} s: {error}"
+            return
         for name, value in computed.items():
             self._counts[name] = self.count(name) + 1
             self._set[name], self._times[name] = value, now
-        return computed
+            self._record.note(f"{name} is {show_briefly(names.values.get(name), value)}")
 
-    def value(self, name: str) -> Value | NotArrived:
+    def value(self, name: str, /) -> Value | NotArrived:
         """Return the newest value."""
         if name in self._set:
             return self._set[name]
         return NOT_ARRIVED if self.below is None else self.below.value(name)
 
-    def age(self, name: str, now: float) -> float | NotArrived:
+    def age(self, name: str, /) -> float | NotArrived:
         """Return the age of a value [s]."""
         if name in self._times:
-            return now - self._times[name]
+            return self._now() - self._times[name]
         return NOT_ARRIVED if self.below is None else self.below.age(name)
 
-    def count(self, name: str) -> int:
+    def count(self, name: str, /) -> int:
         """Return how many values have arrived; those of the robot count only until the test sets the first one."""
         if name in self._counts:
             return self._counts[name]
         return 0 if self.below is None else self.below.count(name)
 
 
-class Now:
-    """The values as they are at a time [s]."""
-
-    def __init__(self, values: SetValues, now: float) -> None:
-        self._values = values
-        self._now = now
-
-    def value(self, name: str, /) -> Value | NotArrived:
-        """Return the newest value."""
-        return self._values.value(name)
-
-    def age(self, name: str, /) -> float | NotArrived:
-        """Return the age of a value [s]."""
-        return self._values.age(name, self._now)
-
-    def count(self, name: str, /) -> int:
-        """Return how many values have arrived."""
-        return self._values.count(name)
+WhenEnded = Callable[[int, Result], None]
 
 
-class Watcher(Observer, Protocol):
-    """An observer of the paths that a mission takes."""
+class TrialRun(ABC):
+    """What a test does while its mission runs: it answers calls, sets values, and records what happens."""
 
-    def receive(self, event: MissionEvent, /) -> None:
-        """Handle an event of the mission."""
-        ...
+    ended: WhenEnded
+    """Notifies the engine of the end of a call."""
 
-
-class Setter:
-    """Sets values for a test and reports them; an expression without a value ends the test."""
-
-    def __init__(self, trial: Trial, record: TrialRecord, values: SetValues) -> None:
-        self.trial = trial
-        self.record = record
-        self.values = values
-
-    def set(self, settings: Mapping[str, ValueSetting], known: Mapping[str, Value], now: float) -> set[str]:
-        """Set values; return their names."""
-        try:
-            computed = self.values.set(settings, known, now)
-        except (EvaluationError, NotArrivedError) as error:
-            self.record.trouble = f"the test cannot set its values at {now:g} s: {error}"
-            return set()
-        for name, value in computed.items():
-            self.record.note(f"{name} is {show_briefly(self.trial.names.values.get(name), value)}")
-        return set(computed)
-
-
-class TrialStage:
-    """The world of a mission that runs alone."""
-
-    def __init__(self, trial: Trial, watcher: Watcher) -> None:
-        self.trial = trial
-        self.watcher = watcher
-        self.now = 0.0
-        self.is_paused = False
+    def __init__(self, trial: Trial, seen: SeenWays) -> None:
+        self.trial, self.seen = trial, seen
         self.record = TrialRecord(trial.mission)
         self.mocked = Mocked(trial.mocks)
-        self.values = SetValues(trial.names, trial.inputs)
-        self.setter = Setter(trial, self.record, self.values)
+        self.values = SetValues(trial, self.record, lambda: self.now)
         self.events = list(trial.events)  # events still to come
-        self.engine = Engine(trial.program, trial.names, trial.inputs, self, Settings(observer=watcher))
 
-    # What the engine calls.
+    @property
+    @abstractmethod
+    def now(self) -> float:
+        """Return robot time [s]."""
 
-    def value(self, name: str, /) -> Value | NotArrived:
-        """Return the newest value."""
-        return self.values.value(name)
+    def end_calls(self) -> None:
+        """End the calls that are due."""
+        for call, result in self.mocked.ended(self.now):
+            self.record.now = self.now
+            if result.success:
+                self.values.set(call.mock.sets, call.arguments)
+            self.ended(call.leaf, result)
 
-    def age(self, name: str, /) -> float | NotArrived:
-        """Return the age of a value [s]."""
-        return self.values.age(name, self.now)
+    @abstractmethod
+    def await_calls(self) -> None:
+        """Have calls that have begun, or go on, end when they are due."""
 
-    def count(self, name: str, /) -> int:
-        """Return how often it was set."""
-        return self.values.count(name)
 
-    def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
-        """Begin a call."""
-        self.mocked.start(leaf, skill, arguments, self.now)
+class TrialStage(TrialRun):
+    """A mission that runs alone."""
 
-    def halt(self, leaf: int, /) -> None:
-        """Forget a call."""
-        self.mocked.halt(leaf)
+    now = 0.0
 
-    def pause(self, leaf: int, /) -> None:
-        """Hold a call."""
-        self.mocked.pause(leaf, self.now)
+    def __init__(self, trial: Trial, seen: SeenWays) -> None:
+        super().__init__(trial, seen)
+        self.is_paused = False
+        world = TrialWorld(self, None)
+        self.engine = Engine(trial.program, trial.names, trial.inputs, world, Settings(observer=seen))
+        self.ended = self.engine.ended
 
-    def resume(self, leaf: int, /) -> None:
-        """Let a call continue."""
-        self.mocked.resume(leaf, self.now)
-
-    def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
-        """Do nothing: there is no subscriber, only the event counts."""
-
-    def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
-        """Begin a call."""
-        self.start(leaf, service, fields)
-
-    def say(self, event: MissionEvent, /) -> None:
-        """Record an event."""
-        self.record.receive(event)
-        self.watcher.receive(event)
-
-    # The run.
+    def await_calls(self) -> None:
+        """Do nothing: each instant begins with the calls that end."""
 
     def run(self) -> TrialRecord:
         """Jump from instant to instant until the mission or the test has ended, and return what happened."""
@@ -293,10 +238,7 @@ class TrialStage:
 
     def _instant(self) -> None:
         """Do everything that is due: end calls, let the test act, tick the mission."""
-        for call, result in self.mocked.ended(self.now):
-            if result.success:
-                self.setter.set(call.mock.sets, call.arguments, self.now)
-            self.engine.ended(call.leaf, result)
+        self.end_calls()
         while self.events and self.events[0].at <= self.now + ROUNDING:
             for deed in self.events.pop(0).deeds:
                 self._do(deed)
@@ -306,7 +248,7 @@ class TrialStage:
     def _do(self, deed: EventDeed) -> None:
         match deed.word:
             case "set":
-                self.setter.set(deed.settings, {}, self.now)
+                self.values.set(deed.settings, {})
             case "stop" | "pause":
                 self.record.note(f"the test {'stops the robot' if deed.word == 'stop' else 'pauses the mission'}")
                 self.is_paused = True
@@ -319,21 +261,11 @@ class TrialStage:
                 self.record.note("the test releases the stop")
 
 
-WhenEnded = Callable[[int, Result], None]
-
-
-class RobotRun:
+class RobotRun(TrialRun):
     """A robot whose executive runs the mission in the world of the test."""
 
-    def __init__(self, trial: Trial, watcher: Watcher) -> None:
-        self.trial = trial
-        self.watcher = watcher
-        self.record = TrialRecord(trial.mission)
-        self.mocked = Mocked(trial.mocks)
-        self.values = SetValues(trial.names, trial.inputs)
-        self.setter = Setter(trial, self.record, self.values)
-        self.ended: WhenEnded = lambda leaf, result: None  # notifies the engine, once there is one
-        self.events = list(trial.events)  # events still to come
+    def __init__(self, trial: Trial, seen: SeenWays) -> None:
+        super().__init__(trial, seen)
         plan = _with_mission(trial.plan, trial)
         self.bench = Bench(plan=plan, start=False, rules=LiveRules(trial.robot))
         name = next(
@@ -344,7 +276,7 @@ class RobotRun:
             raise TypeError(f"'{name}' runs no missions")
         self.name, self.executive = name, executive
         self.make, executive.missions.make = executive.missions.make, self.make_world
-        executive.missions.observer = watcher
+        executive.missions.observer = seen
 
     @property
     def now(self) -> float:
@@ -390,12 +322,12 @@ class RobotRun:
                 self._do(deed)
             except Refused as refusal:
                 self.record.trouble = f"the robot refuses to {deed.word} at {self.now:g} s: {refusal}"
-        self.look()
+        self.executive.look_soon()
 
     def _do(self, deed: EventDeed) -> None:
         match deed.word:
             case "set":
-                self.setter.set(deed.settings, {}, self.now)
+                self.values.set(deed.settings, {})
             case "stop":
                 self.record.note("the test stops the robot")
                 self.bench.host.stop()
@@ -413,76 +345,68 @@ class RobotRun:
                 self.bench.host.ask(self.name, _COMMANDS[word](self.trial.mission))
 
     def settle(self) -> None:
-        """End the calls that are due."""
-        for call, result in self.mocked.ended(self.now):
-            self.record.now = self.now
-            if result.success:
-                self.setter.set(call.mock.sets, call.arguments, self.now)
-            self.ended(call.leaf, result)
-        self.look()
+        """End the calls that are due, and have the executive examine the mission."""
+        self.end_calls()
+        self.executive.look_soon()
 
     def await_calls(self) -> None:
         """Schedule the end of the call that is due next."""
-        due = self.mocked.next_due()
-        if due is not None:
+        if (due := self.mocked.next_due()) is not None:
             self.bench.scheduler.at(due, OWNER, self.settle)
-
-    def look(self) -> None:
-        """Have the executive examine the mission."""
-        self.executive.look_soon()
 
 
 class TrialWorld:
-    """The world of a robot's mission, except for what the test answers or sets."""
+    """The world of a mission, except for what the test answers or sets; without a `robot`, that is all."""
 
-    def __init__(self, run: RobotRun, robot: World) -> None:
-        self._run = run
-        self._robot = robot
+    def __init__(self, run: TrialRun, robot: World | None) -> None:
+        self._run, self._robot = run, robot
+        self._values, self._mocked = run.values, run.mocked
 
     def value(self, name: str, /) -> Value | NotArrived:
         """Return the test's value, else the robot's."""
-        return self._run.values.value(name)
+        return self._values.value(name)
 
     def age(self, name: str, /) -> float | NotArrived:
         """Return the age of a value [s]."""
-        return self._run.values.age(name, self._run.now)
+        return self._values.age(name)
 
     def count(self, name: str, /) -> int:
         """Return how many values have arrived."""
-        return self._run.values.count(name)
+        return self._values.count(name)
 
     def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
         """Answer a call, or let the robot do it."""
-        if skill not in self._run.mocked.mocks:
+        if self._robot is None or skill in self._mocked.mocks:
+            self._mocked.start(leaf, skill, arguments, self._run.now)
+            self._run.await_calls()
+        else:
             self._robot.start(leaf, skill, arguments)
-            return
-        self._run.mocked.start(leaf, skill, arguments, self._run.now)
-        self._run.await_calls()
 
     def halt(self, leaf: int, /) -> None:
         """Stop a call."""
-        if not self._run.mocked.halt(leaf):
+        if not self._mocked.halt(leaf) and self._robot is not None:
             self._robot.halt(leaf)
 
     def pause(self, leaf: int, /) -> None:
         """Hold a call."""
-        if not self._run.mocked.pause(leaf, self._run.now):
+        if not self._mocked.pause(leaf, self._run.now) and self._robot is not None:
             self._robot.pause(leaf)
 
     def resume(self, leaf: int, /) -> None:
         """Let a call continue."""
-        if self._run.mocked.resume(leaf, self._run.now):
+        if self._mocked.resume(leaf, self._run.now):
             self._run.await_calls()
-        else:
+        elif self._robot is not None:
             self._robot.resume(leaf)
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
-        """Publish on the robot."""
-        self._robot.publish(topic, fields)
+        """Publish on the robot; without one there is no subscriber, and only the event counts."""
+        if self._robot is not None:
+            self._robot.publish(topic, fields)
 
     def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
         """Answer a call, or let the robot do it."""
-        if service in self._run.mocked.mocks:
+        if self._robot is None or service in self._mocked.mocks:
             self.start(leaf, service, fields)
         else:
             self._robot.call(leaf, service, fields)
@@ -491,8 +415,9 @@ class TrialWorld:
         """Keep an event, and pass it on."""
         self._run.record.now = self._run.now
         self._run.record.receive(event)
-        self._run.watcher.receive(event)
-        self._robot.say(event)
+        self._run.seen.receive(event)
+        if self._robot is not None:
+            self._robot.say(event)
 
 
 def _with_mission(plan: Plan, trial: Trial) -> Plan:

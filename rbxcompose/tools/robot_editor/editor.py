@@ -2,7 +2,8 @@
 
 A page sends what it wants to change as a list, always from the beginning: what is on disk is the document, and undo is
 a shorter list. Each change is made in the file where the value stands, the robot is compiled with it, and it is refused
-if anything else would change with it. Files are saved together or not at all, if all of them are as they were read.
+if anything else would change with it. Files are saved together or not at all, if all of them are as they were read. The
+robot that runs is changed to what its files say by `apply`, and back again.
 """
 
 from __future__ import annotations
@@ -18,17 +19,20 @@ from typing import Any
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Severity, Span
 from rbxcompose.base.requests import Refused
+from rbxcompose.commands.console import NotDoneError
+from rbxcompose.commands.lookup import answer_of
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import project_of
 from rbxcompose.manifest.tree import KeyPath
-from rbxcompose.tools.mission_editor.patch import TextPatch
+from rbxcompose.runtime.folder import ChosenLayers, RobotFolder
+from rbxcompose.runtime.plan_requests import RevertPlan
 from rbxcompose.tools.mission_editor.yaml_places import Path as TextPath
 from rbxcompose.tools.project_texts import ProjectTexts, ReadText, words_of
-from rbxcompose.tools.robot_editor.map_patches import with_entry, with_name, with_values, without_entry
+from rbxcompose.tools.robot_changes import LONGEST_CHANGE, Proposal
+from rbxcompose.tools.robot_editor.map_patches import MapPatch, entry_at, file_of, value_at
 from rbxcompose.tools.robot_editor.parts import IncludedParts, OfferedPart, offered_parts
 from rbxcompose.tools.robot_editor.subjects import Muxes, Places, Subject
-from rbxcompose.tools.robot_editor.written_at import entry_at, file_of, value_at
 
 MOST_CHANGES = 100
 MOST_FINDINGS = 200
@@ -167,36 +171,37 @@ class RobotEditor:
         subject, path, texts = SUBJECTS[change["subject"]], tuple(change["path"]), dict(state.texts)
         if change["op"] not in subject.operations:
             raise Refused(f"of {subject.what}, only values can be changed here: change it in the file")
-        for file, patched in self._patches(state, subject, path, change):
+        for file, changed in self._patches(state, subject, path, change):
             text = self._text(state, file) if file not in texts else texts[file]
-            texts[file] = patched(text).applied(text)
+            patch = MapPatch(text)
+            changed(patch)
+            texts[file] = patch.done().applied(text)
         made = EditedRobot(texts, self._compiled(texts))
         _require_meant(subject, state.robot, made.robot, change)
         return made
 
     def _patches(
         self, state: EditedRobot, subject: Subject, path: KeyPath, change: RobotChange
-    ) -> list[tuple[Path, Callable[[str], TextPatch]]]:
+    ) -> list[tuple[Path, Callable[[MapPatch], None]]]:
         """Return which files a change changes, and how, one after the other."""
         op, manifest = change["op"], state.robot.manifest
         if op == "add":
             name, value = subject.new_entry(state.robot, path, {**change, "file": str(self._file)})
             self._require_writable(self._file)
-            return [(self._file, partial(with_entry, path=path[:1], key=name, value=value))]
+            return [(self._file, lambda patch: patch.add(path[:1], name, value))]
         if op == "set":
             maps: dict[tuple[Path, TextPath], dict[str, str]] = {}
             for keys, value in subject.written(state.robot, path, change).items():
                 file, place, key = value_at(manifest, (*path, *keys), lambda one: self._text(state, one))
                 self._require_writable(file)
                 maps.setdefault((file, place), {})[key] = value
-            return [(file, partial(with_values, path=place, values=values)) for (file, place), values in maps.items()]
+            return [(file, partial(MapPatch.set, path=place, values=values)) for (file, place), values in maps.items()]
         file, place = entry_at(manifest, path, lambda one: self._text(state, one))
         self._require_writable(file)
         if op == "remove":
-            return [(file, partial(without_entry, path=place))]
-        return [
-            (file, partial(with_name, path=place, name=subject.new_name(state.robot, path, str(place[-1]), change)))
-        ]
+            return [(file, lambda patch: patch.remove(place))]
+        new_name = subject.new_name(state.robot, path, str(place[-1]), change)
+        return [(file, lambda patch: patch.rename(place, new_name))]
 
     def _where(self, state: EditedRobot, path: KeyPath) -> dict[str, Any]:
         """Return where an entry stands, and why it cannot be changed, if it cannot."""
@@ -302,3 +307,60 @@ def _is_change(change: Any, section: str) -> bool:
         return False
     path = change.get("path")
     return isinstance(path, list) and len(path) == 2 and isinstance(path[1], str) and path[0] == section
+
+
+class LiveRobot:
+    """Answers what a page asks about the robot that runs; `compiled` compiles it with the `layers` that it has."""
+
+    def __init__(self, folder: RobotFolder, compiled: Compile, layers: ChosenLayers) -> None:
+        self._folder, self._compiled, self._layers = folder, compiled, layers
+
+    def answer(self, request: Mapping[str, Any]) -> Any:
+        """Return the answer to a request: its `do`, and the `generation` of the plan that a person has seen.
+
+        Raises:
+            Refused: with the reason.
+        """
+        try:
+            return LIVE_REQUESTS[request["do"]](self, request)
+        except NotDoneError as error:
+            raise Refused(error.finding.message) from error
+
+    def _compare(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what would change in the robot that runs, and what prevents it."""
+        proposal = self._proposal()
+        changed = [one for one in proposal.data["components"] if one["fate"] != "kept"]
+        return {
+            "generation": proposal.found.generation,
+            "is_empty": proposal.is_empty,
+            "why_not": proposal.why_not,
+            "components": [{key: one[key] for key in ("name", "fate", "reasons")} for one in changed],
+            "said": list(proposal.found.said),
+        }
+
+    def _apply(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Change the robot that runs to what its files say, if it is still the one that was compared."""
+        proposal = self._proposal()
+        if proposal.found.generation != request["generation"]:
+            raise Refused("the robot was changed by someone else meanwhile: look at the difference again")
+        if proposal.why_not:
+            raise Refused(proposal.why_not)
+        return {"text": proposal.apply(), "generation": proposal.found.generation}
+
+    def _revert(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Take a change back; the files stay as they are."""
+        return {"text": answer_of(self._folder, RevertPlan(request["generation"]), timeout=LONGEST_CHANGE)}
+
+    def _proposal(self) -> Proposal:
+        if self._layers.system:
+            raise Refused("this robot belongs to a system, which is changed as a whole by 'rbxcompose apply'")
+        made = self._compiled({})
+        if made.plan is None or made.robot is None:
+            found = [one for one in made.report if one.severity is Severity.ERROR]
+            raise Refused(f"its files have {len(found)} errors, the first: {found[0].message}")
+        return Proposal.of(made.plan, made.robot, self._layers)
+
+
+LIVE_REQUESTS: Mapping[str, Callable[[LiveRobot, Mapping[str, Any]], Any]] = MappingProxyType(
+    {"robot/compare": LiveRobot._compare, "robot/apply": LiveRobot._apply, "robot/revert": LiveRobot._revert}
+)

@@ -1,87 +1,72 @@
 """Changes of entries in a YAML file as changes of its text: every byte that does not belong to the change stays.
 
-As with missions, what comes of a change is parsed again, and refused if it is not exactly the tree that was meant.
+A change that cannot be made without touching anything else is refused. `entry_at` and `value_at` return where an entry
+or a value stands: in a part, names are others than in the robot, and layers may each have written a piece of an entry.
 """
 
 from __future__ import annotations
 
-from itertools import pairwise
+from collections.abc import Callable
+from pathlib import Path
 
+from rbxcompose.base.findings import Span
 from rbxcompose.base.requests import Refused
+from rbxcompose.compiler.composition.overlay import SET
+from rbxcompose.compiler.composition.robot_manifest import RobotManifest
+from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode, at
 from rbxcompose.manifest.yaml_nodes import compose
-from rbxcompose.tools.mission_editor.patch import TextEdit, TextPatch
-from rbxcompose.tools.mission_editor.yaml_places import Path, PlacedNode, PlainTree, TextLines, placed
+from rbxcompose.tools.mission_editor.yaml_places import (
+    BLOCK_MARK,
+    INDENT,
+    SCALAR_MARK,
+    PlacedNode,
+    PlainTree,
+    TextLines,
+    YamlPatch,
+    pair_in,
+    placed,
+    take_out,
+    tree_at,
+)
+from rbxcompose.tools.mission_editor.yaml_places import Path as TextPath
 
-INDENT = 2
-_BY_HAND = "change it in the file"
-_SCALAR = (None, None, "")  # the mark of a scalar without quotes
-_BLOCK = (None, None)  # of a map
-
-
-def with_values(text: str, path: Path, values: dict[str, str]) -> TextPatch:
-    """Return how keys of the map at `path` get values, given as YAML of one line; those that it lacks are added.
-
-    Raises:
-        Refused: as all of these do, if that cannot be done without touching anything else.
-    """
-    patch = _MapPatch(text)
-    patch.set(path, values)
-    return patch.done()
-
-
-def with_entry(text: str, path: Path, key: str, value: str) -> TextPatch:
-    """Return how the map at `path` gets a new entry at its end; the maps that lead there are made if they are not."""
-    patch = _MapPatch(text)
-    patch.add(path, key, value)
-    return patch.done()
+_BY_HAND, _THERE = "change it in the file", "change it there"
+TextOf = Callable[[Path], str]
 
 
-def with_name(text: str, path: Path, name: str) -> TextPatch:
-    """Return how the entry at `path` gets another name."""
-    patch = _MapPatch(text)
-    patch.rename(path, name)
-    return patch.done()
+class MapPatch(YamlPatch):
+    """Makes one change of the entries of a text; each method raises `Refused` if that is impossible."""
 
-
-def without_entry(text: str, path: Path) -> TextPatch:
-    """Return how the entry at `path` is taken out, with the map around it if that would be empty."""
-    patch = _MapPatch(text)
-    patch.remove(path)
-    return patch.done()
-
-
-class _MapPatch:
-    """Collects the edits of one change, and what the tree is to be afterwards."""
+    BY_HAND = _BY_HAND
 
     def __init__(self, text: str) -> None:
         root = placed(text)
         if root is None or compose(text, "")[1] is not None or root.form != "map":
             raise Refused(f"the file cannot be read: {_BY_HAND} first")
-        self.text, self.lines, self.root = text, TextLines(text), root
-        self.tree: PlainTree = root.plain()
-        self.edits: list[TextEdit] = []
+        super().__init__(TextLines(text), root)
+        self.text = text
 
-    def set(self, path: Path, values: dict[str, str]) -> None:
+    def set(self, path: TextPath, values: dict[str, str]) -> None:
+        """Give values, as YAML of one line, to keys of the map at `path`; those that it lacks are added."""
         node = self.map_at(path)
         added: list[str] = []
         for key, written in values.items():
             old, plain = node.get(key), _plain(written)
             if old is None:
                 added.append(f"{key}: {written}")
-                _at(self.tree, path)[1].append([("scalar", key, _SCALAR), plain])
+                tree_at(self.tree, path)[1].append([("scalar", key, SCALAR_MARK), plain])
                 continue
             self.require_own(old, key)
-            if old.form not in ("scalar", "list", "map") or (old.form != "scalar" and not old.is_flow):
-                raise Refused(f"'{key}' is written in several lines: {_BY_HAND}")
-            if "\n" in self.text[old.start : old.end]:
+            if (old.form != "scalar" and not old.is_flow) or "\n" in self.text[old.start : old.end]:
                 raise Refused(f"'{key}' is written in several lines: {_BY_HAND}")
             gap = " " if old.start == old.end and self.text[old.start - 1 : old.start] == ":" else ""
-            self.edits.append(TextEdit(old.start, old.end, f"{gap}{written}"))
-            _pair(_at(self.tree, path), key)[1] = plain
+            self.replace(old.start, old.end, f"{gap}{written}")
+            pair_in(tree_at(self.tree, path), key)[1] = plain
         if added:
             self.append(node, added)
 
-    def add(self, path: Path, key: str, value: str) -> None:
+    def add(self, path: TextPath, key: str, value: str) -> None:
+        """Add an entry at the end of the map at `path`; the maps that lead there are made if they are not."""
         known = path
         while known and ((node := self.root.at(known)) is None or _is_nothing(node)):
             known = known[:-1]
@@ -91,39 +76,41 @@ class _MapPatch:
             if node.get(key) is not None:
                 raise Refused(f"there is '{key}' already")
             self.append(node, [f"{key}: {value}"])
-            _at(self.tree, path)[1].append([("scalar", key, _SCALAR), _plain(value)])
+            tree_at(self.tree, path)[1].append([("scalar", key, SCALAR_MARK), _plain(value)])
             return
-        tree: PlainTree = [[("scalar", key, _SCALAR), _plain(value)]]
+        tree: PlainTree = [[("scalar", key, SCALAR_MARK), _plain(value)]]
         for name in reversed(missing[1:]):
-            tree = [[("scalar", str(name), _SCALAR), ["map", tree, _BLOCK]]]
+            tree = [[("scalar", str(name), SCALAR_MARK), ["map", tree, BLOCK_MARK]]]
         inner = [*(f"{' ' * INDENT * depth}{name}:" for depth, name in enumerate(missing[1:], 1))]
         inner.append(f"{' ' * INDENT * len(missing)}{key}: {value}")
-        top, above = str(missing[0]), _at(self.tree, known)
+        top, above = str(missing[0]), tree_at(self.tree, known)
         if (old := node.get(top)) is not None:  # a key without a value
             if node.is_flow or not self.lines.begins(node.pairs[0][0].start):
                 raise Refused(f"'{top}' is written within a line: {_BY_HAND}")
             word = next(word for word, value in node.pairs if value is old)
             column = self.lines.column(word.start)
-            self.insert_below(self.lines.of(word.end), [f"{' ' * column}{line}" for line in inner])
-            _pair(above, top)[1] = ["map", tree, _BLOCK]
+            self.paste(self.lines.of(word.end) + 1, "\n".join(f"{' ' * column}{line}" for line in inner))
+            pair_in(above, top)[1] = ["map", tree, BLOCK_MARK]
             return
         if node.is_flow:
             raise Refused(f"there is no '{top}', and what is around it is written within a line: {_BY_HAND}")
         apart = [""] if not known and "\n\n" in self.text else []  # as the other sections are
         self.append(node, [*apart, f"{top}:", *inner])
-        above[1].append([("scalar", top, _SCALAR), ["map", tree, _BLOCK]])
+        above[1].append([("scalar", top, SCALAR_MARK), ["map", tree, BLOCK_MARK]])
 
-    def rename(self, path: Path, name: str) -> None:
+    def rename(self, path: TextPath, name: str) -> None:
+        """Give the entry at `path` another name."""
         above = self.map_at(path[:-1])
         if above.get(name) is not None:
             raise Refused(f"there is '{name}' already")
         key = next((key for key, _ in above.pairs if key.text == path[-1]), None)
         if key is None or key.form != "scalar":
             raise Refused("the file has changed: load it again")
-        self.edits.append(TextEdit(key.start, key.end, name))
-        _pair(_at(self.tree, path[:-1]), path[-1])[0] = ("scalar", name, _SCALAR)
+        self.replace(key.start, key.end, name)
+        pair_in(tree_at(self.tree, path[:-1]), path[-1])[0] = ("scalar", name, SCALAR_MARK)
 
-    def remove(self, path: Path) -> None:
+    def remove(self, path: TextPath) -> None:
+        """Take the entry at `path` out, with the map around it if that would be empty."""
         if self.root.at(path) is None:
             raise Refused("the file has changed: load it again")
         while len(path) > 1 and len(self.map_at(path[:-1]).pairs) == 1:
@@ -142,14 +129,11 @@ class _MapPatch:
             if not self.lines.begins(key.start):
                 raise Refused(f"'{path[-1]}' is written within a line: {_BY_HAND}")
             first, last = self.lines.region(key.start, max(value.end, key.end + 1), self.lines.column(key.start))
-            start, end = self.lines.starts[first], self.lines.place(last)
-            if last >= self.lines.count and self.lines.is_open and start > 0:
-                start -= 1  # with the end of the line before
-            self.edits.append(TextEdit(start, end, ""))
-        tree = _at(self.tree, path[:-1])
-        tree[1].remove(_pair(tree, path[-1]))
+            self.cut(first, last)
+        take_out(tree_at(self.tree, path[:-1]), path[-1])
 
     def remove_within_line(self, above: PlacedNode, at: int) -> None:
+        """Take an entry in brackets out, with the comma before or behind it."""
         (key, value), is_last = above.pairs[at], at == len(above.pairs) - 1
         end_of = max(value.end, key.end)
         if at > 0:
@@ -159,11 +143,11 @@ class _MapPatch:
             start, end = key.start, end_of if is_last else above.pairs[1][0].start
         if "#" in self.text[start : key.start] or "#" in self.text[end_of:end]:
             raise Refused(f"there is a comment between its neighbours: {_BY_HAND}")
-        self.edits.append(TextEdit(start, end, ""))
+        self.replace(start, end, "")
 
     # What they are made of
 
-    def map_at(self, path: Path) -> PlacedNode:
+    def map_at(self, path: TextPath) -> PlacedNode:
         """Return the map at a path that nothing else has a part in."""
         node: PlacedNode | None = self.root
         if not all(isinstance(key, str) for key in path):
@@ -193,45 +177,18 @@ class _MapPatch:
         """Write entries behind the last one of a map."""
         if node.is_flow:
             if len(node.pairs) == 0:
-                self.edits.append(TextEdit(node.start + 1, node.start + 1, ", ".join(lines)))
+                self.replace(node.start + 1, node.start + 1, ", ".join(lines))
                 return
             key, value = node.pairs[-1]
             end = max(value.end, key.end + 1) if value.start != value.end else key.end + 1
-            self.edits.append(TextEdit(end, end, "".join(f", {line}" for line in lines)))
+            self.replace(end, end, "".join(f", {line}" for line in lines))
             return
         key, value = node.pairs[-1]
         if not self.lines.begins(key.start):
             raise Refused(f"'{key.text}' is written within a line: {_BY_HAND}")
         column = self.lines.column(key.start)
         _, last = self.lines.region(key.start, max(value.end, key.end + 1), column)
-        self.insert_below(last - 1, [f"{' ' * column}{line}" for line in lines])
-
-    def insert_below(self, line: int, lines: list[str]) -> None:
-        at, block = self.lines.place(line + 1), "\n".join(lines)
-        is_behind = line + 1 >= self.lines.count and self.lines.is_open
-        self.edits.append(TextEdit(at, at, f"\n{block}" if is_behind else f"{block}\n"))
-
-    def done(self) -> TextPatch:
-        """Return the change, if it does what was meant and nothing else."""
-        edits = sorted(self.edits, key=lambda edit: (edit.start, edit.end))
-        made = TextPatch(tuple(edits), ())
-        is_apart = all(one.end <= other.start for one, other in pairwise(edits))
-        root = placed(made.applied(self.text)) if is_apart else None
-        if root is None or root.plain() != self.tree:
-            raise Refused(f"this cannot be done without changing something else: {_BY_HAND}")
-        return made
-
-
-def path_to(root: PlacedNode, start: int, form: str) -> Path | None:
-    """Return the path of the value with this form that begins at an offset of the text; None if there is none."""
-    waiting: list[tuple[Path, PlacedNode]] = [((), root)]
-    while waiting:
-        path, node = waiting.pop()
-        if path and node.start == start and node.form == form:
-            return path
-        waiting += [((*path, key.text), value) for key, value in node.pairs]
-        waiting += [((*path, index), item) for index, item in enumerate(node.items)]
-    return None
+        self.paste(last, "\n".join(f"{' ' * column}{line}" for line in lines))
 
 
 def _is_nothing(node: PlacedNode) -> bool:
@@ -251,11 +208,79 @@ def _plain(written: str) -> PlainTree:
     return value.plain()
 
 
-def _at(tree: PlainTree, path: Path) -> PlainTree:
-    for key in path:
-        tree = _pair(tree, key)[1]
-    return tree
+def file_of(manifest: RobotManifest, path: KeyPath) -> Path | None:
+    """Return the file that has the last word about an entry; None if no file has."""
+    steps = manifest.history.of(path)
+    return manifest.files.get(steps[-1].span.file) if steps else None
 
 
-def _pair(tree: PlainTree, key: str | int) -> PlainTree:
-    return next(pair for pair in tree[1] if pair[0][1] == key)
+def entry_at(manifest: RobotManifest, path: KeyPath, text_of: TextOf) -> tuple[Path, TextPath]:
+    """Return the file that says an entry, and the path to it there.
+
+    Raises:
+        Refused: if it is not written in one place, of a file.
+    """
+    steps = manifest.history.of(path)
+    if not steps or steps[-1].node is None:
+        world = at(manifest.root, ("world",))
+        if path[0] == "places" and isinstance(world, ScalarNode):
+            raise Refused(f"'{path[-1]}' comes from the world '{world.text}', named at {world.span}: {_THERE}")
+        raise Refused(f"'{path[-1]}' stands in no file of the robot")
+    pieces = {step.span: step for step in steps if step.node is not None}
+    if len({span.file for span in pieces}) > 1:
+        names = " and ".join(sorted({span.file for span in pieces}))
+        raise Refused(f"'{path[-1]}' is written in several files: {names}: {_THERE}")
+    return _located(manifest, steps[-1].node, steps[-1].span, text_of)
+
+
+def value_at(manifest: RobotManifest, path: KeyPath, text_of: TextOf) -> tuple[Path, TextPath, str]:
+    """Return the file that says a value, the path to the map that has it there, and its key.
+
+    Of a value that nobody has written, that is where the map around it is.
+
+    Raises:
+        Refused: if no file says it, or it is computed.
+    """
+    steps = manifest.history.of(path)
+    node = steps[-1].node if steps else None
+    if node is not None:
+        if isinstance(node, ScalarNode) and "${" in node.text:
+            raise Refused(f"'{path[-1]}' is computed from '{node.text}' at {node.span}: {_THERE}")
+        file, place = _located(manifest, node, steps[-1].span, text_of)
+        return file, place[:-1], str(place[-1])
+    above = manifest.history.of(path[:-1])
+    if not above or not isinstance(above[-1].node, MappingNode):
+        entry_at(manifest, path[:2], text_of)  # it may know why
+        raise Refused(f"'{path[-2]}' is no map in a file of the robot")
+    file, place = _located(manifest, above[-1].node, above[-1].span, text_of)
+    return file, place, str(path[-1])
+
+
+def _located(manifest: RobotManifest, node: TreeNode, span: Span, text_of: TextOf) -> tuple[Path, TextPath]:
+    if span.file == SET:
+        raise Refused("it was given by '--set', which is in no file: start the robot without it")
+    file = manifest.files.get(span.file)
+    if file is None:
+        raise Refused(f"it is written at {span}, which is no file of this robot: {_THERE}")
+    text = text_of(file)
+    root, lines = placed(text), TextLines(text)
+    form = "map" if isinstance(node, MappingNode) else "scalar" if isinstance(node, ScalarNode) else "list"
+    found = None
+    if root is not None and 0 < node.span.line <= len(lines.lines):
+        start = lines.starts[node.span.line - 1] + node.span.column - 1
+        found = _path_to(root, start, form) or _path_to(root, start, "scalar")  # the short form of a map
+    if not found:
+        raise Refused(f"it is written at {span} in a way that cannot be changed here: {_THERE}")
+    return file, found
+
+
+def _path_to(root: PlacedNode, start: int, form: str) -> TextPath | None:
+    """Return the path of the value with this form that begins at an offset of the text; None if there is none."""
+    waiting: list[tuple[TextPath, PlacedNode]] = [((), root)]
+    while waiting:
+        path, node = waiting.pop()
+        if path and node.start == start and node.form == form:
+            return path
+        waiting += [((*path, key.text), value) for key, value in node.pairs]
+        waiting += [((*path, index), item) for index, item in enumerate(node.items)]
+    return None

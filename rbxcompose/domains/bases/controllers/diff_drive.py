@@ -12,7 +12,7 @@ from rbxcompose import sdk
 from rbxcompose.base.config import AngularJerk, Config, Jerk, JointName, LinkName
 from rbxcompose.base.geometry import Velocity2
 from rbxcompose.domains.bases.driving import drives
-from rbxcompose.domains.bases.wheels import (, BaseLimits, OdometryPolicy, WheelDrive, WheelGeometry, WheelOdometry
+from rbxcompose.domains.bases.wheels import (
     BaseLimits,
     OdometryPolicy,
     WheelDrive,
@@ -21,8 +21,7 @@ from rbxcompose.domains.bases.wheels import (, BaseLimits, OdometryPolicy, Wheel
     odometry_message,
     odometry_transform,
 )
-from rbxcompose.domains.servos.controller import ControlledJoint, Controller, ControllerConfig, controller
-from rbxcompose.domains.bases.odometry_messages import odometry_message, odometry_transform
+from rbxcompose.domains.servos.controller import Controller, ControllerConfig, controller
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import Odometry

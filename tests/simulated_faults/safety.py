@@ -348,7 +348,7 @@ def _is_judged(config: MuxConfig) -> bool:
 
 def _switch(instance: Instance) -> Switch:
     config = instance.config
-    assert isinstance(config, MuxConfig)  # noqa: S101
+    assert isinstance(config, MuxConfig)
     inputs = {
         instance.topic(name): SwitchInput(input_.priority, math.inf if input_.timeout is None else input_.timeout)
         for name, input_ in config.inputs.items()
