@@ -14,10 +14,10 @@ from rbxcompose.compiler.model.mission_facts import constants, ways_of
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import ScalarNode, at
+from rbxcompose.missions.analysis.examined import views
 from rbxcompose.missions.analysis.facts import place_in_text
-from rbxcompose.missions.analysis.scope_types import views
 from rbxcompose.missions.analysis.travel_times import distance, too_short
-from rbxcompose.missions.language.asked import Asked, inner_span
+from rbxcompose.missions.program.parts import Asked, inner_span
 from rbxcompose.sdk.capabilities import CommandsMotion, Drives, Setting
 
 _LEAST = 3  # places

@@ -17,9 +17,8 @@ from rbxcompose.compiler.model.triggers import condition_of
 from rbxcompose.compiler.model.values import fitting_kinds
 from rbxcompose.compiler.sections.triggers import triggers
 from rbxcompose.compiler.sections.values import ValueModel
-from rbxcompose.missions.analysis.effects import called, published
-from rbxcompose.missions.analysis.facts import Constants, number_of
-from rbxcompose.missions.program.machines import MessageTemplate, TemplateShape, WrittenValue
+from rbxcompose.missions.analysis.facts import Constants, called, number_of, published
+from rbxcompose.missions.program.parts import MessageTemplate, TemplateShape, WrittenValue
 from rbxcompose.missions.sources import ValueSource
 from rbxcompose.msgs.fields import NoFieldError, field_type
 from rbxcompose.sdk.capabilities import Drains, Setting, Warns

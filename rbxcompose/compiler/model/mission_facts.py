@@ -10,12 +10,11 @@ from rbxcompose.base.geometry import Pose2
 from rbxcompose.compiler.model.flow import MessageFlow
 from rbxcompose.compiler.model.robot import Robot, RobotComponent, RobotMission
 from rbxcompose.manifest.tree import at
-from rbxcompose.missions.analysis.bounds import Bounds, truth
-from rbxcompose.missions.analysis.facts import Constants, constants_of
-from rbxcompose.missions.analysis.scope_types import NodeScope, base_scope, views
+from rbxcompose.missions.analysis.examined import NodeScope, base_scope, views
+from rbxcompose.missions.analysis.facts import Bounds, Constants, constants_of, truth
 from rbxcompose.missions.analysis.travel_times import Driving, Ways
 from rbxcompose.missions.engine.world import POSE
-from rbxcompose.missions.language.asked import Asked
+from rbxcompose.missions.program.parts import Asked
 from rbxcompose.sdk.capabilities import CommandsMotion, Drains, Navigates
 
 

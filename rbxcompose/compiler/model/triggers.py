@@ -12,11 +12,11 @@ from rbxcompose.compiler.model.robot import Robot, RobotMission, places_of, reso
 from rbxcompose.compiler.sections.triggers import TriggerModel, triggers
 from rbxcompose.manifest.tree import BROKEN, MappingNode, ScalarNode, at
 from rbxcompose.missions import codes
-from rbxcompose.missions.analysis.scope_types import base_scope, findings_of
+from rbxcompose.missions.analysis.examined import base_scope, findings_of
 from rbxcompose.missions.engine.inputs import bind_inputs
 from rbxcompose.missions.engine.world import Watched
-from rbxcompose.missions.execution.ports import TRIGGER
-from rbxcompose.missions.language.asked import expression_of, inner_span
+from rbxcompose.missions.execution.errands import TRIGGER
+from rbxcompose.missions.program.parts import expression_of, inner_span
 from rbxcompose.missions.program.program import Program
 from rbxcompose.missions.triggers.trigger import Trigger
 from rbxcompose.msgs import registry

@@ -10,7 +10,7 @@ from rbxcompose.compiler.sections.start import MissionName
 from rbxcompose.manifest.fields import InterfaceName, TopicName
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Reading
-from rbxcompose.missions.triggers.schedule import Schedule, daily, parse_cron
+from rbxcompose.missions.triggers.trigger import Schedule, daily, parse_cron
 
 TRIGGER = "trigger"
 CAUSES = ("at", "cron", "when", "message", "at_start", "ends")

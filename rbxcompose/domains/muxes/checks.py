@@ -17,7 +17,7 @@ from rbxcompose.domains.muxes.config import HIGHEST, MODE_OF, TIMELESS, HoldFirs
 from rbxcompose.domains.muxes.core import RAMPS
 from rbxcompose.domains.muxes.requests import NONE
 from rbxcompose.domains.muxes.sections.muxes import MuxModel, muxes
-from rbxcompose.missions.analysis.effects import published
+from rbxcompose.missions.analysis.facts import published
 from rbxcompose.sdk.capabilities import CommandsMotion, Drives, Forwards, Setting
 from rbxcompose.sdk.ports import In, Looks, Out, Qos
 

@@ -9,14 +9,18 @@ from rbxcompose.base.findings import Finding, Related, Severity, Span
 from rbxcompose.base.rules import OWN
 from rbxcompose.base.units import TIME, format_quantity
 from rbxcompose.manifest.tree import ScalarNode
-from rbxcompose.missions.analysis.bounds import truth
-from rbxcompose.missions.analysis.check_runner import mission_check
-from rbxcompose.missions.analysis.effects import written
-from rbxcompose.missions.analysis.examined import Ending, Examined
-from rbxcompose.missions.analysis.facts import Constants, constants_of, never_skipped, number_of, place_in_text
-from rbxcompose.missions.language.asked import Asked
-from rbxcompose.missions.program.answers import ModifierScope, NodeFlow
+from rbxcompose.missions.analysis.examined import Ending, Examined, mission_check
+from rbxcompose.missions.analysis.facts import (
+    Constants,
+    constants_of,
+    never_skipped,
+    number_of,
+    place_in_text,
+    truth,
+    written,
+)
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS
+from rbxcompose.missions.program.parts import Asked, ModifierScope, NodeFlow
 from rbxcompose.missions.program.program import CONTINUE, MissionNode, Program
 
 

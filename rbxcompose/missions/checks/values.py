@@ -10,21 +10,32 @@ from rbxcompose.base.findings import Finding, Related, Span, clauses, nearest, s
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import NUMBER, QUOTIENT, TIME, Dimension, example
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
-from rbxcompose.missions.analysis.check_runner import mission_check
-from rbxcompose.missions.analysis.effects import assignments, called, published
-from rbxcompose.missions.analysis.examined import Ending, Examined
-from rbxcompose.missions.analysis.facts import Constants, constants_of, number_of
-from rbxcompose.missions.analysis.scope_types import View, findings_of
+from rbxcompose.missions.analysis.examined import Ending, Examined, View, check_written, findings_of, mission_check
+from rbxcompose.missions.analysis.facts import (
+    Constants,
+    assignments,
+    called,
+    compared_with_word,
+    constants_of,
+    number_of,
+    published,
+)
 from rbxcompose.missions.codes import UNKNOWN_NAME, WRONG_INPUT, WRONG_TYPE
-from rbxcompose.missions.engine.value_text import show
-from rbxcompose.missions.language.asked import Asked, Assignment, WrittenArgument, inner_span
-from rbxcompose.missions.language.literals import WrongValue, check_written, typed
-from rbxcompose.missions.language.written import help_with_place, is_pose, nodes_of
-from rbxcompose.missions.modifiers.registry import modifier_keys
-from rbxcompose.missions.program.branches import RESULTS, compared_with_word
-from rbxcompose.missions.program.machines import MessageTemplate, TemplateShape, WrittenValue
+from rbxcompose.missions.engine.world import show
+from rbxcompose.missions.language.literals import WrongValue, help_with_place, is_pose, nodes_of, typed
 from rbxcompose.missions.program.outcomes import Outcomes
+from rbxcompose.missions.program.parts import (
+    RESULTS,
+    Asked,
+    Assignment,
+    MessageTemplate,
+    TemplateShape,
+    WrittenArgument,
+    WrittenValue,
+    inner_span,
+)
 from rbxcompose.missions.program.program import Program, Skill
+from rbxcompose.missions.program.registry import modifier_keys
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import FieldShape, parse_type
 from rbxcompose.msgs.fields import measure_of

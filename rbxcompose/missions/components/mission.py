@@ -13,12 +13,20 @@ from pydantic_core import CoreSchema, core_schema
 
 from rbxcompose.base.expressions.types import Type
 from rbxcompose.base.requests import Command
-from rbxcompose.missions.analysis.uses import Using
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
 from rbxcompose.missions.engine.world import POSE, World
 from rbxcompose.missions.execution import requests
-from rbxcompose.missions.execution.errands import ENDS, PUBLISHES, VALUE, port_name
-from rbxcompose.missions.execution.ports import EVENTS, TRIGGER, ports_for, ports_of_triggers
+from rbxcompose.missions.execution.errands import (
+    ENDS,
+    EVENTS,
+    PUBLISHES,
+    TRIGGER,
+    VALUE,
+    port_name,
+    ports_for,
+    ports_of_triggers,
+)
+from rbxcompose.missions.program.linker import Using
 from rbxcompose.missions.program.outcomes import IDLE, Result
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from rbxcompose.base.findings import Span, clauses, suggest
 from rbxcompose.missions.engine.interventions import NotPossible
-from rbxcompose.missions.program.in_turn import InTurn
+from rbxcompose.missions.program.families import InTurn
 from rbxcompose.missions.program.program import MissionNode, Program
 
 ARROW = "->"

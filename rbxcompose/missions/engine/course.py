@@ -1,9 +1,8 @@
 """A course is one line of work with a clock of its own: the mission itself, or the reaction to an interrupt."""
 
 from rbxcompose.base.expressions.evaluate import holds
-from rbxcompose.missions.engine.scopes import SinceScope
 from rbxcompose.missions.engine.task import Task
-from rbxcompose.missions.engine.world import Watched
+from rbxcompose.missions.engine.world import SinceScope, Watched
 from rbxcompose.missions.program.outcomes import RUNNING, SUCCESS
 from rbxcompose.missions.program.program import Interrupt, Target
 

@@ -14,17 +14,15 @@ from dataclasses import field
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.values import NOT_ARRIVED
-from rbxcompose.missions.analysis.held_nodes import HeldNode
 from rbxcompose.missions.engine.course import Course
 from rbxcompose.missions.engine.debugger import Probed, named
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.interventions import NotPossible
-from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.run import Run
-from rbxcompose.missions.engine.task import MovedChildren, Task
-from rbxcompose.missions.modifiers.registry import Decorator
+from rbxcompose.missions.engine.task import Leaf, MovedChildren, Task
+from rbxcompose.missions.language.literals import HeldNode
 from rbxcompose.missions.program.counterparts import Pairing
-from rbxcompose.missions.program.in_turn import InTurnTask
+from rbxcompose.missions.program.families import Decorator, InTurnTask
 from rbxcompose.missions.program.outcomes import RUNNING
 from rbxcompose.missions.program.program import MissionNode
 

@@ -10,9 +10,8 @@ from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import Finding, Span
 from rbxcompose.manifest.tree import NOWHERE, Entry, ScalarNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.header import range_trouble
-from rbxcompose.missions.language.literals import WrongValue, typed
-from rbxcompose.missions.program.machines import Datum, Input
+from rbxcompose.missions.language.literals import WrongValue, range_trouble, typed
+from rbxcompose.missions.program.parts import Datum, Input
 from rbxcompose.missions.program.program import MissionNode, Program
 
 

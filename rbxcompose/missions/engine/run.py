@@ -6,13 +6,13 @@ from rbxcompose.base.expressions.tree import new_names
 from rbxcompose.base.expressions.types import FLAG
 from rbxcompose.base.expressions.values import NOT_ARRIVED, Value
 from rbxcompose.missions.engine.course import Course, Reaction
-from rbxcompose.missions.engine.engine_base import EngineBase, RunBase
 from rbxcompose.missions.engine.events import InterruptEnded, InterruptStarted, Reported
-from rbxcompose.missions.engine.resume_points import DEEP
-from rbxcompose.missions.engine.scopes import MissionScope, SinceScope
-from rbxcompose.missions.language.asked import Asked
-from rbxcompose.missions.program.in_turn import WithHistory
+from rbxcompose.missions.engine.task import EngineBase, RunBase
+from rbxcompose.missions.engine.world import MissionScope, SinceScope
+from rbxcompose.missions.language.grammar import DEEP
+from rbxcompose.missions.program.families import WithHistory
 from rbxcompose.missions.program.outcomes import FAILURE, RUNNING, SUCCESS, words
+from rbxcompose.missions.program.parts import Asked
 from rbxcompose.missions.program.program import CONTINUE, END, Program, RobotNames, Target
 
 

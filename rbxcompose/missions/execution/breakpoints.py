@@ -17,10 +17,10 @@ from rbxcompose.missions.execution.errands import Equipment
 from rbxcompose.missions.execution.mission_run import MissionRun
 from rbxcompose.missions.execution.requests import ListedBreakpoint, SetBreakpoint
 from rbxcompose.missions.language.literals import WrongValue, typed
-from rbxcompose.missions.program.answers import Form
 from rbxcompose.missions.program.counterparts import Pairing
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.outcomes import SUCCEEDS
+from rbxcompose.missions.program.parts import Form
 from rbxcompose.missions.program.program import MissionNode, Program
 
 

@@ -17,8 +17,7 @@ from rbxcompose.missions.engine.inputs import NoSuchState, bind_texts, start_at
 from rbxcompose.missions.engine.interventions import NotPossible
 from rbxcompose.missions.engine.logbook import LogRecord
 from rbxcompose.missions.engine.snapshot import from_plain
-from rbxcompose.missions.engine.value_text import show
-from rbxcompose.missions.engine.world import PLAIN, Observer, Settings
+from rbxcompose.missions.engine.world import PLAIN, Observer, Settings, show
 from rbxcompose.missions.execution.breakpoints import Breakpoints
 from rbxcompose.missions.execution.errands import Equipment
 from rbxcompose.missions.execution.mission_run import LeftMission, LogStore, MakeWorld, MissionRun, claims_of
@@ -33,8 +32,8 @@ from rbxcompose.missions.execution.requests import (
 )
 from rbxcompose.missions.execution.snapshots import differences, identity_of
 from rbxcompose.missions.program.linker import link
-from rbxcompose.missions.program.machines import Input
 from rbxcompose.missions.program.outcomes import IDLE, NAMES
+from rbxcompose.missions.program.parts import Input
 from rbxcompose.missions.program.program import Program
 from rbxcompose.missions.view.picture import picture_of, picture_to_data
 from rbxcompose.sdk.bound import Window

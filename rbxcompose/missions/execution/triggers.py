@@ -17,7 +17,7 @@ from rbxcompose.base.expressions.values import NOT_ARRIVED, EvaluationError, Not
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.requests import Refused, from_data, to_data
 from rbxcompose.missions.engine.events import MissionEnded
-from rbxcompose.missions.engine.scopes import RobotValues, RunScope, SinceScope
+from rbxcompose.missions.engine.world import RobotValues, RunScope, SinceScope
 from rbxcompose.missions.execution.mission_run import MissionRun
 from rbxcompose.missions.execution.missions import RunningMissions
 from rbxcompose.missions.execution.requests import ListedTrigger, RunMission

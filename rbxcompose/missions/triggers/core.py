@@ -7,8 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.missions.triggers.schedule import Local
-from rbxcompose.missions.triggers.trigger import INTERRUPT, QUEUE, Trigger
+from rbxcompose.missions.triggers.trigger import INTERRUPT, QUEUE, Local, Trigger
 
 LATE = 60.0  # [s] after a time of day, it counts as missed
 CHECK = 30.0  # [s] between looks at the wall clock, which may be set

@@ -26,16 +26,11 @@ from rbxcompose.manifest.registry import section_named
 from rbxcompose.manifest.section import Section
 from rbxcompose.manifest.test_file import STEP_KEYS
 from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, all_nodes, at
-from rbxcompose.missions.language.asked import Asked, WrittenArgument
-from rbxcompose.missions.language.grammar import Takes
-from rbxcompose.missions.language.keys import keys_taking
-from rbxcompose.missions.language.machine_reader import STATE_KEYS
-from rbxcompose.missions.language.reader import BODIES, INTERRUPT_KEYS, read_program
-from rbxcompose.missions.modifiers.registry import modifier_keys
-from rbxcompose.missions.program.answers import DEEDS
-from rbxcompose.missions.program.machines import MACHINE_KEYS
+from rbxcompose.missions.language.grammar import BODIES, STATE_KEYS, Takes
+from rbxcompose.missions.language.reader import INTERRUPT_KEYS, read_program
+from rbxcompose.missions.program.parts import DEEDS, MACHINE_KEYS, Asked, WrittenArgument
 from rbxcompose.missions.program.program import Program, Skill
-from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.program.registry import keys_taking, kinds, modifier_keys
 from rbxcompose.tools.lsp.project_files import MISSION as MISSION_DOCUMENT
 from rbxcompose.tools.lsp.project_files import NO_MEANING, OVERLAY, PART, ROBOT, TEST, Meanings, ProjectFiles
 from rbxcompose.tools.lsp.symbols import BRANCH, INTERRUPT, ITEM, NODE, STATE, VARIABLE, Mention, NamePiece, Symbol

@@ -11,7 +11,7 @@ from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.registry import section_named
 from rbxcompose.manifest.tree import NOWHERE, ScalarNode
-from rbxcompose.missions.language.value_reader import NAME, invalid_name
+from rbxcompose.missions.language.node_reader import NAME, invalid_name
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.tools.lsp.mentions import SymbolIndex
 from rbxcompose.tools.lsp.project import Project

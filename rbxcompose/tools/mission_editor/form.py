@@ -16,8 +16,7 @@ from rbxcompose.compiler.schema.documents import schema_for
 from rbxcompose.compiler.schema.guide import Guide, GuidedValue
 from rbxcompose.compiler.schema.mission import ITEM_NAME
 from rbxcompose.manifest.tree import MappingNode
-from rbxcompose.missions.language.keys import anywhere
-from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.program.registry import anywhere, kinds
 from rbxcompose.tools.lsp.answers import variables
 from rbxcompose.tools.lsp.document import Cursor, Document, Spot, quick_tree
 from rbxcompose.tools.lsp.names import KnownNames

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rbxcompose.base.requests import Refused
-from rbxcompose.missions.language.machine_reader import RESULTS
-from rbxcompose.missions.program.machines import FINISHED
+from rbxcompose.missions.kinds.machine import RESULTS
+from rbxcompose.missions.program.parts import FINISHED
 from rbxcompose.missions.program.program import RESTART
 from rbxcompose.tools.mission_editor.outline import INTERRUPT, INTERRUPTS, STATE, Slot
 from rbxcompose.tools.mission_editor.patch import (

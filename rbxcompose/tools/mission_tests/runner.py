@@ -13,9 +13,7 @@ from rbxcompose.manifest.test_file import LONGEST_TEST
 from rbxcompose.missions.components.mission import Mission, MissionConfig
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEvent
-from rbxcompose.missions.engine.scopes import RobotValues
-from rbxcompose.missions.engine.value_text import show_briefly
-from rbxcompose.missions.engine.world import Observer, Settings, World
+from rbxcompose.missions.engine.world import Observer, RobotValues, Settings, World, show_briefly
 from rbxcompose.missions.execution.requests import CancelMission, PauseMission, ResumeMission
 from rbxcompose.missions.execution.world import RobotWorld
 from rbxcompose.missions.program.outcomes import IDLE, RUNNING, Result
