@@ -15,7 +15,7 @@ from rbxcompose.missions import codes
 from rbxcompose.missions.analysis.examined import base_scope, findings_of
 from rbxcompose.missions.engine.inputs import bind_inputs
 from rbxcompose.missions.engine.world import Watched
-from rbxcompose.missions.execution.errands import TRIGGER
+from rbxcompose.missions.execution.equipment import TRIGGER
 from rbxcompose.missions.program.parts import expression_of, inner_span
 from rbxcompose.missions.program.program import Program
 from rbxcompose.missions.triggers.trigger import Trigger

@@ -5,48 +5,27 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
-from pydantic import GetCoreSchemaHandler, WithJsonSchema
-from pydantic_core import CoreSchema, core_schema
-
-from rbxcompose.base.expressions.types import Type
 from rbxcompose.base.requests import Command
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
 from rbxcompose.missions.engine.world import POSE, World
 from rbxcompose.missions.execution import requests
-from rbxcompose.missions.execution.errands import (
+from rbxcompose.missions.execution.equipment import (
     ENDS,
     EVENTS,
     PUBLISHES,
     TRIGGER,
     VALUE,
+    MissionConfig,
     port_name,
     ports_for,
     ports_of_triggers,
 )
-from rbxcompose.missions.program.linker import Using
 from rbxcompose.missions.program.outcomes import IDLE, Result
-from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of
-from rbxcompose.missions.triggers.trigger import Trigger
 from rbxcompose.msgs.rbxcompose_msgs import RunMission
 from rbxcompose.msgs.std_msgs import String
-from rbxcompose.sdk import (
-    Capability,
-    Component,
-    Config,
-    Level,
-    Place,
-    Port,
-    Refused,
-    Replaceable,
-    RunsMissions,
-    ServesAction,
-    answers,
-    component,
-)
+from rbxcompose.sdk import Capability, Component, Level, Port, Refused, RunsMissions, ServesAction, answers, component
 from rbxcompose.sdk.robot_events import MissionOver, MissionWaits
 
 if TYPE_CHECKING:  # a check needs no engine: it is imported when the component is configured
@@ -60,77 +39,6 @@ RATE = 10.0  # [Hz]
 LOOK_AGAIN = 0.1  # [s] between two checks for a pose that has not arrived yet
 RESTART, ASK = "restart", "ask"  # after a crash
 NO_INPUTS: Mapping[str, str] = {}
-
-T = TypeVar("T")
-
-
-class IsInstance:
-    """Takes an instance of the annotated class as it is.
-
-    `pydantic.InstanceOf` also works out how each field of a dataclass would be read: 10 ms of each `check`.
-    """
-
-    def __get_pydantic_core_schema__(self, source: type, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.is_instance_schema(source)
-
-
-Made = Annotated[T, IsInstance(), WithJsonSchema({"type": "object"})]  # made by the compiler, never by people
-
-
-class MissionConfig(Config):
-    """The robot's missions as the compiler has prepared them."""
-
-    programs: Annotated[dict[str, Made[Program]], Replaceable()] = {}
-    """Missions by name."""
-    start: Annotated[str | None, Replaceable()] = None
-    """The mission that starts by itself."""
-    inputs: Annotated[dict[str, dict[str, Any]], Replaceable()] = {}
-    """Values of the inputs, by mission and name."""
-    after_crash: Annotated[dict[str, str], Replaceable()] = {}
-    """What missions do after a crash, by mission: `restart`, `ask` or `continue`."""
-    values: dict[str, Made[ValueSource]] = {}
-    """Where the robot's values come from."""
-    places: Annotated[dict[str, Made[Place]], Replaceable()] = {}
-    """The robot's places."""
-    skills: dict[str, Made[SkillSource]] = {}
-    """The robot's skills."""
-    topics: dict[str, Made[TopicSource]] = {}
-    """The topics on which missions publish."""
-    services: dict[str, str] = {}
-    """The services that missions call, with their ROS types."""
-    settings: dict[str, dict[str, Made[Type]]] = {}
-    """The types of settings that missions change."""
-    for_others: bool = False
-    """Whether components run missions, by the action `run_mission`."""
-    triggers: dict[str, Made[Trigger]] = {}
-    """What starts missions by itself, by name."""
-
-    @property
-    def reads(self) -> frozenset[str]:
-        """Return all names that missions and triggers read."""
-        names = frozenset[str]().union(*(program.reads for program in self.programs.values()))
-        return names.union(*(trigger.reads for trigger in self.triggers.values()))
-
-    @property
-    def used(self) -> dict[str, SkillSource]:
-        """Return all skills that missions use."""
-        names = {node.skill for program in self.programs.values() for node in program.nodes}
-        return {name: self.skills[name] for name in sorted(names & self.skills.keys())}
-
-    @cached_property
-    def names(self) -> RobotNames:
-        """Return what the robot offers to missions."""
-        broken = Using(self.programs).broken
-        return RobotNames(
-            {name: source.type for name, source in self.values.items()},
-            self.places,
-            {name: source.skill for name, source in self.skills.items()},
-            {name: program for name, program in self.programs.items() if name not in broken},
-            {name: topic.message for name, topic in self.topics.items()},
-            self.services,
-            self.settings,
-            events=events_of(self.values),
-        )
 
 
 @component("mission")
@@ -170,10 +78,10 @@ class Mission(Component[MissionConfig]):
 
     def configure(self) -> None:
         """Start with no values and no missions."""
+        from rbxcompose.missions.execution.errands import Desks
+        from rbxcompose.missions.execution.mission_run import OrderedMission
         from rbxcompose.missions.execution.missions import Broadcast, RunningMissions
-        from rbxcompose.missions.execution.ordered import OrderedMission
         from rbxcompose.missions.execution.snapshots import SnapshotStore
-        from rbxcompose.missions.execution.topic_skills import Desks
         from rbxcompose.missions.execution.triggers import Triggering, TriggerMemory
         from rbxcompose.missions.execution.world import Arrivals, RobotWorld
 
@@ -501,7 +409,7 @@ class Mission(Component[MissionConfig]):
     @answers(requests.ListOutcomes)
     def list_outcomes(self, request: requests.ListOutcomes) -> requests.OutcomesByNode:
         """Return in which outcomes nodes may be forced to end."""
-        from rbxcompose.missions.execution.debug_views import outcomes_of
+        from rbxcompose.missions.execution.debugging import outcomes_of
 
         run = self.missions.running(request.mission)
         return outcomes_of(run.engine.program, run.engine.robot)
@@ -509,7 +417,7 @@ class Mission(Component[MissionConfig]):
     @answers(requests.ListData)
     def list_data(self, request: requests.ListData) -> tuple[requests.ListedDatum, ...]:
         """Return the data of a mission that runs."""
-        from rbxcompose.missions.execution.debug_views import data_of
+        from rbxcompose.missions.execution.debugging import data_of
 
         return tuple(data_of(self.missions.running(request.mission)))
 
@@ -538,21 +446,21 @@ class Mission(Component[MissionConfig]):
     @answers(requests.ForceNode)
     def force(self, request: requests.ForceNode) -> str:
         """Let a node that runs end."""
-        from rbxcompose.missions.execution.breakpoints import forced
+        from rbxcompose.missions.execution.debugging import forced
 
         return self.intervene(request.mission, lambda run: [forced(run, request.where, request.outcome)])
 
     @answers(requests.SetMissionData)
     def set_data(self, request: requests.SetMissionData) -> str:
         """Set data of a mission."""
-        from rbxcompose.missions.execution.breakpoints import changed
+        from rbxcompose.missions.execution.debugging import changed
 
         return self.intervene(request.mission, lambda run: changed(run, request.values))
 
     @answers(requests.JumpMission)
     def jump(self, request: requests.JumpMission) -> str:
         """Bring a machine into another state."""
-        from rbxcompose.missions.execution.breakpoints import jump
+        from rbxcompose.missions.execution.debugging import jump
 
         return self.intervene(request.mission, lambda run: [jump(run, request.state)])
 

@@ -14,11 +14,10 @@ from dataclasses import field
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.values import NOT_ARRIVED
-from rbxcompose.missions.engine.course import Course
 from rbxcompose.missions.engine.debugger import Probed, named
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.interventions import NotPossible
-from rbxcompose.missions.engine.run import Run
+from rbxcompose.missions.engine.run import Course, Run
 from rbxcompose.missions.engine.task import Leaf, MovedChildren, Task
 from rbxcompose.missions.language.literals import HeldNode
 from rbxcompose.missions.program.counterparts import Pairing

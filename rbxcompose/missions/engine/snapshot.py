@@ -13,9 +13,8 @@ from rbxcompose.base.expressions.values import MOST_LEVELS, NOT_ARRIVED, NotArri
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.printable import plain as plain_text
 from rbxcompose.missions.engine.build import Since
-from rbxcompose.missions.engine.course import Course
 from rbxcompose.missions.engine.engine import Engine
-from rbxcompose.missions.engine.run import Run
+from rbxcompose.missions.engine.run import Course, Run
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.language.literals import HeldNode
 from rbxcompose.missions.program.outcomes import Result

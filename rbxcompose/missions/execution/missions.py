@@ -18,8 +18,8 @@ from rbxcompose.missions.engine.interventions import NotPossible
 from rbxcompose.missions.engine.logbook import LogRecord
 from rbxcompose.missions.engine.snapshot import from_plain
 from rbxcompose.missions.engine.world import PLAIN, Observer, Settings, show
-from rbxcompose.missions.execution.breakpoints import Breakpoints
-from rbxcompose.missions.execution.errands import Equipment
+from rbxcompose.missions.execution.debugging import Breakpoints
+from rbxcompose.missions.execution.equipment import MissionConfig
 from rbxcompose.missions.execution.mission_run import LeftMission, LogStore, MakeWorld, MissionRun, claims_of
 from rbxcompose.missions.execution.requests import (
     ListedInput,
@@ -53,7 +53,7 @@ class RunningMissions:
     """The running missions, in the order in which they began, and ended ones until they run again."""
 
     def __init__(
-        self, equipment: Equipment, make: MakeWorld, on_line: OnLine, publish: Callable[[LogRecord], None]
+        self, equipment: MissionConfig, make: MakeWorld, on_line: OnLine, publish: Callable[[LogRecord], None]
     ) -> None:
         self._equipment, self.make, self._on_line, self._publish = equipment, make, on_line, publish
         self.observer: Observer | None = None  # of all that begin from now on
@@ -118,7 +118,7 @@ class RunningMissions:
 
     # Other missions and places
 
-    def followed(self, equipment: Equipment) -> list[Followed]:
+    def followed(self, equipment: MissionConfig) -> list[Followed]:
         """Return how the missions that run would go on with what has changed; nothing is done so far.
 
         Raises:
@@ -132,7 +132,7 @@ class RunningMissions:
                 raise Refused(f"missions {name} and {other} run, and both would use {' and '.join(common)}")
         return found
 
-    def _followed(self, run: MissionRun, equipment: Equipment) -> Followed | None:
+    def _followed(self, run: MissionRun, equipment: MissionConfig) -> Followed | None:
         """Return how a mission would go on; None if nothing changes for it."""
         program = equipment.names.missions.get(run.name)
         if program is None:
@@ -149,7 +149,7 @@ class RunningMissions:
         except NotPossible as error:
             raise Refused(f"mission {run.name} cannot go on: {error}") from error
 
-    def follow(self, equipment: Equipment, found: Iterable[Followed], now: float) -> tuple[str, ...]:
+    def follow(self, equipment: MissionConfig, found: Iterable[Followed], now: float) -> tuple[str, ...]:
         """Go on as `followed` has found; return the breakpoints that are gone."""
         gone = self.breakpoints.follow(equipment)
         self._equipment = equipment
