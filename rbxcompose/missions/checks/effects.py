@@ -204,8 +204,7 @@ def _comes_again(program: Program, node: MissionNode) -> bool:
     if parent is None:
         return node.number != program.main  # a reaction runs as often as its interrupt
     above = program.nodes[parent]
-    is_repeated = above.step.comes_again or any(modifier.repeats for modifier in above.modifiers.values())
-    return is_repeated or _comes_again(program, above)
+    return above.comes_again or _comes_again(program, above)
 
 
 @mission_check("RBX4128", Severity.WARNING, closed=())

@@ -67,7 +67,7 @@ def _is_later(program: Program, reader: MissionNode, saver: MissionNode) -> bool
     around = program.nodes[shared[0]]
     if around.step.flow is not NodeFlow.IN_TURN or around.step.goes_on_after != "success":
         return False
-    if any(_comes_again(program.nodes[number]) for number in shared):
+    if any(program.nodes[number].comes_again for number in shared):
         return False
     return reader.number < saver.number
 
@@ -79,10 +79,6 @@ def _above(program: Program, node: MissionNode) -> list[int]:
         found.append(here)
         here = program.nodes[here].parent
     return found
-
-
-def _comes_again(node: MissionNode) -> bool:
-    return node.step.comes_again or any(modifier.repeats for modifier in node.modifiers.values())
 
 
 @mission_check("RBX4162")

@@ -18,15 +18,13 @@ from rbxcompose.missions.engine.debugger import Probed, named
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.interventions import NotPossible
 from rbxcompose.missions.engine.run import Course, Run
+from rbxcompose.missions.engine.snapshot import OF_ENGINE, OF_RUN
 from rbxcompose.missions.engine.task import Leaf, MovedChildren, Task
 from rbxcompose.missions.language.literals import HeldNode
 from rbxcompose.missions.program.counterparts import Pairing
 from rbxcompose.missions.program.families import Decorator, InTurnTask
 from rbxcompose.missions.program.outcomes import RUNNING
 from rbxcompose.missions.program.program import MissionNode
-
-_ENGINE = ("status", "outcome", "now", "time", "lost", "is_paused", "draws", "held_until", "instant", "ticks", "wake")
-_RUN = ("begun", "ending", "message")
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +125,7 @@ class _Exchange:
     # What is taken over
 
     def _take_run(self, run: Run, before: Run) -> None:
-        for name in _RUN:
+        for name in OF_RUN:
             setattr(run, name, getattr(before, name))
         if not before.begun:
             return
@@ -260,7 +258,7 @@ class _Exchange:
 
     def _take_engine(self) -> None:
         old, new, after = self.old, self.new, self.after
-        for name in _ENGINE:
+        for name in OF_ENGINE:
             setattr(new, name, getattr(old, name))
         nodes = [
             (old.program.nodes[before].span.place, new.program.nodes[now].span.place) for before, now in after.items()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import ChainMap
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import reduce
 from random import Random
 from typing import Any, ClassVar, Protocol
@@ -84,7 +84,6 @@ class TickSource(Protocol):
     @property
     def place(self) -> str:
         """Return its file and line."""
-        ...
 
 
 @dataclass(slots=True)
@@ -509,6 +508,16 @@ class Leaf(Task):
     def ask(self) -> int:
         """Send the request and return the status; an exception is a failure of the node."""
         raise NotImplementedError
+
+    def request(self, send: Callable[[], None]) -> int:
+        """Send a request; if that raises, none is under way."""
+        self.status, self.is_asked = RUNNING, True
+        try:
+            send()
+        except (Exception, SystemExit):
+            self.is_asked = False
+            raise
+        return RUNNING
 
     def ended(self, result: Result) -> None:
         """Take the result from the world."""

@@ -67,15 +67,12 @@ class RobotValues(Protocol):
 
     def value(self, name: str, /) -> Value | NotArrived:
         """Return the newest value in SI; raise KeyError if there is no such name."""
-        ...
 
     def age(self, name: str, /) -> float | NotArrived:
         """Return the time since the last message [s]; raise KeyError if there is no such name."""
-        ...
 
     def count(self, name: str, /) -> int:
         """Return how many messages have arrived so far; raise KeyError if there is no such name."""
-        ...
 
 
 class MissionScope(Protocol):
@@ -83,23 +80,18 @@ class MissionScope(Protocol):
 
     def variable(self, name: str, /) -> Value | NotArrived:
         """Return the value of `$name`."""
-        ...
 
     def word(self, name: str, /) -> Value:
         """Return the value that a bare word names."""
-        ...
 
     def age(self, name: str, /) -> float | NotArrived:
         """Return the time since the last message of `$name` [s]."""
-        ...
 
     def is_new(self, name: str, /) -> bool:
         """Return whether a message of `$name` has arrived since this node started."""
-        ...
 
     def count(self, name: str, /) -> int:
         """Return how many messages of `$name` have arrived."""
-        ...
 
 
 class RunScope:
@@ -236,31 +228,24 @@ class World(RobotValues, Protocol):
 
     def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
         """Start a skill for a leaf; its result goes to `Engine.ended`."""
-        ...
 
     def halt(self, leaf: int, /) -> None:
         """Stop the skill or the call of a leaf; its result is no longer reported."""
-        ...
 
     def pause(self, leaf: int, /) -> None:
         """Pause the skill of a leaf; the skill declares that it can pause."""
-        ...
 
     def resume(self, leaf: int, /) -> None:
         """Resume the paused skill of a leaf."""
-        ...
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
         """Publish a message with these fields, nested ones as maps; raise ValueError if one does not fit."""
-        ...
 
     def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
         """Call a service for a leaf; its result goes to `Engine.ended`."""
-        ...
 
     def say(self, event: MissionEvent, /) -> None:
         """Receive an event."""
-        ...
 
 
 class Observer(Protocol):
@@ -268,11 +253,9 @@ class Observer(Protocol):
 
     def started(self, number: int, /) -> None:
         """Handle the start of a node."""
-        ...
 
     def ended(self, number: int, status: int, outcome: str, /) -> None:
         """Handle the end of a node, with its own outcome if it has one; IDLE means that it was halted."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

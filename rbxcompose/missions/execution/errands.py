@@ -26,24 +26,19 @@ class Shell(Protocol):
     @property
     def equipment(self) -> MissionConfig:
         """Return the robot's missions and what they may request of it."""
-        ...
 
     @property
     def now(self) -> float:
         """Return robot time [s]."""
-        ...
 
     def info(self, text: str) -> None:
         """Log an event."""
-        ...
 
     def warn(self, text: str) -> None:
         """Log something that a person should look at."""
-        ...
 
     def look_soon(self) -> None:
         """Request to be woken at this instant."""
-        ...
 
 
 BACK_WITHIN = 5.0  # [s] in which a missing server must appear

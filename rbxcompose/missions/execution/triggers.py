@@ -79,32 +79,25 @@ class Executive(Protocol):
     @property
     def now(self) -> float:
         """Return robot time [s]."""
-        ...
 
     @property
     def stamp(self) -> int:
         """Return wall-clock time [ns]."""
-        ...
 
     def run(self, request: RunMission) -> str:
         """Begin a mission; raise Refused if it cannot run."""
-        ...
 
     def end(self, run: MissionRun) -> None:
         """End a mission that runs."""
-        ...
 
     def info(self, text: str) -> None:
         """Log an event."""
-        ...
 
     def warn(self, text: str) -> None:
         """Log a warning."""
-        ...
 
     def look_soon(self) -> None:
         """Request a wake at this instant."""
-        ...
 
 
 class Triggering:

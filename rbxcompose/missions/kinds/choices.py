@@ -13,27 +13,44 @@ from rbxcompose.missions.language.literals import HeldNode
 from rbxcompose.missions.program.parts import Asked, BranchChoice
 
 
-class IfTask(sdk.Task):
+class ChosenTask(sdk.Task):
+    """Runs the child that it chooses when it begins, or none."""
+
+    __slots__ = ("children", "index")
+    saved = ("index",)
+
+    def __init__(self, site: sdk.Site) -> None:
+        super().__init__(site)
+        self.children = site.children
+        self.index = 0  # of the chosen child
+
+    def choose(self) -> int:
+        """Return the index of a child; one that does not exist for none."""
+        raise NotImplementedError
+
+    def begin(self) -> int:
+        """Choose a child and start it."""
+        if not (self.engine.places.kept and self.engine.places.take_up(self)):
+            self.index = self.choose()
+        return self.proceed() if self.index < len(self.children) else sdk.SKIPPED
+
+    def proceed(self) -> int:
+        """Continue with the chosen child."""
+        return self.advance(self.children[self.index])
+
+
+class IfTask(ChosenTask):
     """Runs the chosen branch."""
 
-    __slots__ = ("branches", "condition", "index")
-    saved = ("index",)
+    __slots__ = ("condition",)
 
     def __init__(self, site: sdk.Site, step: IfStep) -> None:
         super().__init__(site)
         self.condition = step.condition
-        self.branches = site.children
-        self.index = 0  # of the chosen branch
 
-    def begin(self) -> int:
-        """Choose a branch and start it."""
-        if not (self.engine.places.kept and self.engine.places.take_up(self)):
-            self.index = 0 if sdk.holds(self.condition, self.scope) else 1
-        return self.proceed() if self.index < len(self.branches) else sdk.SKIPPED
-
-    def proceed(self) -> int:
-        """Continue with the chosen branch."""
-        return self.advance(self.branches[self.index])
+    def choose(self) -> int:
+        """Return the first branch if the condition holds, else the second."""
+        return 0 if sdk.holds(self.condition, self.scope) else 1
 
 
 @sdk.kind("if", IfTask)
@@ -68,35 +85,22 @@ class IfStep(sdk.Choosing):
         return found if sdk.is_simple(node) else found.both(sdk.ALWAYS_FAILS)
 
 
-class ChooseTask(sdk.Task):
+class ChooseTask(ChosenTask):
     """Runs the chosen case."""
 
-    __slots__ = ("choice", "chosen", "index")
-    saved = ("index",)
+    __slots__ = ("choice",)
 
     def __init__(self, site: sdk.Site, step: ChooseStep) -> None:
         super().__init__(site)
         self.choice = step.choice
-        self.chosen = site.children
-        self.index = -1  # of the chosen child
 
-    def begin(self) -> int:
-        """Choose a case and start it."""
-        if not (self.engine.places.kept and self.engine.places.take_up(self)):
-            self.index = self._choose()
-        return sdk.SKIPPED if self.index < 0 else self.proceed()
-
-    def proceed(self) -> int:
-        """Continue with the chosen case."""
-        return self.advance(self.chosen[self.index])
-
-    def _choose(self) -> int:
-        cases = self.choice.cases
+    def choose(self) -> int:
+        """Return the first case that equals the value, else what is behind the last one."""
         value = sdk.evaluate(self.choice.asked, self.scope)
-        for index, case in enumerate(cases):
+        for index, case in enumerate(self.choice.cases):
             if is_same(sdk.evaluate(case.expression, self.scope), value):
                 return index
-        return len(cases) if len(cases) < len(self.chosen) else -1
+        return len(self.choice.cases)
 
 
 @sdk.kind("choose", ChooseTask)
@@ -145,32 +149,23 @@ class ChooseStep(sdk.Choosing):
         return found.both(sdk.ALWAYS_FAILS) if node.asked else found
 
 
-class RunTask(sdk.Task):
+class RunTask(ChosenTask):
     """Runs the node that its expression yields."""
 
-    __slots__ = ("children", "expression", "index", "keys")
-    saved = ("index",)
+    __slots__ = ("expression", "keys")
 
     def __init__(self, site: sdk.Site, step: RunStep) -> None:
         super().__init__(site)
         self.expression = step.expression
-        self.children = site.children
         nodes = site.engine.program.nodes
         self.keys = {nodes[child].held: index for index, child in enumerate(site.node.children)}
-        self.index = 0  # of the child that runs
 
-    def begin(self) -> int:
-        """Look the node up, and start it."""
-        if not (self.engine.places.kept and self.engine.places.take_up(self)):
-            value = sdk.evaluate(self.expression, self.scope)
-            if not isinstance(value, HeldNode) or value.key not in self.keys:
-                raise sdk.NodeFailed(f"'run' needs a node from the data, not {self.run.show('', value)}")
-            self.index = self.keys[value.key]
-        return self.proceed()
-
-    def proceed(self) -> int:
-        """Continue with the node."""
-        return self.advance(self.children[self.index])
+    def choose(self) -> int:
+        """Look the node up."""
+        value = sdk.evaluate(self.expression, self.scope)
+        if not isinstance(value, HeldNode) or value.key not in self.keys:
+            raise sdk.NodeFailed(f"'run' needs a node from the data, not {self.run.show('', value)}")
+        return self.keys[value.key]
 
 
 @sdk.kind("run", RunTask)

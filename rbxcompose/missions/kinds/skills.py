@@ -46,16 +46,10 @@ class SkillTask(sdk.Leaf):
 
     def ask(self) -> int:
         """Start the skill; this happens again after a pause."""
-        self.started, self.status = self.engine.now, sdk.RUNNING
+        self.started = self.engine.now
         text = f"{self.skill.name} {', '.join(self._shown())}".rstrip()
         self.engine.say(sdk.SkillStarted(self.number, self.skill.name, self.arguments, text))
-        self.is_asked = True
-        try:
-            self.engine.world.start(self.number, self.skill.name, self.arguments)
-        except (Exception, SystemExit):
-            self.is_asked = False
-            raise
-        return sdk.RUNNING
+        return self.request(lambda: self.engine.world.start(self.number, self.skill.name, self.arguments))
 
     def _shown(self) -> Iterator[str]:
         """Yield the arguments as they were written, where that is no expression, and else their values."""
@@ -187,13 +181,7 @@ class CallTask(sdk.Leaf):
         service = self.message.target.text
         request = registry.service(self.engine.robot.services[service]).Request
         fields = sdk.fields_of(self.message, request, self)
-        self.status, self.is_asked = sdk.RUNNING, True
-        try:
-            self.engine.world.call(self.number, service, fields)
-        except Exception:
-            self.is_asked = False
-            raise
-        return sdk.RUNNING
+        return self.request(lambda: self.engine.world.call(self.number, service, fields))
 
 
 @sdk.kind("call", CallTask)
@@ -264,13 +252,7 @@ class SetParameterTask(sdk.Leaf):
         number, key = _ENCODED[self.wanted.kind]
         parameter = {"name": self.setting.parameter.text, "value": {"type": number, key: self.value}}
         fields: dict[str, sdk.Value] = {"parameters": [parameter], "by": f"mission {self.run.program.name}"}
-        self.status, self.is_asked = sdk.RUNNING, True
-        try:
-            self.engine.world.call(self.number, self.setting.service, fields)
-        except Exception:
-            self.is_asked = False
-            raise
-        return sdk.RUNNING
+        return self.request(lambda: self.engine.world.call(self.number, self.setting.service, fields))
 
 
 @sdk.kind("set_parameter", SetParameterTask)

@@ -63,23 +63,18 @@ class Nodes(Protocol):
 
     def child(self, node: TreeNode, step: str, parent: int) -> int:
         """Read a node below `parent` and return its number; `step` is the next part of its path."""
-        ...
 
     def state(self, name: str, entry: Entry, parent: int) -> int:
         """Read a state of the machine `parent` and return its number."""
-        ...
 
     def loop(self, item: str, expression: Expression) -> None:
         """Note the item of a loop over the value of an expression."""
-        ...
 
     def held(self, expression: Expression, parent: int, span: Span) -> list[int]:
         """Read the nodes in the data that an expression may yield, below `parent`, and return their numbers."""
-        ...
 
     def add(self, finding: Finding) -> None:
         """Keep a finding."""
-        ...
 
 
 def read_expression(scalar: ScalarNode, nodes: Nodes, wanted: Type = FLAG) -> Expression | None:

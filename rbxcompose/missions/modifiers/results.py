@@ -19,10 +19,6 @@ class TurningTask(sdk.Decorator):
         super().__init__(site, inner)
         self.turned = options.turns if options.is_on else {}
 
-    def begin(self) -> int:
-        """Start the task inside."""
-        return self.proceed()
-
     def proceed(self) -> int:
         """Continue, and replace the result."""
         status = self.advance(self.inner)
@@ -209,10 +205,6 @@ class AsLongAsTask(sdk.Decorator):
     def __init__(self, site: sdk.Site, options: AsLongAs, inner: sdk.Task) -> None:
         super().__init__(site, inner)
         self.watched = sdk.Watched.of(options.value)
-
-    def begin(self) -> int:
-        """Evaluate the condition for the first time."""
-        return self.proceed()
 
     def proceed(self) -> int:
         """Evaluate the condition, then continue."""
@@ -417,10 +409,6 @@ class SaveTask(sdk.Decorator):
     def __init__(self, site: sdk.Site, options: Save, inner: sdk.Task) -> None:
         super().__init__(site, inner)
         self.name = options.kept_as.text
-
-    def begin(self) -> int:
-        """Start the task inside."""
-        return self.proceed()
 
     def proceed(self) -> int:
         """Continue, and keep the result at the end."""

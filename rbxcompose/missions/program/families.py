@@ -185,11 +185,8 @@ class GroupStep(Step):
     """A node that does nothing by itself: its children do the work, and see what it sees."""
 
     __slots__ = ()
-
-    @property
-    def only_asks(self) -> bool:
-        """Return False: it decides more than the answer to a condition."""
-        return False
+    only_asks = False  # it decides more than the answer to a condition
+    has_result = False  # only its children have results
 
     def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
         """Return nothing: its children see what it sees."""
@@ -210,11 +207,6 @@ class GroupStep(Step):
     ) -> Iterator[Possibility]:
         """Yield nothing: there is one way through it, or how often it repeats depends on data."""
         yield from ()
-
-    @property
-    def has_result(self) -> bool:
-        """Return False: only its children have results."""
-        return False
 
 
 class Straight(GroupStep):
@@ -512,6 +504,10 @@ class Decorator(Task):
     def __init__(self, site: Site, inner: Task) -> None:
         super().__init__(site)
         self.inner = inner
+
+    def begin(self) -> int:
+        """Start the task inside."""
+        return self.proceed()
 
     def suspend(self, from_start: bool) -> bool:
         """Start again together with a leaf that starts again."""

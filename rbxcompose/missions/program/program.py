@@ -184,15 +184,12 @@ class Endings(Protocol):
     @property
     def constants(self) -> Mapping[str, Value]:
         """Return the data that nothing changes."""
-        ...
 
     def of(self, number: int, /) -> Outcomes:
         """Return how a node may end, its modifiers included."""
-        ...
 
     def of_mission(self, name: str, /) -> Outcomes:
         """Return how another mission may end."""
-        ...
 
 
 class Step(Declared, ABC):
@@ -401,6 +398,11 @@ class MissionNode:
     def may_be_left_out(self) -> bool:
         """Return whether a modifier may keep it from starting."""
         return any(modifier.may_skip for modifier in self.modifiers.values())
+
+    @property
+    def comes_again(self) -> bool:
+        """Return whether it may run its children, or a modifier it, more than once."""
+        return self.step.comes_again or any(modifier.repeats for modifier in self.modifiers.values())
 
     @property
     def is_forgiven(self) -> bool:
