@@ -152,7 +152,7 @@ def _inside(node: TreeNode, wanted: Type, what: str) -> Iterator[Finding]:
         try:
             typed(node, wanted)
         except WrongValue as error:
-            yield wrong_argument.at(node.span, f"{what} {error.message}", label=error.label, help=error.help)
+            yield error.finding(wrong_argument, node.span, what)
 
 
 FITTING = {  # the types of expressions that fit a field, by its ROS type; all others are numbers
@@ -303,8 +303,7 @@ def _given(view: View, name: str, program: Program) -> Iterator[Finding]:
             try:
                 typed(argument.value, wanted)
             except WrongValue as error:
-                message = f"the input '{argument.name}' {error.message}"
-                yield WRONG_INPUT.at(argument.value.span, message, label=error.label, help=error.help)
+                yield error.finding(WRONG_INPUT, argument.value.span, f"the input '{argument.name}'")
 
 
 def _missing_input(view: View, mission: str, program: Program) -> Iterator[Finding]:

@@ -107,8 +107,7 @@ def _given(declared: Input, entry: Entry, findings: list[Finding]) -> Datum | No
     try:
         datum = typed(entry.value, declared.type)
     except WrongValue as error:
-        message = f"the input '{declared.name}' {error.message}"
-        findings.append(codes.WRONG_INPUT.at(span, message, label=error.label, help=error.help))
+        findings.append(error.finding(codes.WRONG_INPUT, span, f"the input '{declared.name}'"))
         return None
     if trouble := range_trouble(declared, datum):
         findings.append(codes.WRONG_INPUT.at(span, f"the input '{declared.name}' {trouble}"))

@@ -13,6 +13,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.values import NOT_ARRIVED, Value
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Refused
+from rbxcompose.missions.analysis.examined import claims_of
 from rbxcompose.missions.engine import logbook
 from rbxcompose.missions.engine.debugger import named
 from rbxcompose.missions.engine.engine import Engine
@@ -25,7 +26,7 @@ from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.world import PLAIN, POSE, Settings, World
 from rbxcompose.missions.execution.world import RobotWorld
 from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING, Result
-from rbxcompose.missions.program.program import Program, RobotNames, Skill
+from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.view.picture import Drawn, heading_of, picture_of
 from rbxcompose.missions.view.replica import Mirror
 from rbxcompose.msgs.rbxcompose_msgs import RunMission
@@ -125,7 +126,7 @@ class MissionRun:
         world, self.robot = make(self._ended, self._said)
         self.log = LoggedWorld(world, lambda record: write(self._placed(record)))
         self.engine = Engine(program, names, inputs, self.log, settings)
-        self.claims = claims_of(self.engine.program, self.engine.robot.skills)  # parts of the robot, exclusively
+        self.claims = claims_of(self.engine.program, self.engine.robot)  # parts of the robot, exclusively
         self.mirror = Mirror(self.engine)
         self._states = (names.values.keys() | {POSE}) - names.events
         self._inputs, self._settings = inputs, settings
@@ -253,7 +254,7 @@ class MissionRun:
         self.robot.renumber(found.requests)
         self.story.renumber(found.nodes)
         self.engine, self._inputs = engine, engine.inputs
-        self.claims = claims_of(engine.program, engine.robot.skills)
+        self.claims = claims_of(engine.program, engine.robot)
         self.mirror = Mirror(engine, self.mirror.version)
         self._states = (engine.robot.values.keys() | {POSE}) - engine.robot.events
         for cached in ("_drawn", "_sentences"):
@@ -354,12 +355,6 @@ class MissionRun:
             )
         if text:
             self._on_line(level, text)
-
-
-def claims_of(program: Program, skills: Mapping[str, Skill]) -> frozenset[str]:
-    """Return the parts of the robot that the skills of a linked mission need exclusively."""
-    used = {node.skill for node in program.nodes}
-    return frozenset(skills[name].claims for name in used if name in skills and skills[name].claims)
 
 
 Order = ServedGoal[RunMission.Goal, RunMission.Result, RunMission.Feedback]

@@ -11,6 +11,7 @@ from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Query, Refused
+from rbxcompose.missions.analysis.examined import claims_of
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.exchange import Exchanged
 from rbxcompose.missions.engine.inputs import NoSuchState, bind_texts, start_at
@@ -20,7 +21,7 @@ from rbxcompose.missions.engine.snapshot import from_plain
 from rbxcompose.missions.engine.world import PLAIN, Observer, Settings, show
 from rbxcompose.missions.execution.debugging import Breakpoints
 from rbxcompose.missions.execution.equipment import MissionConfig
-from rbxcompose.missions.execution.mission_run import LeftMission, LogStore, MakeWorld, MissionRun, claims_of
+from rbxcompose.missions.execution.mission_run import LeftMission, LogStore, MakeWorld, MissionRun
 from rbxcompose.missions.execution.requests import (
     ListedInput,
     ListedMission,
@@ -126,7 +127,7 @@ class RunningMissions:
         """
         found = [followed for run in self if (followed := self._followed(run, equipment)) is not None]
         claims = {run.name: run.claims for run in self}
-        now = {**claims, **{one.run.name: claims_of(one.engine.program, equipment.names.skills) for one in found}}
+        now = {**claims, **{one.run.name: claims_of(one.engine.program, equipment.names) for one in found}}
         for name, other in combinations(claims, 2):
             if common := sorted((now[name] & now[other]) - (claims[name] & claims[other])):
                 raise Refused(f"missions {name} and {other} run, and both would use {' and '.join(common)}")
@@ -249,7 +250,7 @@ class RunningMissions:
 
     def _listed(self, name: str, program: Program) -> ListedMission:
         run, names = self.runs.get(name), self._equipment.names
-        claims = sorted(claims_of(link(program, names.missions), names.skills)) if name in names.missions else []
+        claims = sorted(claims_of(program, names)) if name in names.missions else []
         inputs = tuple(map(_listed_input, program.inputs.values()))
         states = program.nodes[program.main].step.states
         starts = states.names if states else ()
@@ -287,7 +288,7 @@ class RunningMissions:
 
     def _clashes(self, linked: Program, lent: frozenset[str]) -> Iterator[tuple[MissionRun, list[str]]]:
         """Yield the running missions that need parts of the robot that a mission needs as well, each with these."""
-        wanted = claims_of(linked, self._equipment.names.skills) - lent
+        wanted = claims_of(linked, self._equipment.names) - lent
         for other in self:
             if common := sorted(wanted & other.claims):
                 yield other, common

@@ -16,7 +16,7 @@ from rbxcompose.base.expressions.types import (
     quantity_of,
 )
 from rbxcompose.base.expressions.values import Value
-from rbxcompose.base.findings import DID_YOU_MEAN, surely_meant
+from rbxcompose.base.findings import DID_YOU_MEAN, Finding, FindingKind, Span, surely_meant
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import NUMBER, Quantity, UnitError, parse_quantity, to_si
 from rbxcompose.manifest.scalars import describe, plain_value
@@ -33,6 +33,10 @@ class WrongValue(ValueError):  # noqa: N818 - a user's mistake, told apart from 
         self.message = message
         self.label = label
         self.help = help
+
+    def finding(self, kind: FindingKind, span: Span, what: str) -> Finding:
+        """Return the finding on this value; `what` is the subject of its message."""
+        return kind.at(span, f"{what} {self.message}", label=self.label, help=self.help)
 
 
 def literal(node: TreeNode) -> Datum:

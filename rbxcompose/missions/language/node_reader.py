@@ -89,13 +89,34 @@ def read_expression(scalar: ScalarNode, nodes: Nodes, wanted: Type = FLAG) -> Ex
         return None
 
 
-class ValueReader:
-    """The values of one mapping of a mission: `key` is the word of its kind, or the name of its skill."""
+_FLOW_HELP = "inside '{}', commas and colons separate: put quotes around the condition, or write it in block style"
 
-    def __init__(self, mapping: MappingNode, key: str, nodes: Nodes) -> None:
+
+def _part_of(scalar: ScalarNode, slot: TextSlot) -> ScalarNode:
+    return ScalarNode(f"${slot.path}", inner_span(scalar, slot.start, slot.end))
+
+
+def unknown_keys(mapping: MappingNode, keys: Iterable[str], where: str, of: str = "") -> Iterator[Finding]:
+    """Yield the findings on keys of a map that mean nothing there; `of` is what has these keys, if not that place."""
+    for key, entry in mapping.entries.items():
+        if key not in keys:
+            message, what = f"unknown key '{key}' in {where}", f"keys of {of or where}"
+            yield codes.UNKNOWN_KEY.misspelt(entry.key.span, message, key, keys, what, taken=mapping.entries)
+
+
+class NodeReader:
+    """Reads one mapping of a mission, with the nodes below it.
+
+    `key` is the word of its kind, or the name of its skill.
+    """
+
+    def __init__(self, mapping: MappingNode, key: str, number: int, nodes: Nodes) -> None:
         self.mapping = mapping
         self.key = key
+        self.number = number
         self.nodes = nodes
+        self.children: list[int] = []
+        self.item = ""
         self.asked: list[Asked] = []
         self.names: tuple[str, ...] = ()  # of the branches
 
@@ -229,23 +250,6 @@ class ValueReader:
             self.add(codes.NOT_A_CHOICE.misspelt(scalar.span, message, scalar.text, branches, "its branches"))
         return scalar
 
-
-_FLOW_HELP = "inside '{}', commas and colons separate: put quotes around the condition, or write it in block style"
-
-
-def _part_of(scalar: ScalarNode, slot: TextSlot) -> ScalarNode:
-    return ScalarNode(f"${slot.path}", inner_span(scalar, slot.start, slot.end))
-
-
-class NodeReader(ValueReader):
-    """Reads one mapping of a mission, with the nodes below it."""
-
-    def __init__(self, mapping: MappingNode, key: str, number: int, nodes: Nodes) -> None:
-        super().__init__(mapping, key, nodes)
-        self.number = number
-        self.children: list[int] = []
-        self.item = ""
-
     def map_of(self, key: str, what: str) -> MappingNode | None:
         """Return an option that must be a map with entries; None, with a finding, if it is not."""
         value = self.mapping.get(key)
@@ -257,11 +261,8 @@ class NodeReader(ValueReader):
 
     def inside(self, mapping: MappingNode, keys: Iterable[str], what: str) -> NodeReader:
         """Return a reader of a map below this node; unknown keys are findings."""
-        for key, entry in mapping.entries.items():
-            if key not in keys:
-                message, of = f"unknown key '{key}' in {what}", f"keys of {what}"
-                taken = mapping.entries
-                self.add(codes.UNKNOWN_KEY.misspelt(entry.key.span, message, key, keys, of, taken=taken))
+        for finding in unknown_keys(mapping, keys, what):
+            self.add(finding)
         return NodeReader(mapping, self.key, self.number, self.nodes)
 
     def child_node(self, node: TreeNode, step: str) -> None:

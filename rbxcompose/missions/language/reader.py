@@ -24,7 +24,7 @@ from rbxcompose.missions.language.literals import (
     typed,
     with_held,
 )
-from rbxcompose.missions.language.node_reader import NAME, NAME_HELP, NodeReader, Nodes, invalid_name
+from rbxcompose.missions.language.node_reader import NAME, NAME_HELP, NodeReader, Nodes, invalid_name, unknown_keys
 from rbxcompose.missions.program import program
 from rbxcompose.missions.program.linker import TOO_MUCH
 from rbxcompose.missions.program.parts import STATE, Asked, Datum, Input
@@ -79,12 +79,7 @@ def _input(name: str, entry: Entry, report: Report) -> Input:
         message = f"the input '{name}' needs its 'type' below it"
         report.add(codes.WRONG_SHAPE.at(value.span, message, help="give 'type' and perhaps 'default'"))
         return Input(name, UNKNOWN, place, is_sound=False)
-    for key, unknown in value.entries.items():
-        if key not in INPUT_KEYS:
-            message, taken = f"unknown key '{key}' in the input '{name}'", value.entries
-            report.add(
-                codes.UNKNOWN_KEY.misspelt(unknown.key.span, message, key, INPUT_KEYS, "keys of an input", taken=taken)
-            )
+    report.extend(unknown_keys(value, INPUT_KEYS, f"the input '{name}'", "an input"))
     if (wanted := _type(name, value, entry, report)) is None:
         return Input(name, UNKNOWN, place, is_sound=False)
     default, least, most = (_value(value.get(key), wanted, f"'{key}'", report) for key in ("default", "min", "max"))
@@ -124,7 +119,7 @@ def _value(node: TreeNode | None, wanted: Type, what: str, report: Report) -> Da
     try:
         return typed(node, wanted)
     except WrongValue as error:
-        report.add(codes.WRONG_TYPE.at(node.span, f"{what} {error.message}", label=error.label, help=error.help))
+        report.add(error.finding(codes.WRONG_TYPE, node.span, what))
         return None
 
 
@@ -214,12 +209,7 @@ def read_program(
         return None
     repairs = Repairs.of(report, skills)
     whole, root = root, repairs.mission(root)
-    for name, entry in root.entries.items():
-        if name not in KEYS:
-            message = f"unknown key '{name}' in a mission"
-            report.add(
-                codes.UNKNOWN_KEY.misspelt(entry.key.span, message, name, KEYS, "keys of a mission", taken=root.entries)
-            )
+    report.extend(unknown_keys(root, KEYS, "a mission"))
     is_open = _is_open(root)
     root = with_keys(root, misspelt_keys(root, KEYS))
     inputs, data = read_inputs(root.get("inputs"), report), read_data(root.get("data"), report)
@@ -332,11 +322,7 @@ class _Reader:
         self.paths.append(f"{self.paths[-1]}.{name}")
         state = all_kinds()[STATE]
         self.nodes[number] = self.read(NodeReader(mapping, name, number, self), state, parent, name, entry.key.span)
-        for key, one in mapping.entries.items():
-            if key not in (*STATE_KEYS, *modifier_keys()):
-                message, what = f"unknown key '{key}' in the state '{name}'", "keys of a state"
-                valid, taken = (*STATE_KEYS, *modifier_keys()), mapping.entries
-                self.add(codes.UNKNOWN_KEY.misspelt(one.key.span, message, key, valid, what, taken=taken))
+        self.report.extend(unknown_keys(mapping, (*STATE_KEYS, *modifier_keys()), f"the state '{name}'", "a state"))
         self.paths.pop()
         return number
 
@@ -470,11 +456,7 @@ class _Reader:
         if not isinstance(value, MappingNode):
             self.add(codes.WRONG_SHAPE.at(value.span, f"the interrupt '{name}' needs 'when' and 'do'"))
             return None
-        for key, unknown in value.entries.items():
-            if key not in INTERRUPT_KEYS:
-                message, what = f"unknown key '{key}' in the interrupt '{name}'", "keys of an interrupt"
-                taken = value.entries
-                self.add(codes.UNKNOWN_KEY.misspelt(unknown.key.span, message, key, INTERRUPT_KEYS, what, taken=taken))
+        self.report.extend(unknown_keys(value, INTERRUPT_KEYS, f"the interrupt '{name}'", "an interrupt"))
         reader = NodeReader(value, "when", len(self.nodes), self)
         if "when" not in value:
             self.add(codes.MISSING.at(entry.key.span, f"the interrupt '{name}' needs 'when': a condition"))
