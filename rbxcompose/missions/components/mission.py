@@ -10,18 +10,8 @@ from typing import TYPE_CHECKING, Any
 from rbxcompose.base.requests import Command
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
 from rbxcompose.missions.engine.world import POSE, World
-from rbxcompose.missions.execution import requests
-from rbxcompose.missions.execution.equipment import (
-    ENDS,
-    EVENTS,
-    PUBLISHES,
-    TRIGGER,
-    VALUE,
-    MissionConfig,
-    port_name,
-    ports_for,
-    ports_of_triggers,
-)
+from rbxcompose.missions.execution import equipment, requests
+from rbxcompose.missions.execution.equipment import MissionConfig
 from rbxcompose.missions.program.outcomes import IDLE, Result
 from rbxcompose.msgs.rbxcompose_msgs import RunMission
 from rbxcompose.msgs.std_msgs import String
@@ -64,7 +54,7 @@ class Mission(Component[MissionConfig]):
     def ports(cls, config: MissionConfig) -> dict[str, Port[Any]]:
         """Return a port for each used value, skill, topic and service, and for the pose if missions read it."""
         runs = {RUN: ServesAction(RunMission, RUN, skill=None).named(RUN)} if config.for_others else {}
-        return ports_for(config) | ports_of_triggers(config.triggers.values()) | runs
+        return equipment.ports_for(config) | equipment.ports_of_triggers(config.triggers.values()) | runs
 
     @classmethod
     def capabilities(cls, config: MissionConfig) -> tuple[Capability, ...]:
@@ -190,13 +180,13 @@ class Mission(Component[MissionConfig]):
 
     def received(self, port: str, message: Any) -> None:
         """Take a value and wake the missions that read it; or take the outcome of an order."""
-        if port.startswith(ENDS):
+        if port.startswith(equipment.ENDS):
             self.desks.ended(port, message)
             return
-        if port.startswith(TRIGGER):
-            self.triggering.message(port.removeprefix(TRIGGER))
+        if port.startswith(equipment.TRIGGER):
+            self.triggering.message(port.removeprefix(equipment.TRIGGER))
             return
-        name = port.removeprefix(VALUE)
+        name = port.removeprefix(equipment.VALUE)
         wrong = self.arrivals.take(name, message, self.now)
         if wrong and name not in self.misfits:
             self.misfits.add(name)
@@ -576,7 +566,7 @@ class Mission(Component[MissionConfig]):
         from rbxcompose.missions.engine.logbook import INPUTS
 
         if record["event"] not in INPUTS:
-            self.bound[port_name(PUBLISHES, EVENTS)](String(data=json.dumps(record)))
+            self.bound[equipment.port_name(equipment.PUBLISHES, equipment.EVENTS)](String(data=json.dumps(record)))
 
     def running_text(self) -> str:
         """Return the running missions in words."""

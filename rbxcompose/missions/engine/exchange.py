@@ -64,7 +64,7 @@ class _Exchange:
         self.old_tasks, self.new_tasks = _by_node(old.tasks), _by_node(new.tasks)
         self.counterparts = dict(self._counterparts())
         self.running = {task for above in old.tasks for task in above.running()} | {
-            course.current for run in old.runs for course in _courses(run) if course.current is not None
+            course.current for run in old.runs for course in run.courses if course.current is not None
         }
         self.restarted = frozenset(self._restarted())
         self.astray: set[Task] = set()  # those that kept their place at something that is gone
@@ -231,13 +231,9 @@ class _Exchange:
                 task.current, task.index = self._running(child), node.children.index(child)
         self.new.statuses[number] = RUNNING
 
-    def _stands_for(self, number: int) -> int | None:
-        """Return the node before of a node, or of the one that it was put around."""
-        return self.pairing.around.get(number, self.before.get(number))
-
     def _moved(self, number: int) -> MovedChildren:
         new, old = self.new.program.nodes[number].children, self.old.program.nodes[self.before[number]].children
-        came_from = {child: self._stands_for(child) for child in new}
+        came_from = {child: self.pairing.around.get(child, self.before.get(child)) for child in new}
         lists = {now: before for before, now in self.pairing.opened.items()}
         places = {child: lists.get(child, before) for child, before in came_from.items()}
         moved = {old.index(before): at for at, child in enumerate(new) if (before := places[child]) in old}
@@ -297,10 +293,6 @@ def _by_node(tasks: Sequence[Task]) -> Mapping[int, list[Task]]:
     for task in tasks:
         found[task.number].append(task)
     return found
-
-
-def _courses(run: Run) -> tuple[Course, ...]:
-    return (run.mission, *run.reactions)
 
 
 def _inner_runs(engine: Engine) -> Mapping[int, Run]:

@@ -150,12 +150,10 @@ def _on_line(program: Program, file: str, line: int) -> tuple[NodeAddress, ...]:
     found = [spot for spot in found if spot.outcome is not None or above[spot.node] not in starts]
     if not found:
         lines = sorted(sorted({spot.span.line for spot in spots}), key=lambda other: abs(other - line))[:_MOST]
-        raise NotPossible(f"nothing begins in line {line} of '{file}'; lines near it are {_listed(sorted(lines))}")
+        raise NotPossible(
+            f"nothing begins in line {line} of '{file}'; lines near it are {', '.join(map(str, sorted(lines)))}"
+        )
     return tuple(found)
-
-
-def _listed(lines: list[int]) -> str:
-    return ", ".join(map(str, lines))
 
 
 def _spots(program: Program) -> Iterator[NodeAddress]:

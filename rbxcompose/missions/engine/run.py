@@ -128,6 +128,11 @@ class Run(RunBase):
         self.returns: list[tuple[int, ...]] = []  # the leaves that each reaction of the stack halted
         self.keepers: list[WithHistory] = []  # the tasks of the main node that can keep a place
 
+    @property
+    def courses(self) -> tuple[Course, ...]:
+        """Return the mission proper and its reactions."""
+        return (self.mission, *self.reactions)
+
     def begin(self, inputs: Mapping[str, Value]) -> None:
         """Start afresh: initial data, nothing runs, every interrupt is armed."""
         self.inputs.clear()
@@ -142,7 +147,7 @@ class Run(RunBase):
     def begin_again(self) -> None:
         """Start again with the current data; nodes that keep their place resume there."""
         self.stack[:], self.returns[:] = [self.mission], []
-        for course in (self.mission, *self.reactions):
+        for course in self.courses:
             course.restart()
         for reaction in self.reactions:
             reaction.is_armed = True

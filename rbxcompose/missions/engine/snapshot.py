@@ -14,7 +14,7 @@ from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.printable import plain as plain_text
 from rbxcompose.missions.engine.build import Since
 from rbxcompose.missions.engine.engine import Engine
-from rbxcompose.missions.engine.run import Course, Run
+from rbxcompose.missions.engine.run import Run
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.language.literals import HeldNode
 from rbxcompose.missions.program.outcomes import Result
@@ -115,7 +115,7 @@ def _task(task: Task, engine: Engine) -> list[Any]:
 
 
 def _run(run: Run) -> dict[str, Any]:
-    courses: list[Course] = [run.mission, *run.reactions]
+    courses = run.courses
     return {
         **{name: getattr(run, name) for name in OF_RUN},
         "data": to_plain(run.data),
@@ -128,7 +128,7 @@ def _run(run: Run) -> dict[str, Any]:
 
 
 def _restore_run(run: Run, state: Mapping[str, Any]) -> None:
-    courses: list[Course] = [run.mission, *run.reactions]
+    courses = run.courses
     for name in OF_RUN:
         setattr(run, name, state[name])
     for held, name in ((run.data, "data"), (run.inputs, "inputs")):

@@ -19,18 +19,10 @@ from rbxcompose.missions.engine.interventions import NotPossible
 from rbxcompose.missions.engine.logbook import LogRecord
 from rbxcompose.missions.engine.snapshot import from_plain
 from rbxcompose.missions.engine.world import PLAIN, Observer, Settings, show
+from rbxcompose.missions.execution import requests
 from rbxcompose.missions.execution.debugging import Breakpoints
 from rbxcompose.missions.execution.equipment import MissionConfig
 from rbxcompose.missions.execution.mission_run import LeftMission, LogStore, MakeWorld, MissionRun
-from rbxcompose.missions.execution.requests import (
-    ListedInput,
-    ListedMission,
-    ListMissions,
-    LogPart,
-    LookAtAll,
-    PictureData,
-    Seen,
-)
 from rbxcompose.missions.execution.snapshots import differences, identity_of
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.outcomes import IDLE, NAMES
@@ -193,7 +185,7 @@ class RunningMissions:
         self.runs[name].breakpoints = self.breakpoints.of(name)
         return self.runs[name]
 
-    def seen(self, name: str, since: int = 0) -> Seen:
+    def seen(self, name: str, since: int = 0) -> requests.Seen:
         """Return what has changed in a mission since the version that a viewer has; 0 gives the full state.
 
         Raises:
@@ -210,7 +202,7 @@ class RunningMissions:
         main = self._begun(name).engine.main
         return {name: main.show(name, value) for name, value in main.data.items()}
 
-    def picture(self, name: str) -> PictureData:
+    def picture(self, name: str) -> requests.PictureData:
         """Return the picture of a mission, as data; of one that has not been running, as it would run.
 
         Raises:
@@ -244,22 +236,24 @@ class RunningMissions:
             raise Refused(f"no mission is {word}")
         raise Refused(f"several missions are {word}: {', '.join(run.name for run in found)}; name one")
 
-    def listed(self) -> tuple[ListedMission, ...]:
+    def listed(self) -> tuple[requests.ListedMission, ...]:
         """Return all missions of the robot with their states."""
         return tuple(self._listed(name, program) for name, program in self._equipment.programs.items())
 
-    def _listed(self, name: str, program: Program) -> ListedMission:
+    def _listed(self, name: str, program: Program) -> requests.ListedMission:
         run, names = self.runs.get(name), self._equipment.names
         claims = sorted(claims_of(program, names)) if name in names.missions else []
         inputs = tuple(map(_listed_input, program.inputs.values()))
         states = program.nodes[program.main].step.states
         starts = states.names if states else ()
         at = ", ".join(stop["place"] for stop in run.stopped_at) if run else ""
-        return ListedMission(name, program.about, run.state if run else NAMES[IDLE], tuple(claims), inputs, starts, at)
+        return requests.ListedMission(
+            name, program.about, run.state if run else NAMES[IDLE], tuple(claims), inputs, starts, at
+        )
 
-    def since(self, number: int) -> LogPart:
+    def since(self, number: int) -> requests.LogPart:
         """Return the records of the log after the first `number`."""
-        return LogPart(self._log.written, self._log.since(number))
+        return requests.LogPart(self._log.written, self._log.since(number))
 
     def _begun(self, name: str) -> MissionRun:
         if name not in self.runs:
@@ -315,7 +309,7 @@ class Broadcast:
     """A window for each mission of a robot."""
 
     def __init__(self, names: Iterable[str], open_window: Open) -> None:
-        self._list = open_window(PATH, ListMissions())
+        self._list = open_window(PATH, requests.ListMissions())
         self._open, self._feeds = open_window, dict[str, MissionFeed]()
         self.follow(names)
 
@@ -323,7 +317,7 @@ class Broadcast:
         """Open windows for missions that have none yet."""
         for name in names:
             if name not in self._feeds:
-                self._feeds[name] = MissionFeed(self._open(f"{PATH}/{name}", LookAtAll(name)))
+                self._feeds[name] = MissionFeed(self._open(f"{PATH}/{name}", requests.LookAtAll(name)))
 
     def publish(self, missions: RunningMissions) -> None:
         """Publish what has changed; nothing is prepared without a viewer."""
@@ -357,12 +351,12 @@ class MissionFeed:
         self._window.put(fresh)
 
 
-def _picture(engine: Engine) -> PictureData:
+def _picture(engine: Engine) -> requests.PictureData:
     return picture_to_data(picture_of(engine.program, engine.robot))
 
 
-def _listed_input(given: Input) -> ListedInput:
+def _listed_input(given: Input) -> requests.ListedInput:
     choices = ("false", "true") if given.type == FLAG else given.type.choices
-    return ListedInput(
+    return requests.ListedInput(
         given.name, given.type.detail, choices, None if given.default is None else show(given.type, given.default.value)
     )

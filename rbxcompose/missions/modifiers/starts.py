@@ -73,30 +73,15 @@ class Entering(sdk.Acting):
 class ConditionalTask(sdk.Decorator):
     """Evaluates a condition once, before the node starts."""
 
-    __slots__ = ("condition",)
-    skips_if: ClassVar[bool]
+    __slots__ = ("condition", "skips_if")
 
     def __init__(self, site: sdk.Site, options: Conditional, inner: sdk.Task) -> None:
         super().__init__(site, inner)
-        self.condition = options.value
+        self.condition, self.skips_if = options.value, options.skips_if
 
     def begin(self) -> int:
         """Evaluate the condition once."""
         return sdk.SKIPPED if sdk.holds(self.condition, self.scope) == self.skips_if else self.advance(self.inner)
-
-
-class OnlyIfTask(ConditionalTask):
-    """Continues if the condition holds."""
-
-    __slots__ = ()
-    skips_if = False
-
-
-class SkipIfTask(ConditionalTask):
-    """Continues if the condition does not hold."""
-
-    __slots__ = ()
-    skips_if = True
 
 
 @sdk.dataclass(frozen=True, slots=True)
@@ -106,9 +91,10 @@ class Conditional(sdk.Skipping):
     value: sdk.Expression = sdk.condition()
 
     serves = sdk.ModifierScope.ALL
+    skips_if: ClassVar[bool]
 
 
-@sdk.modifier("only_if", OnlyIfTask)
+@sdk.modifier("only_if", ConditionalTask)
 class OnlyIf(Conditional):
     """Start only if the condition holds, else be skipped.
 
@@ -119,10 +105,11 @@ class OnlyIf(Conditional):
     """
 
     __slots__ = ()
+    skips_if = False
     clause = sdk.says("only if {value:if}")
 
 
-@sdk.modifier("skip_if", SkipIfTask)
+@sdk.modifier("skip_if", ConditionalTask)
 class SkipIf(Conditional):
     """Be skipped if the condition holds.
 
@@ -133,6 +120,7 @@ class SkipIf(Conditional):
     """
 
     __slots__ = ()
+    skips_if = True
     clause = sdk.says("not if {value:if}")
 
 
@@ -214,11 +202,10 @@ class CooldownTask(CountingTask):
 
     def begin(self) -> int:
         """Start if that time has passed, or if the node has not ended yet."""
-        is_cooling = self.has_ended and not self.engine.has_gone_by(self._seconds(), self.ended_at)
+        is_cooling = self.has_ended and not self.engine.has_gone_by(
+            self.number_of(self.duration, "'cooldown'"), self.ended_at
+        )
         return sdk.SKIPPED if is_cooling else self.proceed()
-
-    def _seconds(self) -> float:
-        return self.number_of(self.duration, "'cooldown'")
 
 
 @sdk.modifier("cooldown", CooldownTask)

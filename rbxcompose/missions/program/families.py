@@ -138,7 +138,28 @@ def ends(outcomes: Outcomes) -> Any:
     return may_end
 
 
-class LeafStep(Step):
+class Quiet(Step):
+    """A kind that by itself shows its children no names, changes nothing, and does nothing that tests should cover."""
+
+    __slots__ = ()
+
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
+        """Yield nothing: what is around it covers whether it starts, and how often it repeats depends on data."""
+        yield from ()
+
+    def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
+        """Return nothing: its children, if it has any, see what it sees."""
+        return {}
+
+    @property
+    def effects(self) -> NodeEffects:
+        """Return no effects."""
+        return NO_EFFECTS
+
+
+class LeafStep(Quiet):
     """A node without children: it does one thing once."""
 
     __slots__ = ()
@@ -149,21 +170,6 @@ class LeafStep(Step):
 
     def endless(self, ends: Outcomes) -> None:
         """Return nothing: it runs once."""
-
-    def possibilities(
-        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
-    ) -> Iterator[Possibility]:
-        """Yield nothing: the nodes around it cover whether it starts."""
-        yield from ()
-
-    def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
-        """Return nothing: it has no children."""
-        return {}
-
-    @property
-    def effects(self) -> NodeEffects:
-        """Return no effects."""
-        return NO_EFFECTS
 
     @property
     @abstractmethod
@@ -181,32 +187,17 @@ class Deed(LeafStep):
     lasts = None
 
 
-class GroupStep(Step):
+class GroupStep(Quiet):
     """A node that does nothing by itself: its children do the work, and see what it sees."""
 
     __slots__ = ()
     only_asks = False  # it decides more than the answer to a condition
     has_result = False  # only its children have results
 
-    def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
-        """Return nothing: its children see what it sees."""
-        return {}
-
     @property
     def waits(self) -> bool:
         """Return False: only its children take time."""
         return False
-
-    @property
-    def effects(self) -> NodeEffects:
-        """Return no effects."""
-        return NO_EFFECTS
-
-    def possibilities(
-        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
-    ) -> Iterator[Possibility]:
-        """Yield nothing: there is one way through it, or how often it repeats depends on data."""
-        yield from ()
 
 
 class Straight(GroupStep):
