@@ -15,7 +15,7 @@ from rbxcompose.base.expressions.values import NotArrived, Value
 from rbxcompose.base.findings import Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
-from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.analysis.examined import check_program
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.language.reader import read_program

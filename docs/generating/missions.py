@@ -14,9 +14,8 @@ from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.missions.language.fields import Field, first_line
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.reader import INTERRUPT_KEYS
-from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program.goals import skill_of, topic_skill
-from rbxcompose.missions.program.registry import StepType, kinds
+from rbxcompose.missions.program.registry import StepType, kinds, modifiers
 from rbxcompose.sdk.ports import ServesAction, ServesTopic
 from rbxcompose.sdk.registry import PLUGINS, component_type
 

@@ -84,8 +84,10 @@ def linked(kind: StepType) -> str:
 
 
 def few_words(kind: StepType) -> str:
-    """Return what the first line of a kind's file says of it."""
-    return (inspect.getdoc(inspect.getmodule(kind)) or "").partition(": ")[2].partition("\n")[0].rstrip(".")
+    """Return what the docstring of a kind's file says of it."""
+    lines = (inspect.getdoc(inspect.getmodule(kind)) or "").splitlines()
+    said = dict(line.partition(": ")[::2] for line in lines)
+    return said[code(kind.name)].rstrip(".")
 
 
 TABLES: Mapping[str, Callable[[], str]] = {

@@ -63,7 +63,7 @@ def kind_of(code: str) -> FindingKind | None:
 def all_kinds() -> dict[str, FindingKind]:
     """Import every module that declares a kind of finding, including those of plug-ins, and return all by code."""
     from rbxcompose.compiler.check_runner import all_checks  # which imports the compiler: a page does without
-    from rbxcompose.missions.analysis.check_runner import mission_checks
+    from rbxcompose.missions.analysis.examined import mission_checks
 
     for module in dict.fromkeys(module for module, _ in declared()):
         importlib.import_module(module)

@@ -11,8 +11,7 @@ from rbxcompose.compiler.doubts import Doubts, doubts_of, half_read
 from rbxcompose.compiler.model.robot import NOTHING, Robot
 from rbxcompose.manifest.registry import PLUGINS as SECTIONS
 from rbxcompose.manifest.registry import section_named
-from rbxcompose.missions.analysis.check_runner import mission_checks
-from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.analysis.examined import Examined, mission_checks
 
 Check = Rule[Robot]
 Find = Callable[[Robot], Iterable[Finding]]

@@ -9,11 +9,9 @@ from rbxcompose.base.expressions.values import NotArrivedError, Value
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.facts import is_simple, is_sure, takes_time
 from rbxcompose.missions.engine.events import Logged, Reported, SkillEnded, SkillStarted, Transition
-from rbxcompose.missions.engine.instant_actions import act, act_safely, fields_of
-from rbxcompose.missions.engine.leaf import Leaf
-from rbxcompose.missions.engine.task import MovedChildren, Site, Task
+from rbxcompose.missions.engine.instant_actions import PLACED, Getter, act, act_safely, fields_of, getter, place
+from rbxcompose.missions.engine.task import Leaf, MovedChildren, Site, Task
 from rbxcompose.missions.engine.world import Watched
-from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.language.fields import (
     assignments,
     branch,
@@ -44,29 +42,29 @@ from rbxcompose.missions.language.fields import (
 )
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.language.written import PLACED, Getter, getter, place
-from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.answers import (
-    LEVELS,
-    NO_EFFECTS,
-    PLAIN,
-    Advice,
-    Form,
-    ModifierScope,
-    NodeEffects,
-    NodeFlow,
-    NodeLook,
-    Possibility,
-    Skipped,
-    WrittenSetting,
-    ended,
-    led,
-    started,
+from rbxcompose.missions.program.families import (
+    RANDOM,
+    Acting,
+    Choosing,
+    Decorator,
+    Deed,
+    GroupStep,
+    InTurn,
+    InTurnTask,
+    LeafStep,
+    Loop,
+    Plain,
+    Skipping,
+    Straight,
+    WithHistory,
+    argument_in_words,
+    ends,
+    logged_in_words,
+    says,
+    set_in_words,
+    spoken,
+    times_in_words,
 )
-from rbxcompose.missions.program.families import Choosing, Deed, GroupStep, LeafStep, Loop, Straight, ends
-from rbxcompose.missions.program.in_turn import RANDOM, InTurn, InTurnTask, WithHistory
-from rbxcompose.missions.program.machines import MessageTemplate
-from rbxcompose.missions.program.modifier import Acting, Modifier, Plain, Skipping
 from rbxcompose.missions.program.outcomes import (
     ALWAYS_FAILS,
     ALWAYS_SUCCEEDS,
@@ -85,13 +83,24 @@ from rbxcompose.missions.program.outcomes import (
     Result,
     either,
 )
-from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames, Step, Target
-from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.sentences import (
-    argument_in_words,
-    logged_in_words,
-    says,
-    set_in_words,
-    spoken,
-    times_in_words,
+from rbxcompose.missions.program.parts import (
+    LEVELS,
+    NO_EFFECTS,
+    PLAIN,
+    Advice,
+    Form,
+    MessageTemplate,
+    ModifierScope,
+    NodeEffects,
+    NodeFlow,
+    NodeLook,
+    Possibility,
+    Skipped,
+    WrittenArgument,
+    WrittenSetting,
+    ended,
+    led,
+    started,
 )
+from rbxcompose.missions.program.program import Endings, MissionNode, Modifier, RobotNames, Step, Target
+from rbxcompose.missions.program.registry import kind, modifier

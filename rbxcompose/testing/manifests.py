@@ -12,7 +12,7 @@ from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
-from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.analysis.examined import check_program
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.story import MissionStory

@@ -23,14 +23,15 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.model.skills import python_skills
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.missions.engine.inputs import bind_texts
-from rbxcompose.missions.engine.log_replay import (
+from rbxcompose.missions.engine.logbook import (
+    INPUTS,
+    LogRecord,
     OtherInterventionError,
     OtherMissionError,
     ReplayBudget,
     ReplayError,
     replay,
 )
-from rbxcompose.missions.engine.logbook import INPUTS, LogRecord
 from rbxcompose.missions.execution.requests import ListMissions, LookAtAll, settings
 from rbxcompose.missions.program.outcomes import IDLE, NAMES
 from rbxcompose.missions.program.program import Skill

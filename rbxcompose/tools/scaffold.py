@@ -18,8 +18,7 @@ from rbxcompose.base.expressions.values import FUNCTIONS
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.plugins import BrokenPluginError
 from rbxcompose.commands.new_files import ANSWER, NAME, AnswerError, class_name, read_name, read_place, render
-from rbxcompose.missions.modifiers.registry import modifier_keys
-from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.program.registry import kinds, modifier_keys
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.sdk.capabilities import Drives
 from rbxcompose.sdk.component import Component

@@ -9,7 +9,8 @@ import pytest
 from rbxcompose.base.expressions.values import NOT_ARRIVED
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.requests import Command
-from rbxcompose.missions.components.mission import Mission, MissionConfig
+from rbxcompose.missions.components.mission import Mission
+from rbxcompose.missions.execution.equipment import MissionConfig
 from rbxcompose.missions.execution.requests import PauseMission, ResumeMission
 from rbxcompose.sdk import Ended, Outcome, Refused
 from rbxcompose.sdk.component import MissionOver, MissionWaits

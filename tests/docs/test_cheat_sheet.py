@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 
 from rbxcompose.manifest.registry import sections
-from rbxcompose.missions.modifiers.registry import modifiers
-from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.program.registry import kinds, modifiers
 from tests.docs.examples import ROOT
 
 PAGE = (ROOT / "docs/cheat_sheet.md").read_text(encoding="utf-8")

@@ -11,10 +11,9 @@ from rbxcompose.base.expressions.values import FUNCTIONS
 from rbxcompose.base.units import UNITS
 from rbxcompose.manifest.registry import FILES, file_model, sections
 from rbxcompose.manifest.section import ComponentOptions
-from rbxcompose.missions.language.header import INPUT_KEYS
-from rbxcompose.missions.language.reader import INTERRUPT_KEYS, KEYS
-from rbxcompose.missions.modifiers.registry import modifiers
+from rbxcompose.missions.language.reader import INPUT_KEYS, INTERRUPT_KEYS, KEYS
 from rbxcompose.missions.program.program import AFTERWARDS
+from rbxcompose.missions.program.registry import modifiers
 from tests.docs.examples import ROOT
 from tests.loops import for_all
 

@@ -18,8 +18,9 @@ from rbxcompose.compiler.model.skills import python_skills
 from rbxcompose.domains.arms.goals import RANGES, SHARES
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
-from rbxcompose.missions.analysis.effects import sent_by
-from rbxcompose.missions.components.mission import Mission, MissionConfig
+from rbxcompose.missions.analysis.facts import sent_by
+from rbxcompose.missions.components.mission import Mission
+from rbxcompose.missions.execution.equipment import MissionConfig
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.goals import skill_of
 from rbxcompose.missions.program.program import Program, Skill

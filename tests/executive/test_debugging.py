@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from rbxcompose.base.requests import Command, Refused
-from rbxcompose.missions.engine.log_replay import OtherInterventionError, replay
-from rbxcompose.missions.engine.logbook import INPUTS
+from rbxcompose.missions.engine.logbook import INPUTS, OtherInterventionError, replay
 from rbxcompose.missions.execution.requests import (
     CancelMission,
     ClearBreakpoints,

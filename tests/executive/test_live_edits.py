@@ -8,8 +8,8 @@ import pytest
 
 from rbxcompose.base.config import Place, with_values
 from rbxcompose.base.requests import Refused
-from rbxcompose.missions.components.mission import MissionConfig
-from rbxcompose.missions.engine.log_replay import OtherInterventionError, replay
+from rbxcompose.missions.engine.logbook import OtherInterventionError, replay
+from rbxcompose.missions.execution.equipment import MissionConfig
 from rbxcompose.missions.execution.requests import (
     ListBreakpoints,
     ListMissions,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.base.requests import Refused
-from rbxcompose.missions.engine.log_replay import OtherInterventionError, replay
+from rbxcompose.missions.engine.logbook import OtherInterventionError, replay
 from rbxcompose.missions.execution.requests import (
     CancelMission,
     ListMissions,

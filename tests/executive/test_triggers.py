@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.missions.components.mission import MissionConfig
+from rbxcompose.missions.execution.equipment import MissionConfig
 from rbxcompose.missions.execution.requests import CancelMission, ListMissions, ListTriggers, ResumeMission, RunMission
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import Bool, Empty, Float32

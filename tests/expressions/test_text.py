@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from rbxcompose.base.expressions.text import fill, parse_template
 from rbxcompose.base.expressions.tree import ExpressionError
 from rbxcompose.base.expressions.values import NOT_ARRIVED, EvaluationError, NotArrived, NotArrivedError, Value
-from rbxcompose.missions.engine.value_text import show
+from rbxcompose.missions.engine.world import show
 from tests.loops import for_all
 
 

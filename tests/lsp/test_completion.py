@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.manifest.documents import KINDS
-from rbxcompose.missions.modifiers.registry import modifier_keys
+from rbxcompose.missions.program.registry import modifier_keys
 from rbxcompose.tools.lsp.completion import complete
 from rbxcompose.tools.lsp.document import Document
 from tests.loops import for_all

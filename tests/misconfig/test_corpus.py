@@ -9,7 +9,7 @@ import pytest
 
 from rbxcompose.base.findings import KINDS
 from rbxcompose.compiler.check_runner import all_checks
-from rbxcompose.missions.analysis.check_runner import mission_checks
+from rbxcompose.missions.analysis.examined import mission_checks
 from tests.misconfig.corpus import Case, Outcome, cases, described, figures, kinds, outcomes
 from tests.misconfig.page import page, row_start
 from tests.soak import Soak

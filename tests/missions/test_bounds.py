@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.expressions.evaluate import holds
 from rbxcompose.base.expressions.parser import parse
-from rbxcompose.missions.analysis.bounds import Bounds, truth
+from rbxcompose.missions.analysis.facts import Bounds, truth
 from tests.loops import for_all
 
 KNOWN = {"a": Bounds(0.0, 1.0), "b": Bounds(-3.0, 3.0)}

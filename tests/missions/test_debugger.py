@@ -10,7 +10,6 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from rbxcompose.missions.engine.addresses import find
 from rbxcompose.missions.engine.debugger import Probed
 from rbxcompose.missions.engine.events import Intervened, MissionEnded, Stopped
 from rbxcompose.missions.engine.interventions import (
@@ -22,6 +21,7 @@ from rbxcompose.missions.engine.interventions import (
     NotPossible,
     SetBreakpoints,
     TakeStep,
+    find,
 )
 from rbxcompose.missions.program.outcomes import FAILURE, IDLE, RUNNING
 from rbxcompose.missions.program.program import Program

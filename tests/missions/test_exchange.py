@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.exchange import exchange
 from rbxcompose.missions.engine.interventions import NotPossible, SetBreakpoints
-from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.snapshot import save
+from rbxcompose.missions.engine.task import Leaf
 from rbxcompose.missions.program.outcomes import RUNNING
 from rbxcompose.missions.program.program import Program
 from tests.loops import for_all

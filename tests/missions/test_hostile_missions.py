@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.findings import Report, Span
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
-from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.analysis.examined import check_program
 from rbxcompose.missions.language.reader import KEYS, read_program
 from rbxcompose.missions.program.registry import kinds
 from tests.missions.simulated import ROBOT

@@ -12,8 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.missions.engine.log_replay import ReplayBudget, ReplayError, replay
-from rbxcompose.missions.engine.logbook import INPUTS
+from rbxcompose.missions.engine.logbook import INPUTS, ReplayBudget, ReplayError, replay
 from rbxcompose.missions.execution.requests import PauseMission, ResumeMission
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.sdk import Outcome

@@ -6,7 +6,7 @@ import pytest
 
 from rbxcompose.base.findings import Report
 from rbxcompose.base.geometry import Pose2
-from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.analysis.examined import check_program
 from rbxcompose.missions.engine.world import Settings
 from rbxcompose.missions.language.reader import read_program
 from tests.missions.simulated import ROBOT, Simulated, simulate, tree

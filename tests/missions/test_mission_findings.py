@@ -12,7 +12,7 @@ from rbxcompose.commands.formats.text import render_text
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.analysis.examined import check_program
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.testing.golden import Golden

@@ -7,12 +7,11 @@ import pytest
 from rbxcompose.base.findings import Report, Span
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis import examined as claims
-from rbxcompose.missions.analysis.check_runner import check_program
-from rbxcompose.missions.analysis.examined import Ending
+from rbxcompose.missions.analysis.examined import Ending, check_program
 from rbxcompose.missions.analysis.facts import Constants, constants_of
-from rbxcompose.missions.analysis.uses import TOO_MUCH
 from rbxcompose.missions.language import reader
 from rbxcompose.missions.language.reader import MOST_HELD, MOST_WRITTEN, Budget, operators, read_program
+from rbxcompose.missions.program.linker import TOO_MUCH
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, Outcomes
 from rbxcompose.missions.program.program import Program, RobotNames
 from tests.missions.simulated import PLACES, SKILLS, VALUES, program_of, tree

@@ -12,10 +12,9 @@ from rbxcompose.base.expressions.parser import parse
 from rbxcompose.base.expressions.text import condition_in_words, in_words
 from rbxcompose.base.findings import Report
 from rbxcompose.missions.language.reader import read_program
-from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.program.registry import kinds, modifiers
 from rbxcompose.missions.view.picture import MissionPicture, picture_of
 from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.inspection.mission_text import mission_sentences

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rbxcompose.base.config import Place
 from rbxcompose.base.expressions.types import TYPES
 from rbxcompose.base.expressions.values import Value
-from rbxcompose.missions.engine.value_text import show, show_briefly
+from rbxcompose.missions.engine.world import show, show_briefly
 from tests.loops import for_all
 
 

@@ -9,10 +9,9 @@ from rbxcompose.base.fixes import apply, safe_fixes
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
-from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.analysis.examined import check_program
 from rbxcompose.missions.language.reader import read_program
-from rbxcompose.missions.slips.settings import FOREIGN, STEPS
-from rbxcompose.missions.slips.values import ENDLESS, FLAGS
+from rbxcompose.missions.slips.values import ENDLESS, FLAGS, FOREIGN, STEPS
 from rbxcompose.testing.golden import Golden
 from tests.loops import for_all
 from tests.missions.simulated import ROBOT

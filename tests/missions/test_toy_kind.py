@@ -8,7 +8,7 @@ import pytest
 
 from rbxcompose.base.findings import Report
 from rbxcompose.compiler.schema.mission import schemas_of_keys
-from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.analysis.examined import check_program
 from rbxcompose.missions.engine.snapshot import restore, save
 from rbxcompose.missions.engine.world import Settings
 from rbxcompose.missions.language.reader import read_program

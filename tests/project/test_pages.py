@@ -14,7 +14,7 @@ from rbxcompose.commands.finding_pages import FAMILIES, all_kinds, declared, fam
 from rbxcompose.compiler.check_runner import all_checks
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import ROBOT
-from rbxcompose.missions.analysis.check_runner import mission_checks
+from rbxcompose.missions.analysis.examined import mission_checks
 from tests.project.package import modules
 
 pages = cache(generate.pages)

@@ -23,7 +23,7 @@ from rbxcompose.base.expressions.text import fill, parse_template
 from rbxcompose.base.expressions.tree import ExpressionError
 from rbxcompose.base.expressions.types import FLAG, TYPES, UNKNOWN, Type, list_of, map_of
 from rbxcompose.base.expressions.values import NOT_ARRIVED, EvaluationError, NotArrived, NotArrivedError, Value
-from rbxcompose.missions.engine.value_text import show
+from rbxcompose.missions.engine.world import show
 
 MEMORY = 200_000_000  # bytes of address space beyond what the process has at its start
 DEADLINE = 20  # [s] of processor time for a batch of 500, more for more

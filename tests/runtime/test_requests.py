@@ -15,7 +15,7 @@ from rbxcompose.base.requests import Command, Request, answers, as_data, from_da
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.compiler.plan.dump import dump
 from rbxcompose.compiler.plan.model import Instance, Plan
-from rbxcompose.missions.components.mission import MissionConfig
+from rbxcompose.missions.execution.equipment import MissionConfig
 from rbxcompose.missions.execution.requests import ListMissions, PauseMission
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import HostReport

@@ -12,8 +12,7 @@ from rbxcompose.base.expressions.values import FUNCTIONS
 from rbxcompose.commands.new_files import AnswerError
 from rbxcompose.compiler.composition.robot_file import RESERVED
 from rbxcompose.manifest.registry import robot_keys
-from rbxcompose.missions.modifiers.registry import modifier_keys
-from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.program.registry import kinds, modifier_keys
 from rbxcompose.testing import Checked, Golden, check_file, run_robot
 from rbxcompose.tools.scaffold import DOCK, MOST_PLACES, RobotAnswers, read_places, robot_files
 from tests.soak import rare

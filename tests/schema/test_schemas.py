@@ -24,8 +24,7 @@ from rbxcompose.compiler.schema.settle import referred
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.registry import FILES, file_model
 from rbxcompose.manifest.validate import to_plain
-from rbxcompose.missions.modifiers.registry import modifiers
-from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.program.registry import kinds, modifiers
 from rbxcompose.sdk import Component, component
 from rbxcompose.sdk.registry import PLUGINS
 from tests.conftest import ROOT

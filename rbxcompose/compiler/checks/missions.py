@@ -18,12 +18,11 @@ from rbxcompose.compiler.sections.missions import CAUSES, TriggerModel, triggers
 from rbxcompose.manifest.files import files_named
 from rbxcompose.manifest.reader import read_file
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, at
-from rbxcompose.missions.analysis.bounds import Bounds, Known, truth
 from rbxcompose.missions.analysis.examined import Examined, claims_of
-from rbxcompose.missions.analysis.facts import place_in_text, places_taken, shortened, texts_in
+from rbxcompose.missions.analysis.facts import Bounds, Known, place_in_text, places_taken, shortened, texts_in, truth
 from rbxcompose.missions.analysis.travel_times import too_short
-from rbxcompose.missions.language.asked import expression_of, inner_span
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS
+from rbxcompose.missions.program.parts import expression_of, inner_span
 from rbxcompose.missions.program.program import END, Interrupt, Program
 from rbxcompose.missions.triggers.trigger import HALTED, INTERRUPT
 

@@ -15,11 +15,9 @@ from rbxcompose.compiler.check_runner import check, checks_of
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
 from rbxcompose.compiler.model.skills import constants
 from rbxcompose.manifest.tree import ScalarNode, at
-from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.analysis.examined import Examined, check_written
 from rbxcompose.missions.analysis.facts import Constants, constants_of
-from rbxcompose.missions.language.asked import expression_of
-from rbxcompose.missions.language.literals import check_written
-from rbxcompose.missions.program.answers import WrittenSetting
+from rbxcompose.missions.program.parts import WrittenSetting, expression_of
 
 
 @check("RBX3025")

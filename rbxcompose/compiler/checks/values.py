@@ -30,12 +30,10 @@ from rbxcompose.compiler.model.values import condition_of, fitting_kinds
 from rbxcompose.compiler.sections.missions import triggers
 from rbxcompose.compiler.sections.values import ValueModel
 from rbxcompose.manifest.tree import ScalarNode, at, plain_value
-from rbxcompose.missions.analysis.effects import called, published
-from rbxcompose.missions.analysis.facts import Constants, number_of, place_in_text
-from rbxcompose.missions.analysis.scope_types import views
+from rbxcompose.missions.analysis.examined import views
+from rbxcompose.missions.analysis.facts import Constants, called, number_of, place_in_text, published
 from rbxcompose.missions.analysis.travel_times import distance, too_short
-from rbxcompose.missions.language.asked import Asked, inner_span
-from rbxcompose.missions.program.machines import MessageTemplate, TemplateShape, WrittenValue
+from rbxcompose.missions.program.parts import Asked, MessageTemplate, TemplateShape, WrittenValue, inner_span
 from rbxcompose.missions.sources import ValueSource
 from rbxcompose.msgs.fields import NoFieldError, field_type
 from rbxcompose.sdk.capabilities import CommandsMotion, Drains, Drives, Setting, Warns

@@ -29,10 +29,10 @@ from rbxcompose.manifest.registry import sections_in_use
 from rbxcompose.manifest.section import ROBOT, Contents, WantedComponent
 from rbxcompose.manifest.tree import MappingNode, at
 from rbxcompose.manifest.validate import refusals
-from rbxcompose.missions.analysis.effects import sent_by, settings_of
-from rbxcompose.missions.analysis.uses import Using
+from rbxcompose.missions.analysis.facts import sent_by, settings_of
 from rbxcompose.missions.engine.inputs import bind_inputs
 from rbxcompose.missions.language.reader import Budget, read_program
+from rbxcompose.missions.program.linker import Using
 from rbxcompose.missions.program.program import Program
 from rbxcompose.missions.sources import ValueSource
 from rbxcompose.sdk.capabilities import Drives, require_declared

@@ -16,7 +16,7 @@ from rbxcompose.compiler.sections.values import unknown_place, values
 from rbxcompose.manifest.fill import OpenNames
 from rbxcompose.manifest.registry import naming_in_use, sections_in_use
 from rbxcompose.manifest.tree import KeyPath, ScalarNode, all_nodes, at, key_span, value_span
-from rbxcompose.missions.analysis.effects import settings_of
+from rbxcompose.missions.analysis.facts import settings_of
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of
 from rbxcompose.sdk.capabilities import Capability

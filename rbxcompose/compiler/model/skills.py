@@ -13,13 +13,12 @@ from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.model.flow import MessageFlow
 from rbxcompose.compiler.model.robot import NOTHING, Outside, PortEnd, Robot, RobotComponent, RobotMission
 from rbxcompose.manifest.tree import at
-from rbxcompose.missions.analysis.bounds import Bounds, truth
-from rbxcompose.missions.analysis.facts import Constants, constants_of
-from rbxcompose.missions.analysis.scope_types import NodeScope, base_scope, views
+from rbxcompose.missions.analysis.examined import NodeScope, base_scope, views
+from rbxcompose.missions.analysis.facts import Bounds, Constants, constants_of, truth
 from rbxcompose.missions.analysis.travel_times import Driving, Ways
 from rbxcompose.missions.engine.world import POSE
-from rbxcompose.missions.language.asked import Asked
 from rbxcompose.missions.program.goals import service_skill, skill_of, topic_skill
+from rbxcompose.missions.program.parts import Asked
 from rbxcompose.missions.program.program import Program, Skill
 from rbxcompose.missions.sources import Orders, OrderTopic, SkillSource, SkillWay, TopicSource
 from rbxcompose.sdk.capabilities import CommandsMotion, Drains, Navigates

@@ -14,11 +14,11 @@ from rbxcompose.compiler.sections.values import ValueModel
 from rbxcompose.manifest.shapes import exact
 from rbxcompose.manifest.tree import BROKEN, MappingNode, ScalarNode, at
 from rbxcompose.missions import codes
-from rbxcompose.missions.analysis.scope_types import base_scope, findings_of
+from rbxcompose.missions.analysis.examined import base_scope, findings_of
 from rbxcompose.missions.engine.inputs import bind_inputs
 from rbxcompose.missions.engine.world import Watched
-from rbxcompose.missions.execution.ports import TRIGGER
-from rbxcompose.missions.language.asked import expression_of, inner_span
+from rbxcompose.missions.execution.equipment import TRIGGER
+from rbxcompose.missions.program.parts import expression_of, inner_span
 from rbxcompose.missions.program.program import Program
 from rbxcompose.missions.sources import ValueSource
 from rbxcompose.missions.triggers.trigger import Trigger

@@ -13,18 +13,15 @@ from rbxcompose.compiler.schema.scalars import DEFINITIONS, Schema, computed
 from rbxcompose.compiler.schema.settle import schemas_of
 from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.manifest.documents import ManifestHeader
-from rbxcompose.missions.engine.resume_points import HISTORIES
+from rbxcompose.missions.kinds.machine import RESULTS
 from rbxcompose.missions.language.fields import HISTORY, Declared, Field, first_line
-from rbxcompose.missions.language.grammar import Takes
-from rbxcompose.missions.language.machine_reader import RESULTS
+from rbxcompose.missions.language.grammar import HISTORIES, Takes
 from rbxcompose.missions.language.reader import INTERRUPT_KEYS, KEYS
-from rbxcompose.missions.modifiers.registry import modifiers
-from rbxcompose.missions.modifiers.state_hooks import ON_ENTER
-from rbxcompose.missions.program.answers import DEEDS
+from rbxcompose.missions.modifiers.starts import ON_ENTER
 from rbxcompose.missions.program.goals import skill_of, topic_skill
-from rbxcompose.missions.program.machines import MACHINE_KEYS
+from rbxcompose.missions.program.parts import DEEDS, MACHINE_KEYS
 from rbxcompose.missions.program.program import AFTERWARDS, RESTART, Skill
-from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.program.registry import kinds, modifiers
 from rbxcompose.sdk.ports import ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
 

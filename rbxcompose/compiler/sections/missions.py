@@ -17,7 +17,7 @@ from rbxcompose.manifest.section import OVERLAY, ROBOT, Reading, Short
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, all_nodes
 from rbxcompose.manifest.validate import salvaged, validate
 from rbxcompose.manifest.yaml_nodes import is_moderate
-from rbxcompose.missions.triggers.schedule import Schedule, daily, parse_cron
+from rbxcompose.missions.triggers.trigger import Schedule, daily, parse_cron
 
 INPUT = "input"
 """An input of the mission that an entry names."""

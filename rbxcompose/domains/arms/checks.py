@@ -26,8 +26,7 @@ from rbxcompose.domains.servos.checks import known_value
 from rbxcompose.domains.servos.sections.joints import limits_in
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode, at
 from rbxcompose.missions.analysis.facts import Constants
-from rbxcompose.missions.language.asked import WrittenArgument
-from rbxcompose.missions.program.answers import NodeFlow
+from rbxcompose.missions.program.parts import NodeFlow, WrittenArgument
 from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.msgs.moveit_msgs import CollisionObject
 from rbxcompose.sdk.capabilities import Drives, PutsThings, WritesFrame

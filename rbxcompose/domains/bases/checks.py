@@ -16,9 +16,8 @@ from rbxcompose.compiler.model.skills import constants
 from rbxcompose.domains.bases.safety import lead_of, speed_within
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.sections.body import body
-from rbxcompose.missions.analysis.effects import published
-from rbxcompose.missions.analysis.facts import number_of
-from rbxcompose.missions.program.machines import TemplateShape, WrittenValue
+from rbxcompose.missions.analysis.facts import number_of, published
+from rbxcompose.missions.program.parts import TemplateShape, WrittenValue
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.sdk.capabilities import Drives, RollsOn, SeesEdges, Setting, WritesFrame
 from rbxcompose.sdk.ports import Looks

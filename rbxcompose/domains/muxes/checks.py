@@ -25,7 +25,7 @@ from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, reso
 from rbxcompose.domains.muxes.config import HIGHEST, MODE_OF, TIMELESS, VELOCITIES, HoldFirst, MuxConfig, is_own
 from rbxcompose.domains.muxes.requests import NONE
 from rbxcompose.domains.muxes.sections.muxes import MuxModel, muxes
-from rbxcompose.missions.analysis.effects import published
+from rbxcompose.missions.analysis.facts import published
 from rbxcompose.sdk.capabilities import CommandsMotion, Drives, Forwards, Setting
 from rbxcompose.sdk.ports import In, Looks, Out, Qos
 

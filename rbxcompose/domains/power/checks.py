@@ -14,11 +14,9 @@ from rbxcompose.compiler.checks.values import far_places
 from rbxcompose.compiler.model.flow import OTHER_TYPE, is_written, setting_span
 from rbxcompose.compiler.model.robot import Robot, RobotComponent, RobotMission
 from rbxcompose.compiler.model.skills import batteries, blamed, constants, is_served, navigator_of, ways_of
-from rbxcompose.missions.analysis.bounds import truth
-from rbxcompose.missions.analysis.facts import Constants, goal_place, number_in
+from rbxcompose.missions.analysis.facts import Constants, goal_place, number_in, truth
 from rbxcompose.missions.analysis.travel_times import Ways, distance, too_short
-from rbxcompose.missions.language.asked import Asked
-from rbxcompose.missions.program.answers import NodeFlow
+from rbxcompose.missions.program.parts import Asked, NodeFlow
 from rbxcompose.missions.program.program import Interrupt, MissionNode, Program
 from rbxcompose.sdk.capabilities import Charges, Drains, Navigates, Setting, Warns
 

@@ -38,9 +38,8 @@ from rbxcompose.domains.servos.sections.safety import safety
 from rbxcompose.domains.servos.transfers import BusLoad, cycle_load
 from rbxcompose.manifest.tree import KeyPath, ScalarNode, at, value_span
 from rbxcompose.missions.analysis.facts import Constants, number_in
-from rbxcompose.missions.engine.value_text import show
-from rbxcompose.missions.language.asked import WrittenArgument, expression_of
-from rbxcompose.missions.program.answers import NodeFlow
+from rbxcompose.missions.engine.world import show
+from rbxcompose.missions.program.parts import NodeFlow, WrittenArgument, expression_of
 from rbxcompose.missions.program.program import MissionNode, Skill
 from rbxcompose.sdk.capabilities import BoundsGoals, LocksInSilence
 from rbxcompose.sdk.ports import In, ServesAction

@@ -1,17 +1,76 @@
-"""What a mission will do, as far as its text shows: constants, steps that cannot fail, steps that never end."""
+"""What a mission will do, as far as its text shows: what it sets and sends, constants, what conditions give."""
 
+from __future__ import annotations
+
+import math
 from collections.abc import Iterable, Iterator, Mapping
 
 from rbxcompose.base.config import Place
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions import tree as syntax
+from rbxcompose.base.expressions.tree import Comparison, ExpressionNode, Variable, Word
 from rbxcompose.base.expressions.types import TypeKind
 from rbxcompose.base.expressions.values import Value
-from rbxcompose.base.findings import Span
+from rbxcompose.base.findings import Itself, Span, once
 from rbxcompose.manifest.tree import ScalarNode
-from rbxcompose.missions.analysis.effects import replaced, written
-from rbxcompose.missions.language.asked import expression_of
-from rbxcompose.missions.program.answers import Skipped
+from rbxcompose.missions.program.parts import Assignment, Deeds, MessageTemplate, Skipped, WrittenSetting, expression_of
 from rbxcompose.missions.program.program import MissionNode, Program, RobotNames, Skill
+
+
+def assignments(node: MissionNode) -> Iterator[Assignment]:
+    """Yield the assignments that a node makes."""
+    yield from node.step.effects.assignments
+    for deeds in _deeds(node):
+        yield from deeds.assignments
+
+
+def published(node: MissionNode) -> Iterator[MessageTemplate]:
+    """Yield the messages that a node publishes."""
+    if message := node.step.effects.published:
+        yield message
+    yield from (deeds.message for deeds in _deeds(node) if deeds.message)
+
+
+def called(node: MissionNode) -> Iterator[MessageTemplate]:
+    """Yield the request that a node makes."""
+    if request := node.step.effects.called:
+        yield request
+
+
+def replaced(program: Program) -> frozenset[str]:
+    """Return the names of all data that are assigned while a mission runs."""
+    return program.saved.union(assignment.name for node in program.nodes for assignment in assignments(node))
+
+
+def written(program: Program) -> frozenset[str]:
+    """Return the names of all data that change while a mission runs, including those that only lose items."""
+    return _written(Itself(program))
+
+
+@once  # many rules ask
+def _written(program: Itself[Program]) -> frozenset[str]:
+    shortened = (node.step.effects.shortened for node in program.value.nodes)
+    return replaced(program.value).union(name for name in shortened if name)
+
+
+def sent_by(programs: Iterable[Program]) -> tuple[set[str], set[str]]:
+    """Return the topics on which missions publish, and the services that they call, as they write them."""
+    nodes = [node for program in programs for node in program.nodes]
+    topics = {message.target.text for node in nodes for message in published(node)}
+    services = {message.target.text for node in nodes for message in called(node)}
+    return topics, services | {setting.service for setting in settings_of(nodes)}
+
+
+def settings_of(nodes: Iterable[MissionNode]) -> list[WrittenSetting]:
+    """Return the settings of components that nodes change."""
+    return [setting for node in nodes if (setting := node.step.effects.setting) is not None]
+
+
+def _deeds(node: MissionNode) -> Iterator[Deeds]:
+    for modifier in node.modifiers.values():
+        if modifier.moments:
+            yield from modifier.moments.deeds.values()
+
 
 Constants = Mapping[str, Value]  # values of `$names` that never change
 
@@ -175,3 +234,115 @@ def takes_time(pause: syntax.Expression | None) -> bool:
 def place_in_text(node: MissionNode, expression: syntax.Expression | None) -> Span:
     """Return the span of an expression of a node."""
     return next((asked.scalar.span for asked in node.asked if asked.expression is expression), node.span)
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """The smallest and the largest possible value, both inclusive."""
+
+    least: float = -math.inf
+    most: float = math.inf
+
+
+ANYTHING = Bounds()
+NOT_BELOW_ZERO = Bounds(0.0)
+Known = Mapping[str, Bounds]  # known bounds of `$names`
+
+_TURNED = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
+_MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
+
+
+def truth(node: syntax.ExpressionNode, known: Known) -> bool | None:
+    """Return whether a condition always holds (True), never holds (False), or may do either (None)."""
+    match node:
+        case syntax.Flag(value=value):
+            return value
+        case syntax.Not(operand=operand):
+            inner = truth(operand, known)
+            return None if inner is None else not inner
+        case syntax.Comparison(operator=operator, left=left, right=right):
+            return _compared(operator, bounds_of(left, known), bounds_of(right, known))
+        case syntax.Junction(operator=operator, operands=operands):
+            return _joined(operands, known, decides=operator == "or")
+    return None
+
+
+def _compared(operator: str, left: Bounds, right: Bounds) -> bool | None:
+    match operator:
+        case "<":
+            return True if left.most < right.least else False if left.least >= right.most else None
+        case "<=":
+            return True if left.most <= right.least else False if left.least > right.most else None
+        case ">" | ">=":
+            return _compared(_MIRRORED[operator], right, left)
+    apart = left.most < right.least or right.most < left.least
+    return None if not apart else operator == "!="
+
+
+def _joined(operands: tuple[syntax.ExpressionNode, ...], known: Known, *, decides: bool) -> bool | None:
+    """Evaluate from the left, as at run time: an operand counts only where those before it have not decided."""
+    is_open = False
+    for operand in operands:
+        found = truth(operand, known)
+        if found is decides:
+            return decides
+        is_open = is_open or found is None
+        known = narrowed(known, operand, holds=not decides)
+    return None if is_open else not decides
+
+
+def narrowed(known: Known, node: syntax.ExpressionNode, *, holds: bool) -> Known:
+    """Return the bounds that are known where a comparison of a `$name` holds, or does not hold."""
+    if not isinstance(node, syntax.Comparison) or node.operator not in _TURNED:
+        return known
+    operator, name, limit = node.operator, node.left, bounds_of(node.right, known)
+    if not isinstance(name, syntax.Variable):
+        operator, name, limit = _MIRRORED[operator], node.right, bounds_of(node.left, known)
+    if not isinstance(name, syntax.Variable):
+        return known
+    operator = operator if holds else _TURNED[operator]
+    before = known.get(name.name, ANYTHING)
+    if operator in ("<", "<="):
+        return {**known, name.name: Bounds(before.least, min(before.most, limit.most))}
+    return {**known, name.name: Bounds(max(before.least, limit.least), before.most)}
+
+
+def bounds_of(node: syntax.ExpressionNode, known: Known) -> Bounds:
+    """Return the bounds of a number; `ANYTHING` for everything else."""
+    match node:
+        case syntax.Number(value=value):
+            return Bounds(value, value)
+        case syntax.Variable(name=name):
+            return known.get(name, ANYTHING)
+        case syntax.Minus(operand=operand):
+            inner = bounds_of(operand, known)
+            return Bounds(-inner.most, -inner.least)
+        case syntax.Arithmetic(operator=operator, left=left, right=right):
+            return _computed(operator, bounds_of(left, known), bounds_of(right, known))
+        case syntax.FunctionCall(function="distance" | "age" | "count" | "abs"):
+            return NOT_BELOW_ZERO
+    return ANYTHING
+
+
+def _computed(operator: str, left: Bounds, right: Bounds) -> Bounds:
+    match operator:
+        case "+":
+            return Bounds(left.least + right.least, left.most + right.most)
+        case "-":
+            return Bounds(left.least - right.most, left.most - right.least)
+    ends = (left.least, left.most, right.least, right.most)
+    if not all(map(math.isfinite, ends)) or (operator == "/" and right.least <= 0 <= right.most):
+        return ANYTHING
+    both = [(end, other) for end in ends[:2] for other in ends[2:]]
+    found = [value * other if operator == "*" else value / other for value, other in both]
+    return Bounds(min(found), max(found))
+
+
+def compared_with_word(tree: ExpressionNode) -> tuple[str, Word] | None:
+    """Return the `$name` and the word that a comparison tests for equality, None for anything else."""
+    match tree:
+        case Comparison(operator="==", left=Variable(name=name), right=Word() as word):
+            return name, word
+        case Comparison(operator="==", left=Word() as word, right=Variable(name=name)):
+            return name, word
+    return None

@@ -9,7 +9,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.missions.analysis.facts import Constants, goal_place, items_of, number_of, shortened
-from rbxcompose.missions.program.answers import NodeFlow
+from rbxcompose.missions.program.parts import NodeFlow
 from rbxcompose.missions.program.program import ROOT, MissionNode, Program
 
 MOST_STEPS = 2_000  # visited per mission; nested loops would take for ever

@@ -8,14 +8,11 @@ from rbxcompose.base.expressions.types import FLAG
 from rbxcompose.base.findings import OWN, Finding, Related, Severity, Span
 from rbxcompose.base.units import TIME, format_quantity
 from rbxcompose.manifest.tree import ScalarNode
-from rbxcompose.missions.analysis.bounds import truth
-from rbxcompose.missions.analysis.check_runner import mission_check
-from rbxcompose.missions.analysis.effects import written
-from rbxcompose.missions.analysis.examined import Ending, Examined
-from rbxcompose.missions.analysis.facts import Constants, constants_of, never_skipped, number_of, place_in_text
-from rbxcompose.missions.language.asked import Asked
-from rbxcompose.missions.program.answers import ModifierScope, NodeFlow
+from rbxcompose.missions.analysis import facts
+from rbxcompose.missions.analysis.examined import Ending, Examined, mission_check
+from rbxcompose.missions.analysis.facts import Constants
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS
+from rbxcompose.missions.program.parts import Asked, ModifierScope, NodeFlow
 from rbxcompose.missions.program.program import CONTINUE, MissionNode, Program
 
 
@@ -59,7 +56,7 @@ def _barrier(program: Program, node: MissionNode, ending: Ending) -> tuple[Missi
             continue
         if node.step.goes_on_after == SUCCEEDS:
             return step, following, "never ends in success", "put this one before it, or let that one end in success"
-        if never_skipped(program, step):
+        if facts.never_skipped(program, step):
             return step, following, "never fails", "put this one before it: a fallback goes on after a failure"
     return None
 
@@ -97,10 +94,10 @@ def _condition(node: MissionNode, key: str) -> Asked | None:
 def _go_together(first: Asked, second: Asked, *, is_second: bool) -> bool:
     """Return whether the first may hold while the second does, or does not."""
     node, other = first.expression.tree, second.expression.tree
-    if truth(other, {}) is not None:
+    if facts.truth(other, {}) is not None:
         return True  # it is decided by itself, as when somebody tries something out
     both = Junction(node.start, node.end, "and", (node, other if is_second else Not(other.start, other.end, other)))
-    return truth(both, {}) is not False and (is_second or first.expression.text != second.expression.text)
+    return facts.truth(both, {}) is not False and (is_second or first.expression.text != second.expression.text)
 
 
 def _first_steps(program: Program, number: int | None) -> Iterator[MissionNode]:
@@ -128,7 +125,7 @@ def event_at_once(mission: Examined) -> Iterator[Finding]:
 def frozen_condition(mission: Examined) -> Iterator[Finding]:
     """A condition is waited for that nothing changes."""
     program = mission.program
-    fixed = program.data.keys() - written(program)
+    fixed = program.data.keys() - facts.written(program)
     for node in program.nodes if fixed else ():
         for asked in node.asked[: node.own]:
             names = {name.name for name in asked.expression.names}
@@ -145,14 +142,14 @@ def frozen_condition(mission: Examined) -> Iterator[Finding]:
 @mission_check("RBX4127", Severity.WARNING, closed=(OWN,))
 def idle_modifier(mission: Examined) -> Iterator[Finding]:
     """A modifier changes nothing."""
-    known = constants_of(mission.program, {})
+    known = facts.constants_of(mission.program, {})
     for node in mission.program.nodes:
         yield from _attempt(node, known)
         yield from _forgiven(mission, node)
         for key, modifier in node.modifiers.items():
             if modifier.serves is ModifierScope.FAILING and not mission.ending.inside_of(node, key).counting_as(FAILS):
                 yield idle_modifier.at(
-                    place_in_text(node, modifier.value),
+                    facts.place_in_text(node, modifier.value),
                     f"'{key}' changes nothing here: '{node.step.word}' cannot fail",
                     help="it belongs to the step that can fail",
                 )
@@ -167,10 +164,10 @@ def idle_modifier(mission: Examined) -> Iterator[Finding]:
 def _attempt(node: MissionNode, known: Constants) -> Iterator[Finding]:
     """Yield the finding about a limit of each attempt that the limit of all forestalls."""
     each = node.attempt_limit
-    value, whole = number_of(each, known), number_of(node.limit, known)
+    value, whole = facts.number_of(each, known), facts.number_of(node.limit, known)
     if each is not None and value is not None and whole is not None and value >= whole:
         yield idle_modifier.at(
-            place_in_text(node, each),
+            facts.place_in_text(node, each),
             f"'attempt_timeout' changes nothing here: all attempts together end after {format_quantity(whole, TIME)}",
             help="'timeout' counts all attempts: make it longer than 'attempt_timeout' times 'attempts'",
         )
@@ -199,8 +196,7 @@ def _comes_again(program: Program, node: MissionNode) -> bool:
     if parent is None:
         return node.number != program.main  # a reaction runs as often as its interrupt
     above = program.nodes[parent]
-    is_repeated = above.step.comes_again or any(modifier.repeats for modifier in above.modifiers.values())
-    return is_repeated or _comes_again(program, above)
+    return above.comes_again or _comes_again(program, above)
 
 
 @mission_check("RBX4128", Severity.WARNING, closed=())
@@ -209,10 +205,12 @@ def pointless_number(mission: Examined) -> Iterator[Finding]:
     for node in mission.program.nodes:
         modifiers = (number for modifier in node.modifiers.values() for number in modifier.numbers)
         for what, expression, least, effect in (*node.step.numbers, *modifiers):
-            value = number_of(expression, {}) if expression and expression.text else None  # a name may be on purpose
+            value = (
+                facts.number_of(expression, {}) if expression and expression.text else None
+            )  # a name may be on purpose
             if expression and value is not None and 0 <= value < least:
                 yield pointless_number.at(
-                    place_in_text(node, expression),
+                    facts.place_in_text(node, expression),
                     f"{what} {effect or 'must be above zero to have an effect'}",
                     help="write a larger number, or leave it out",
                 )

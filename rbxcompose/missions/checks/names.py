@@ -9,15 +9,12 @@ from rbxcompose.base.config import MISSION
 from rbxcompose.base.findings import NAMES, WIRING
 from rbxcompose.base.printable import plain
 from rbxcompose.manifest.tree import ScalarNode
-from rbxcompose.missions.analysis.check_runner import mission_check
-from rbxcompose.missions.analysis.effects import assignments, called, published
-from rbxcompose.missions.analysis.examined import Examined
-from rbxcompose.missions.analysis.scope_types import View
+from rbxcompose.missions.analysis.examined import Examined, View, mission_check
+from rbxcompose.missions.analysis.facts import assignments, called, published
 from rbxcompose.missions.codes import NAME_CLASH, UNKNOWN_NAME
 from rbxcompose.missions.engine.world import POSE
-from rbxcompose.missions.language.keys import FOREIGN
-from rbxcompose.missions.program.answers import Form
-from rbxcompose.missions.program.machines import MessageTemplate
+from rbxcompose.missions.language.grammar import FOREIGN
+from rbxcompose.missions.program.parts import Form, MessageTemplate
 from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 from rbxcompose.missions.program.registry import kinds
 

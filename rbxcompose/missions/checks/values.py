@@ -10,21 +10,25 @@ from rbxcompose.base.findings import Finding, Related, Span, clauses, nearest, s
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import NUMBER, QUOTIENT, TIME, Dimension, example
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
-from rbxcompose.missions.analysis.check_runner import mission_check
-from rbxcompose.missions.analysis.effects import assignments, called, published
-from rbxcompose.missions.analysis.examined import Ending, Examined
-from rbxcompose.missions.analysis.facts import Constants, constants_of, number_of
-from rbxcompose.missions.analysis.scope_types import View, findings_of
+from rbxcompose.missions.analysis import facts
+from rbxcompose.missions.analysis.examined import Ending, Examined, View, check_written, findings_of, mission_check
+from rbxcompose.missions.analysis.facts import Constants
 from rbxcompose.missions.codes import UNKNOWN_NAME, WRONG_INPUT, WRONG_TYPE
-from rbxcompose.missions.engine.value_text import show
-from rbxcompose.missions.language.asked import Asked, Assignment, WrittenArgument, inner_span
-from rbxcompose.missions.language.literals import WrongValue, check_written, typed
-from rbxcompose.missions.language.written import help_with_place, is_pose, nodes_of
-from rbxcompose.missions.modifiers.registry import modifier_keys
-from rbxcompose.missions.program.branches import RESULTS, compared_with_word
-from rbxcompose.missions.program.machines import MessageTemplate, TemplateShape, WrittenValue
+from rbxcompose.missions.engine.world import show
+from rbxcompose.missions.language.literals import WrongValue, help_with_place, is_pose, nodes_of, typed
 from rbxcompose.missions.program.outcomes import Outcomes
+from rbxcompose.missions.program.parts import (
+    RESULTS,
+    Asked,
+    Assignment,
+    MessageTemplate,
+    TemplateShape,
+    WrittenArgument,
+    WrittenValue,
+    inner_span,
+)
 from rbxcompose.missions.program.program import Program, Skill
+from rbxcompose.missions.program.registry import modifier_keys
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import FieldShape, parse_type
 from rbxcompose.msgs.fields import measure_of
@@ -141,7 +145,7 @@ def _inside(node: TreeNode, wanted: Type, what: str) -> Iterator[Finding]:
         try:
             typed(node, wanted)
         except WrongValue as error:
-            yield wrong_argument.at(node.span, f"{what} {error.message}", label=error.label, help=error.help)
+            yield error.finding(wrong_argument, node.span, what)
 
 
 FITTING = {  # the types of expressions that fit a field, by its ROS type; all others are numbers
@@ -157,10 +161,10 @@ def wrong_field(mission: Examined) -> Iterator[Finding]:
     """A message of a mission does not fit its type."""
     topics, services = mission.robot.topics, mission.robot.services
     for view in mission.views:
-        for message in published(view.node):
+        for message in facts.published(view.node):
             if message.target.text in topics:
                 yield from _check_body(view, message, registry.message(topics[message.target.text]))
-        for message in called(view.node):
+        for message in facts.called(view.node):
             if message.target.text in services:
                 yield from _check_body(view, message, registry.service(services[message.target.text]).Request)
 
@@ -292,8 +296,7 @@ def _given(view: View, name: str, program: Program) -> Iterator[Finding]:
             try:
                 typed(argument.value, wanted)
             except WrongValue as error:
-                message = f"the input '{argument.name}' {error.message}"
-                yield WRONG_INPUT.at(argument.value.span, message, label=error.label, help=error.help)
+                yield error.finding(WRONG_INPUT, argument.value.span, f"the input '{argument.name}'")
 
 
 def _missing_input(view: View, mission: str, program: Program) -> Iterator[Finding]:
@@ -312,7 +315,7 @@ LISTED = (TypeKind.LIST, TypeKind.MAP, TypeKind.UNKNOWN)
 @mission_check(WRONG_TYPE)
 def wrong_type(mission: Examined) -> Iterator[Finding]:
     """Yield the expressions that have the wrong type, or name something that does not exist."""
-    known = constants_of(mission.program, {})
+    known = facts.constants_of(mission.program, {})
     for view in mission.views:
         is_placed = _goes_to_places(view)
         for asked in view.node.asked:
@@ -321,7 +324,7 @@ def wrong_type(mission: Examined) -> Iterator[Finding]:
                 wanted = PLACE if is_placed and is_word else asked.wanted
                 found = list(view.typed(asked.expression, wanted, asked.scalar, WRONG_TYPE))
                 yield from found or _negative(asked, known)
-        for assignment in assignments(view.node):
+        for assignment in facts.assignments(view.node):
             yield from _assigned(view, assignment)
         yield from _not_listed(view)
         yield from _other_cases(view)
@@ -333,7 +336,7 @@ def wrong_type(mission: Examined) -> Iterator[Finding]:
 
 def _negative(asked: Asked, known: Constants) -> Iterator[Finding]:
     """Yield a finding if a duration or a count is surely negative: the step would always fail."""
-    value = number_of(asked.expression, known) if asked.wanted in (COUNT, quantity_of(TIME)) else None
+    value = facts.number_of(asked.expression, known) if asked.wanted in (COUNT, quantity_of(TIME)) else None
     if value is not None and value < 0:
         message = f"this must be at least 0; it is {show(asked.wanted, value)}"
         yield WRONG_TYPE.at(
@@ -421,7 +424,7 @@ def _outcomes(view: View, ending: Ending) -> Iterator[Finding]:
 def _with_results(finding: Finding, asked: Asked, ends: Mapping[str, Outcomes]) -> Finding:
     """Return a finding about a word that is no result, with the results of the branch that it is compared with."""
     for part, _ in walk(asked.expression.tree):
-        branch, word = compared_with_word(part) or ("", None)
+        branch, word = facts.compared_with_word(part) or ("", None)
         if word and branch in ends and finding.span == inner_span(asked.scalar, word.start, word.end):
             results = ends[branch].words
             text = f"it ends with {' or '.join(results)}" if results else "it never ends"

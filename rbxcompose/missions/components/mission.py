@@ -5,40 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
-from pydantic import GetCoreSchemaHandler, WithJsonSchema
-from pydantic_core import CoreSchema, core_schema
-
-from rbxcompose.base.expressions.types import Type
 from rbxcompose.base.requests import Command
-from rbxcompose.missions.analysis.uses import Using
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
 from rbxcompose.missions.engine.world import POSE, World
-from rbxcompose.missions.execution import requests
-from rbxcompose.missions.execution.errands import ENDS, PUBLISHES, VALUE, port_name
-from rbxcompose.missions.execution.ports import EVENTS, TRIGGER, ports_for, ports_of_triggers
+from rbxcompose.missions.execution import equipment, requests
+from rbxcompose.missions.execution.equipment import MissionConfig
 from rbxcompose.missions.program.outcomes import IDLE, Result
-from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of
-from rbxcompose.missions.triggers.trigger import Trigger
 from rbxcompose.msgs.rbxcompose_msgs import RunMission
 from rbxcompose.msgs.std_msgs import String
-from rbxcompose.sdk import (
-    Capability,
-    Component,
-    Config,
-    Level,
-    Place,
-    Port,
-    Refused,
-    Replaceable,
-    RunsMissions,
-    ServesAction,
-    answers,
-    component,
-)
+from rbxcompose.sdk import Capability, Component, Level, Port, Refused, RunsMissions, ServesAction, answers, component
 from rbxcompose.sdk.component import MissionOver, MissionWaits
 
 if TYPE_CHECKING:  # a check needs no engine: it is imported when the component is configured
@@ -52,77 +29,6 @@ RATE = 10.0  # [Hz]
 LOOK_AGAIN = 0.1  # [s] between two checks for a pose that has not arrived yet
 RESTART, ASK = "restart", "ask"  # after a crash
 NO_INPUTS: Mapping[str, str] = {}
-
-T = TypeVar("T")
-
-
-class IsInstance:
-    """Takes an instance of the annotated class as it is.
-
-    `pydantic.InstanceOf` also works out how each field of a dataclass would be read: 10 ms of each `check`.
-    """
-
-    def __get_pydantic_core_schema__(self, source: type, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.is_instance_schema(source)
-
-
-Made = Annotated[T, IsInstance(), WithJsonSchema({"type": "object"})]  # made by the compiler, never by people
-
-
-class MissionConfig(Config):
-    """The robot's missions as the compiler has prepared them."""
-
-    programs: Annotated[dict[str, Made[Program]], Replaceable()] = {}
-    """Missions by name."""
-    start: Annotated[str | None, Replaceable()] = None
-    """The mission that starts by itself."""
-    inputs: Annotated[dict[str, dict[str, Any]], Replaceable()] = {}
-    """Values of the inputs, by mission and name."""
-    after_crash: Annotated[dict[str, str], Replaceable()] = {}
-    """What missions do after a crash, by mission: `restart`, `ask` or `continue`."""
-    values: dict[str, Made[ValueSource]] = {}
-    """Where the robot's values come from."""
-    places: Annotated[dict[str, Made[Place]], Replaceable()] = {}
-    """The robot's places."""
-    skills: dict[str, Made[SkillSource]] = {}
-    """The robot's skills."""
-    topics: dict[str, Made[TopicSource]] = {}
-    """The topics on which missions publish."""
-    services: dict[str, str] = {}
-    """The services that missions call, with their ROS types."""
-    settings: dict[str, dict[str, Made[Type]]] = {}
-    """The types of settings that missions change."""
-    for_others: bool = False
-    """Whether components run missions, by the action `run_mission`."""
-    triggers: dict[str, Made[Trigger]] = {}
-    """What starts missions by itself, by name."""
-
-    @property
-    def reads(self) -> frozenset[str]:
-        """Return all names that missions and triggers read."""
-        names = frozenset[str]().union(*(program.reads for program in self.programs.values()))
-        return names.union(*(trigger.reads for trigger in self.triggers.values()))
-
-    @property
-    def used(self) -> dict[str, SkillSource]:
-        """Return all skills that missions use."""
-        names = {node.skill for program in self.programs.values() for node in program.nodes}
-        return {name: self.skills[name] for name in sorted(names & self.skills.keys())}
-
-    @cached_property
-    def names(self) -> RobotNames:
-        """Return what the robot offers to missions."""
-        broken = Using(self.programs).broken
-        return RobotNames(
-            {name: source.type for name, source in self.values.items()},
-            self.places,
-            {name: source.skill for name, source in self.skills.items()},
-            {name: program for name, program in self.programs.items() if name not in broken},
-            {name: topic.message for name, topic in self.topics.items()},
-            self.services,
-            self.settings,
-            events=events_of(self.values),
-        )
 
 
 @component("mission")
@@ -148,7 +54,7 @@ class Mission(Component[MissionConfig]):
     def ports(cls, config: MissionConfig) -> dict[str, Port[Any]]:
         """Return a port for each used value, skill, topic and service, and for the pose if missions read it."""
         runs = {RUN: ServesAction(RunMission, RUN, skill=None).named(RUN)} if config.for_others else {}
-        return ports_for(config) | ports_of_triggers(config.triggers.values()) | runs
+        return equipment.ports_for(config) | equipment.ports_of_triggers(config.triggers.values()) | runs
 
     @classmethod
     def capabilities(cls, config: MissionConfig) -> tuple[Capability, ...]:
@@ -162,10 +68,10 @@ class Mission(Component[MissionConfig]):
 
     def configure(self) -> None:
         """Start with no values and no missions."""
+        from rbxcompose.missions.execution.errands import Desks
+        from rbxcompose.missions.execution.mission_run import OrderedMission
         from rbxcompose.missions.execution.missions import Broadcast, RunningMissions
-        from rbxcompose.missions.execution.ordered import OrderedMission
         from rbxcompose.missions.execution.snapshots import SnapshotStore
-        from rbxcompose.missions.execution.topic_skills import Desks
         from rbxcompose.missions.execution.triggers import Triggering, TriggerMemory
         from rbxcompose.missions.execution.world import Arrivals, RobotWorld
 
@@ -274,13 +180,13 @@ class Mission(Component[MissionConfig]):
 
     def received(self, port: str, message: Any) -> None:
         """Take a value and wake the missions that read it; or take the outcome of an order."""
-        if port.startswith(ENDS):
+        if port.startswith(equipment.ENDS):
             self.desks.ended(port, message)
             return
-        if port.startswith(TRIGGER):
-            self.triggering.message(port.removeprefix(TRIGGER))
+        if port.startswith(equipment.TRIGGER):
+            self.triggering.message(port.removeprefix(equipment.TRIGGER))
             return
-        name = port.removeprefix(VALUE)
+        name = port.removeprefix(equipment.VALUE)
         wrong = self.arrivals.take(name, message, self.now)
         if wrong and name not in self.misfits:
             self.misfits.add(name)
@@ -493,7 +399,7 @@ class Mission(Component[MissionConfig]):
     @answers(requests.ListOutcomes)
     def list_outcomes(self, request: requests.ListOutcomes) -> requests.OutcomesByNode:
         """Return in which outcomes nodes may be forced to end."""
-        from rbxcompose.missions.execution.debug_views import outcomes_of
+        from rbxcompose.missions.execution.debugging import outcomes_of
 
         run = self.missions.running(request.mission)
         return outcomes_of(run.engine.program, run.engine.robot)
@@ -501,7 +407,7 @@ class Mission(Component[MissionConfig]):
     @answers(requests.ListData)
     def list_data(self, request: requests.ListData) -> tuple[requests.ListedDatum, ...]:
         """Return the data of a mission that runs."""
-        from rbxcompose.missions.execution.debug_views import data_of
+        from rbxcompose.missions.execution.debugging import data_of
 
         return tuple(data_of(self.missions.running(request.mission)))
 
@@ -530,21 +436,21 @@ class Mission(Component[MissionConfig]):
     @answers(requests.ForceNode)
     def force(self, request: requests.ForceNode) -> str:
         """Let a node that runs end."""
-        from rbxcompose.missions.execution.breakpoints import forced
+        from rbxcompose.missions.execution.debugging import forced
 
         return self.intervene(request.mission, lambda run: [forced(run, request.where, request.outcome)])
 
     @answers(requests.SetMissionData)
     def set_data(self, request: requests.SetMissionData) -> str:
         """Set data of a mission."""
-        from rbxcompose.missions.execution.breakpoints import changed
+        from rbxcompose.missions.execution.debugging import changed
 
         return self.intervene(request.mission, lambda run: changed(run, request.values))
 
     @answers(requests.JumpMission)
     def jump(self, request: requests.JumpMission) -> str:
         """Bring a machine into another state."""
-        from rbxcompose.missions.execution.breakpoints import jump
+        from rbxcompose.missions.execution.debugging import jump
 
         return self.intervene(request.mission, lambda run: [jump(run, request.state)])
 
@@ -660,7 +566,7 @@ class Mission(Component[MissionConfig]):
         from rbxcompose.missions.engine.logbook import INPUTS
 
         if record["event"] not in INPUTS:
-            self.bound[port_name(PUBLISHES, EVENTS)](String(data=json.dumps(record)))
+            self.bound[equipment.port_name(equipment.PUBLISHES, equipment.EVENTS)](String(data=json.dumps(record)))
 
     def running_text(self) -> str:
         """Return the running missions in words."""

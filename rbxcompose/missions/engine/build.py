@@ -4,20 +4,16 @@ from collections.abc import Iterator
 from typing import Any
 
 from rbxcompose.base.expressions.types import UNKNOWN, Type
-from rbxcompose.missions.analysis.scope_types import NodeScope
-from rbxcompose.missions.engine.engine_base import EngineBase
+from rbxcompose.missions.analysis.examined import NodeScope
 from rbxcompose.missions.engine.events import BranchEnded, NodeEnded, NodeStarted
-from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.run import Run, since_scope
-from rbxcompose.missions.engine.scopes import ItemScope, MissionScope, SinceScope, item_types
-from rbxcompose.missions.engine.task import MovedChildren, Site, Task
-from rbxcompose.missions.engine.world import Observer
-from rbxcompose.missions.modifiers.registry import Decorator, decorator_of
-from rbxcompose.missions.program.answers import Form
-from rbxcompose.missions.program.in_turn import WithHistory
+from rbxcompose.missions.engine.task import EngineBase, Leaf, MovedChildren, Site, Task
+from rbxcompose.missions.engine.world import ItemScope, MissionScope, Observer, SinceScope, item_types
+from rbxcompose.missions.program.families import Decorator, WithHistory
 from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING
+from rbxcompose.missions.program.parts import Form
 from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
-from rbxcompose.missions.program.registry import task_of
+from rbxcompose.missions.program.registry import decorator_of, task_of
 
 
 class Since(Decorator):

@@ -10,7 +10,6 @@ from types import new_class
 from typing import Any, ClassVar, assert_never, cast
 
 from rbxcompose.missions.engine.build import Around
-from rbxcompose.missions.engine.engine_base import EngineBase, NodeProbe, result_word
 from rbxcompose.missions.engine.events import Intervened, Stopped
 from rbxcompose.missions.engine.interventions import (
     ChangeData,
@@ -22,8 +21,8 @@ from rbxcompose.missions.engine.interventions import (
     TakeStep,
 )
 from rbxcompose.missions.engine.run import Run
-from rbxcompose.missions.engine.task import Task
-from rbxcompose.missions.engine.value_text import show
+from rbxcompose.missions.engine.task import EngineBase, NodeProbe, Task, result_word
+from rbxcompose.missions.engine.world import show
 from rbxcompose.missions.program.outcomes import FAILURE, IDLE, RUNNING, SUCCESS
 from rbxcompose.missions.program.program import NOTHING, MissionNode, Program, Target
 

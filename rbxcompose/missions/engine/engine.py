@@ -4,12 +4,11 @@ from collections.abc import Mapping
 
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.engine.build import Builder
-from rbxcompose.missions.engine.course import Reaction
 from rbxcompose.missions.engine.debugger import Debugger
-from rbxcompose.missions.engine.engine_base import ROUNDING, EngineBase
 from rbxcompose.missions.engine.events import MissionEnded, Reported
 from rbxcompose.missions.engine.interventions import Intervention
-from rbxcompose.missions.engine.task import Task
+from rbxcompose.missions.engine.run import Reaction
+from rbxcompose.missions.engine.task import ROUNDING, EngineBase, Task
 from rbxcompose.missions.engine.world import PLAIN, Settings, World
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.outcomes import FAILURE, IDLE, NAMES, RUNNING, SUCCESS, Result

@@ -14,22 +14,17 @@ from dataclasses import field
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.values import NOT_ARRIVED
-from rbxcompose.missions.analysis.held_nodes import HeldNode
-from rbxcompose.missions.engine.course import Course
 from rbxcompose.missions.engine.debugger import Probed, named
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.interventions import NotPossible
-from rbxcompose.missions.engine.leaf import Leaf
-from rbxcompose.missions.engine.run import Run
-from rbxcompose.missions.engine.task import MovedChildren, Task
-from rbxcompose.missions.modifiers.registry import Decorator
+from rbxcompose.missions.engine.run import Course, Run
+from rbxcompose.missions.engine.snapshot import OF_ENGINE, OF_RUN
+from rbxcompose.missions.engine.task import Leaf, MovedChildren, Task
+from rbxcompose.missions.language.literals import HeldNode
 from rbxcompose.missions.program.counterparts import Pairing
-from rbxcompose.missions.program.in_turn import InTurnTask
+from rbxcompose.missions.program.families import Decorator, InTurnTask
 from rbxcompose.missions.program.outcomes import RUNNING
 from rbxcompose.missions.program.program import MissionNode
-
-_ENGINE = ("status", "outcome", "now", "time", "lost", "is_paused", "draws", "held_until", "instant", "ticks", "wake")
-_RUN = ("begun", "ending", "message")
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +64,7 @@ class _Exchange:
         self.old_tasks, self.new_tasks = _by_node(old.tasks), _by_node(new.tasks)
         self.counterparts = dict(self._counterparts())
         self.running = {task for above in old.tasks for task in above.running()} | {
-            course.current for run in old.runs for course in _courses(run) if course.current is not None
+            course.current for run in old.runs for course in run.courses if course.current is not None
         }
         self.restarted = frozenset(self._restarted())
         self.astray: set[Task] = set()  # those that kept their place at something that is gone
@@ -130,7 +125,7 @@ class _Exchange:
     # What is taken over
 
     def _take_run(self, run: Run, before: Run) -> None:
-        for name in _RUN:
+        for name in OF_RUN:
             setattr(run, name, getattr(before, name))
         if not before.begun:
             return
@@ -236,13 +231,9 @@ class _Exchange:
                 task.current, task.index = self._running(child), node.children.index(child)
         self.new.statuses[number] = RUNNING
 
-    def _stands_for(self, number: int) -> int | None:
-        """Return the node before of a node, or of the one that it was put around."""
-        return self.pairing.around.get(number, self.before.get(number))
-
     def _moved(self, number: int) -> MovedChildren:
         new, old = self.new.program.nodes[number].children, self.old.program.nodes[self.before[number]].children
-        came_from = {child: self._stands_for(child) for child in new}
+        came_from = {child: self.pairing.around.get(child, self.before.get(child)) for child in new}
         lists = {now: before for before, now in self.pairing.opened.items()}
         places = {child: lists.get(child, before) for child, before in came_from.items()}
         moved = {old.index(before): at for at, child in enumerate(new) if (before := places[child]) in old}
@@ -263,7 +254,7 @@ class _Exchange:
 
     def _take_engine(self) -> None:
         old, new, after = self.old, self.new, self.after
-        for name in _ENGINE:
+        for name in OF_ENGINE:
             setattr(new, name, getattr(old, name))
         nodes = [
             (old.program.nodes[before].span.place, new.program.nodes[now].span.place) for before, now in after.items()
@@ -302,10 +293,6 @@ def _by_node(tasks: Sequence[Task]) -> Mapping[int, list[Task]]:
     for task in tasks:
         found[task.number].append(task)
     return found
-
-
-def _courses(run: Run) -> tuple[Course, ...]:
-    return (run.mission, *run.reactions)
 
 
 def _inner_runs(engine: Engine) -> Mapping[int, Run]:

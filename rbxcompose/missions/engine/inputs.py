@@ -10,9 +10,8 @@ from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import Finding, Span
 from rbxcompose.manifest.tree import NOWHERE, Entry, ScalarNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.header import range_trouble
-from rbxcompose.missions.language.literals import WrongValue, typed
-from rbxcompose.missions.program.machines import Datum, Input
+from rbxcompose.missions.language.literals import WrongValue, range_trouble, typed
+from rbxcompose.missions.program.parts import Datum, Input
 from rbxcompose.missions.program.program import MissionNode, Program
 
 
@@ -108,8 +107,7 @@ def _given(declared: Input, entry: Entry, findings: list[Finding]) -> Datum | No
     try:
         datum = typed(entry.value, declared.type)
     except WrongValue as error:
-        message = f"the input '{declared.name}' {error.message}"
-        findings.append(codes.WRONG_INPUT.at(span, message, label=error.label, help=error.help))
+        findings.append(error.finding(codes.WRONG_INPUT, span, f"the input '{declared.name}'"))
         return None
     if trouble := range_trouble(declared, datum):
         findings.append(codes.WRONG_INPUT.at(span, f"the input '{declared.name}' {trouble}"))

@@ -1,17 +1,19 @@
-"""Instant actions of a task: publish messages, set and edit data, log."""
+"""What a task does at once: compute arguments, publish messages, set and edit data, log."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from rbxcompose.base.expressions.evaluate import evaluate
+from rbxcompose.base.expressions.text import parse_template
 from rbxcompose.base.expressions.tree import Expression, ExpressionNode, FieldAccess, Index, Variable
-from rbxcompose.base.expressions.values import Value, is_same
+from rbxcompose.base.expressions.types import Type, TypeKind
+from rbxcompose.base.expressions.values import Value, is_located, is_named_pose, is_same
+from rbxcompose.manifest.tree import ScalarNode, TreeNode
 from rbxcompose.missions.engine.events import Logged, Published
-from rbxcompose.missions.engine.scopes import MissionScope
 from rbxcompose.missions.engine.task import Task
-from rbxcompose.missions.language.asked import Assignment
-from rbxcompose.missions.program.answers import Deeds, Moments
-from rbxcompose.missions.program.machines import MessageTemplate, TemplateShape
+from rbxcompose.missions.engine.world import MissionScope
+from rbxcompose.missions.language.literals import literal
 from rbxcompose.missions.program.outcomes import NodeFailed
+from rbxcompose.missions.program.parts import Assignment, Deeds, MessageTemplate, Moments, TemplateShape, expression_of
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import parse_type
 from rbxcompose.msgs.types import Message
@@ -138,3 +140,38 @@ def _do(deeds: Deeds, task: Task) -> None:
         task.engine.say(Logged(deeds.level, task.run.filled(deeds.text, task.scope)))
     if deeds.message:
         publish(deeds.message, task)
+
+
+Getter = Callable[[Task], Value]
+PLACED = (TypeKind.PLACE, TypeKind.POSE)
+
+
+def getter(value: TreeNode, wanted: Type) -> Getter:
+    """Return the function that computes an argument of the type `wanted` from its written value."""
+    if not isinstance(value, ScalarNode):
+        constant = literal(value).value
+        return lambda task: constant
+    if wanted.kind is TypeKind.TEXT:
+        template = parse_template(value.text)
+        return lambda task: task.run.filled(template, task.scope)
+    expression = expression_of(value)
+    if wanted.kind in PLACED:
+        return lambda task: place(task, evaluate(expression, task.scope))
+    if wanted.kind is TypeKind.CHOICE:
+        return lambda task: _word(evaluate(expression, task.scope))
+    return lambda task: evaluate(expression, task.scope)
+
+
+def place(task: Task, value: Value) -> Value:
+    """Return the place that a text names; return a place or a pose as it is."""
+    found = task.engine.robot.places.get(value, value) if isinstance(value, str) else value
+    if isinstance(found, str):
+        raise NodeFailed(f"there is no place '{found}'")
+    if not is_located(found):
+        raise NodeFailed(f"{task.run.show('', found)} is no place")
+    return found
+
+
+def _word(value: Value) -> Value:
+    """Return a choice as text, even if a place has the same name."""
+    return value.name if is_named_pose(value) else value

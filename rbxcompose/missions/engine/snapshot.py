@@ -12,12 +12,11 @@ from rbxcompose.base.config import Place
 from rbxcompose.base.expressions.values import MOST_LEVELS, NOT_ARRIVED, NotArrived, Value
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.printable import plain as plain_text
-from rbxcompose.missions.analysis.held_nodes import HeldNode
 from rbxcompose.missions.engine.build import Since
-from rbxcompose.missions.engine.course import Course
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.run import Run
 from rbxcompose.missions.engine.task import Task
+from rbxcompose.missions.language.literals import HeldNode
 from rbxcompose.missions.program.outcomes import Result
 
 VERSION = 3
@@ -33,8 +32,8 @@ _FIELDS: Mapping[str, Mapping[str, type | tuple[type, ...]]] = {
 _NUMBERS = ("nan", "inf", "-inf")  # that JSON cannot express
 _LEVELS = MOST_LEVELS + 10  # of a value as plain data: a result holds values, too
 _BITS = 64  # of the largest integer in a message
-_ENGINE = ("status", "outcome", "now", "time", "lost", "is_paused", "draws", "held_until", "instant", "ticks", "wake")
-_RUN = ("begun", "ending", "message")
+OF_ENGINE = ("status", "outcome", "now", "time", "lost", "is_paused", "draws", "held_until", "instant", "ticks", "wake")
+OF_RUN = ("begun", "ending", "message")
 _COURSE = ("lost", "left")
 
 
@@ -53,7 +52,7 @@ def save(engine: Engine) -> dict[str, Any]:
         "nodes": len(engine.statuses),
         "mission": engine.program.name,
         "statuses": list(engine.statuses),
-        "engine": {name: to_plain(getattr(engine, name)) for name in _ENGINE},
+        "engine": {name: to_plain(getattr(engine, name)) for name in OF_ENGINE},
         "named": sorted(engine.named),
         "stops": list(engine.stops),
         "pending": engine.debugger.pending(),
@@ -77,7 +76,7 @@ def restore(engine: Engine, saved: Mapping[str, Any]) -> None:
     if saved["mission"] != engine.program.name or saved["nodes"] != len(engine.statuses):
         raise NoSnapshot(f"a snapshot of another mission than '{engine.program.name}', or of another version of it")
     engine.statuses[:] = saved["statuses"]
-    for name in _ENGINE:
+    for name in OF_ENGINE:
         setattr(engine, name, from_plain(saved["engine"][name]))
     engine.named, engine.reading = set(saved["named"]), set(saved["reads"])
     engine.reasons = dict(saved["reasons"])
@@ -116,9 +115,9 @@ def _task(task: Task, engine: Engine) -> list[Any]:
 
 
 def _run(run: Run) -> dict[str, Any]:
-    courses: list[Course] = [run.mission, *run.reactions]
+    courses = run.courses
     return {
-        **{name: getattr(run, name) for name in _RUN},
+        **{name: getattr(run, name) for name in OF_RUN},
         "data": to_plain(run.data),
         "inputs": to_plain(run.inputs),
         "stack": [courses.index(course) for course in run.stack],
@@ -129,8 +128,8 @@ def _run(run: Run) -> dict[str, Any]:
 
 
 def _restore_run(run: Run, state: Mapping[str, Any]) -> None:
-    courses: list[Course] = [run.mission, *run.reactions]
-    for name in _RUN:
+    courses = run.courses
+    for name in OF_RUN:
         setattr(run, name, state[name])
     for held, name in ((run.data, "data"), (run.inputs, "inputs")):
         held.clear()

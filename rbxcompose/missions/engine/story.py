@@ -7,7 +7,7 @@ from typing import assert_never
 from rbxcompose.base.levels import Level
 from rbxcompose.base.units import format_number
 from rbxcompose.missions.engine import events
-from rbxcompose.missions.engine.value_text import show
+from rbxcompose.missions.engine.world import show
 from rbxcompose.missions.program.program import RESTART
 
 LEVELS = {"info": Level.OK, "warn": Level.WARN, "error": Level.ERROR}

@@ -1,68 +1,21 @@
 """What a leaf of a mission waits for: a goal, a call, a skill in Python or on topics."""
 
+from __future__ import annotations
+
+import math
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, TypeVar
 
 from rbxcompose.base.expressions.values import Value
+from rbxcompose.missions.execution.equipment import ENDS, HALTS, PAUSES, SKILL, MissionConfig, port_name
 from rbxcompose.missions.program.goals import SUCCESS, values_of
 from rbxcompose.missions.program.outcomes import Result
-from rbxcompose.missions.program.program import Program, RobotNames, Skill
-from rbxcompose.missions.sources import OUTCOME, SkillSource, TopicSource, ValueSource
+from rbxcompose.missions.program.program import Skill
+from rbxcompose.missions.sources import OUTCOME, SkillSource
+from rbxcompose.msgs import registry
 from rbxcompose.msgs.std_srvs import SetBool
-from rbxcompose.sdk.bound import REASONS, Ended, Outcome, Reply, SentGoal
-
-# Prefixes of port names.
-VALUE, PUBLISHES, CALLS = "value_", "publishes_", "calls_"
-SKILL, PAUSES, ENDS, HALTS = "skill_", "pauses_", "ends_", "halts_"  # of a skill: requests, pauses, ends, cancels
-
-
-class Equipment(Protocol):
-    """The robot's missions, and what they may request of it."""
-
-    @property
-    def programs(self) -> Mapping[str, Program]:
-        """Return the missions by name."""
-        ...
-
-    @property
-    def inputs(self) -> Mapping[str, Mapping[str, Any]]:
-        """Return the robot's values for inputs, by mission and name."""
-        ...
-
-    @property
-    def values(self) -> Mapping[str, ValueSource]:
-        """Return the sources of values."""
-        ...
-
-    @property
-    def skills(self) -> Mapping[str, SkillSource]:
-        """Return the skills."""
-        ...
-
-    @property
-    def topics(self) -> Mapping[str, TopicSource]:
-        """Return the topics on which missions publish."""
-        ...
-
-    @property
-    def services(self) -> Mapping[str, str]:
-        """Return the services that missions call, with their ROS types."""
-        ...
-
-    @property
-    def reads(self) -> frozenset[str]:
-        """Return the names that any mission reads."""
-        ...
-
-    @property
-    def used(self) -> Mapping[str, SkillSource]:
-        """Return the skills that any mission uses."""
-        ...
-
-    @property
-    def names(self) -> RobotNames:
-        """Return what the robot gives to missions."""
-        ...
+from rbxcompose.sdk.bound import REASONS, Ended, OrderSender, Outcome, Reply, SentGoal
+from rbxcompose.sdk.skills import Activity, Returned, SkillType
 
 
 class Shell(Protocol):
@@ -71,31 +24,21 @@ class Shell(Protocol):
     bound: dict[str, Any]
 
     @property
-    def equipment(self) -> Equipment:
+    def equipment(self) -> MissionConfig:
         """Return the robot's missions and what they may request of it."""
-        ...
 
     @property
     def now(self) -> float:
         """Return robot time [s]."""
-        ...
 
     def info(self, text: str) -> None:
         """Log an event."""
-        ...
 
     def warn(self, text: str) -> None:
         """Log something that a person should look at."""
-        ...
 
     def look_soon(self) -> None:
         """Request to be woken at this instant."""
-        ...
-
-
-def port_name(beginning: str, topic: str) -> str:
-    """Return the name of the port for a topic or a service."""
-    return beginning + topic.strip("/").replace("/", "_")
 
 
 BACK_WITHIN = 5.0  # [s] in which a missing server must appear
@@ -316,3 +259,275 @@ class CallErrand(Waiting):
             return
         values = values_of(reply.response)
         self.end(Result(values.get(SUCCESS) is not False, text_in(values), values=values))
+
+
+LONGEST = 0.005  # [s] in one call, during which all missions wait
+WORDS = ("success", "failure")
+
+T = TypeVar("T")
+
+
+class PythonErrand(Errand):
+    """One run of a skill in Python."""
+
+    def __init__(self, shell: Shell, done: WhenDone, declared: SkillType, arguments: Mapping[str, Value]) -> None:
+        super().__init__(shell, done)
+        self._declared = declared
+        self._arguments = {name: _fitted(declared, name, value) for name, value in arguments.items()}
+        self._activity: Activity | None = None
+        self._is_paused = False
+        self._due = 0.0  # [s] when the next step is due
+        self._is_told = False  # it was reported to take long
+
+    def begin(self) -> None:
+        """Call the function, or start the activity; an exception is a failure of the leaf."""
+        if not self._declared.is_activity:
+            returned = self._timed(lambda: self._declared.make(**self._arguments))
+            self.end(result_of(True if returned is None else returned))
+            return
+        made: Any = self._timed(self._declared.make)
+        self._timed(lambda: made.start(**self._arguments))
+        self._activity, self._due = made, self._shell.now
+        self._shell.look_soon()
+
+    def halt(self) -> None:
+        """Halt the activity."""
+        super().halt()
+        if self._activity is not None:
+            self._safely(self._activity.halt)
+
+    def pause(self) -> None:
+        """Pause the activity; if it raises, it has failed."""
+        self._is_paused = True
+        if (activity := self._activity) is not None:
+            self._safely(lambda: activity.pause(self._shell.now))
+
+    def resume(self) -> None:
+        """Resume the activity."""
+        self._is_paused, self._due = False, self._shell.now
+        if (activity := self._activity) is not None:
+            self._safely(lambda: activity.resume(self._shell.now))
+        self._shell.look_soon()
+
+    def next_look(self) -> float | None:
+        """Return when its next step is due [s]."""
+        return None if self._is_paused or self._activity is None else self._due
+
+    def look(self) -> None:
+        """Do a step of the activity, if one is due."""
+        activity, now = self._activity, self._shell.now
+        if activity is None or self._is_paused or now + 1e-9 < self._due:
+            return
+        self._due = now + 1.0 / activity.rate
+        try:
+            returned = self._timed(lambda: activity.step(now))
+            result = None if returned is None else result_of(returned)
+        except (Exception, SystemExit) as error:  # whatever a plug-in raises is its own failure, and reported as such
+            result = _raised(error)
+        if result is not None:
+            self.end(result)
+
+    def _safely(self, call: Callable[[], None]) -> None:
+        try:
+            self._timed(call)
+        except (Exception, SystemExit) as error:
+            self._shell.warn(f"{self._declared.name}: {_raised(error).message}")
+            self.end(_raised(error))
+
+    def _timed(self, call: Callable[[], T]) -> T:
+        began = self._shell.now
+        result = call()
+        seconds = self._shell.now - began
+        if seconds > LONGEST and not self._is_told:
+            self._is_told = True
+            self._shell.warn(
+                f"the skill {self._declared.name} took {seconds * 1e3:.0f} ms in one call and held up all missions: "
+                "make it an activity with shorter steps, or an action of a component"
+            )
+        return result
+
+
+def result_of(returned: Returned) -> Result:
+    """Return the result that a skill gives as True, False, a word or a map.
+
+    Raises:
+        TypeError: if it is something else.
+    """
+    match returned:
+        case bool():
+            return Result(returned)
+        case str():
+            return Result(returned == WORDS[0], outcome="" if returned in WORDS else returned)
+        case Mapping():
+            return Result(True, values=dict(returned))
+    raise TypeError(f"a skill returns True, False, an outcome or a map, and not {returned!r}")
+
+
+def _raised(error: BaseException) -> Result:
+    return Result(False, f"{type(error).__name__}: {error}")
+
+
+def _fitted(declared: SkillType, name: str, value: Value) -> object:
+    """Return an argument as the function expects it: counts are whole numbers."""
+    is_count = declared.arguments[name].kind.name == "COUNT"
+    return int(value) if is_count and isinstance(value, int | float) else value
+
+
+LATE_BY = 0.2  # [s] how long after an order was abandoned its end may still arrive
+ROUNDING = 1e-9  # [s]
+REPLACED = "replaced by a newer order"
+
+
+class Desk:
+    """The orders whose ends arrive on one topic, whichever skills and missions they belong to.
+
+    Ends do not name their order, so at most one order is under way.
+    """
+
+    def __init__(self) -> None:
+        self.current: TopicErrand | None = None
+        self.closed_until = -math.inf  # [s] until then, an end belongs to an abandoned order
+
+    def take(self, errand: TopicErrand) -> None:
+        """Make an order the one that is under way; abandon the one before it."""
+        if self.current is not None:
+            self.current.replace()
+        self.current = errand
+
+    def leave(self, errand: TopicErrand) -> None:
+        """Note that an order has ended or was abandoned."""
+        if self.current is errand:
+            self.current = None
+
+    def ended(self, message: Any) -> None:
+        """Handle an end. One that arrives while no order is under way belongs to an abandoned order."""
+        current = self.current
+        if current is not None and current.is_sent:
+            current.ended(message)
+            return
+        self.closed_until = -math.inf
+        if current is not None:
+            current.look_soon()
+
+    def changed(self) -> None:
+        """Handle a change of subscribers."""
+        if self.current is not None:
+            self.current.changed()
+
+
+class Desks:
+    """The desks of all skills that are topics."""
+
+    def __init__(self, shell: Shell) -> None:
+        self._shell = shell
+        self._desks: dict[str, Desk] = {}  # by the port on which ends arrive, else by that of the skill
+        self._watched: set[str] = set()  # skills
+
+    def of(self, source: SkillSource) -> Desk:
+        """Return the desk of a skill."""
+        asked, ends = SKILL + source.skill.name, source.orders.ends
+        desk = self._desks.setdefault(port_name(ENDS, ends.topic) if ends is not None else asked, Desk())
+        if asked not in self._watched:
+            self._watched.add(asked)
+            self._shell.bound[asked].watch(desk.changed)
+        return desk
+
+    def ended(self, port: str, message: Any) -> None:
+        """Handle the end of an order; ignore it if nothing waits for it."""
+        if port in self._desks:
+            self._desks[port].ended(message)
+
+
+class TopicErrand(Waiting):
+    """An order on a topic."""
+
+    nobody = "nothing subscribes to"
+
+    def __init__(self, shell: Shell, done: WhenDone, desk: Desk, source: SkillSource, order: Any) -> None:
+        super().__init__(shell, done, source.topic)
+        self._desk, self._source, self._order = desk, source, order
+        self._has_begun = False
+        self._sent_to: frozenset[bytes] = frozenset()
+
+    def begin(self) -> None:
+        """Send the order once no end of an earlier one can arrive any more, or wait for a subscriber."""
+        if self._source.orders.ends is not None:
+            self._desk.take(self)
+        self._begin_if_free()
+        if not self._has_begun:
+            self.look_soon()
+
+    def send(self) -> bool:
+        """Send it, if there is a subscriber that carries it out."""
+        sender: OrderSender[Any] = self._shell.bound[SKILL + self._source.skill.name]
+        if not sender.listeners:
+            return False
+        self.is_sent, self._sent_to = True, sender.listeners
+        sender(self._order)
+        if self._source.orders.ends is None:
+            self.end(Result(True))
+        return True
+
+    def halt(self) -> None:
+        """Abandon the order."""
+        super().halt()
+        self._give_up()
+
+    def replace(self) -> None:
+        """Abandon the order for a newer one."""
+        self._give_up()
+        self.end(Result(False, REPLACED))
+
+    def ended(self, message: Any) -> None:
+        """Handle its end."""
+        values = values_of(message)
+        outcome = values.get(OUTCOME) if self._source.skill.outcomes else ""
+        self.end(
+            Result(values.get(SUCCESS) is True, text_in(values), outcome if isinstance(outcome, str) else "", values)
+        )
+
+    def changed(self) -> None:
+        """Check whether any of the subscribers that it was sent to is left."""
+        sender: OrderSender[Any] = self._shell.bound[SKILL + self._source.skill.name]
+        if not self.is_sent or self._sent_to & sender.listeners:
+            return
+        if not self._source.skill.restartable:
+            self.end(Result(False, GONE))
+            return
+        self.wait(f"nothing subscribes to {self.name} any more", GONE)
+        self.look_soon()
+
+    def next_look(self) -> float | None:
+        """Return when to poll it next [s]: when it may be sent, and while there is no subscriber."""
+        return super().next_look() if self._has_begun else max(self._desk.closed_until, self._shell.now)
+
+    def look(self) -> None:
+        """Send it as soon as possible; fail at the timeout."""
+        if self._has_begun:
+            super().look()
+        else:
+            self._begin_if_free()
+
+    def look_soon(self) -> None:
+        """Request a poll at this instant."""
+        self._shell.look_soon()
+
+    def end(self, result: Result) -> None:
+        """Report how it ended."""
+        self._desk.leave(self)
+        super().end(result)
+
+    def _begin_if_free(self) -> None:
+        if self._shell.now + ROUNDING >= self._desk.closed_until:
+            self._has_begun = True
+            super().begin()
+
+    def _give_up(self) -> None:
+        self._desk.leave(self)
+        halts = self._source.orders.halts
+        if not self.is_sent:
+            return
+        self.is_sent = False
+        self._desk.closed_until = self._shell.now + LATE_BY
+        if halts is not None:
+            self._shell.bound[HALTS + self._source.skill.name](registry.message(halts.message)())

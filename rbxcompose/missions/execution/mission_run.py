@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import zlib
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.values import NOT_ARRIVED, Value
 from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Refused
+from rbxcompose.missions.analysis.examined import claims_of
 from rbxcompose.missions.engine import logbook
 from rbxcompose.missions.engine.debugger import named
 from rbxcompose.missions.engine.engine import Engine
@@ -24,9 +26,11 @@ from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.world import PLAIN, POSE, Settings, World
 from rbxcompose.missions.execution.world import RobotWorld
 from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING, Result
-from rbxcompose.missions.program.program import Program, RobotNames, Skill
+from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.view.picture import Drawn, heading_of, picture_of
 from rbxcompose.missions.view.replica import Mirror
+from rbxcompose.msgs.rbxcompose_msgs import RunMission
+from rbxcompose.sdk.bound import ServedGoal
 
 BLOCK = 200  # records that are packed together, into about a tenth of their memory
 MOST_BLOCKS = 100
@@ -122,7 +126,7 @@ class MissionRun:
         world, self.robot = make(self._ended, self._said)
         self.log = LoggedWorld(world, lambda record: write(self._placed(record)))
         self.engine = Engine(program, names, inputs, self.log, settings)
-        self.claims = claims_of(self.engine.program, self.engine.robot.skills)  # parts of the robot, exclusively
+        self.claims = claims_of(self.engine.program, self.engine.robot)  # parts of the robot, exclusively
         self.mirror = Mirror(self.engine)
         self._states = (names.values.keys() | {POSE}) - names.events
         self._inputs, self._settings = inputs, settings
@@ -250,7 +254,7 @@ class MissionRun:
         self.robot.renumber(found.requests)
         self.story.renumber(found.nodes)
         self.engine, self._inputs = engine, engine.inputs
-        self.claims = claims_of(engine.program, engine.robot.skills)
+        self.claims = claims_of(engine.program, engine.robot)
         self.mirror = Mirror(engine, self.mirror.version)
         self._states = (engine.robot.values.keys() | {POSE}) - engine.robot.events
         for cached in ("_drawn", "_sentences"):
@@ -353,7 +357,60 @@ class MissionRun:
             self._on_line(level, text)
 
 
-def claims_of(program: Program, skills: Mapping[str, Skill]) -> frozenset[str]:
-    """Return the parts of the robot that the skills of a linked mission need exclusively."""
-    used = {node.skill for node in program.nodes}
-    return frozenset(skills[name].claims for name in used if name in skills and skills[name].claims)
+Order = ServedGoal[RunMission.Goal, RunMission.Result, RunMission.Feedback]
+
+
+class Begins(Protocol):
+    """Begins a mission with inputs as text, and parts of the robot that are lent to it."""
+
+    def __call__(self, name: str, inputs: Mapping[str, str], *, lent: frozenset[str]) -> MissionRun:
+        """Begin it.
+
+        Raises:
+            Refused: if it cannot run, with the reason.
+        """
+
+
+class OrderedMission:
+    """Runs one mission at a time for other components; the newest goal counts."""
+
+    def __init__(
+        self, inputs_of: Callable[[str], Collection[str]], begin: Begins, end: Callable[[MissionRun], None]
+    ) -> None:
+        self._inputs_of, self._begin_mission, self._end_mission = inputs_of, begin, end
+        self._goal: Order | None = None
+        self._run: MissionRun | None = None
+
+    def step(self, goal: Order | None) -> None:
+        """Begin what is wanted now, and report how it ended."""
+        if goal is not self._goal:
+            self._leave()
+            self._goal = goal
+            if goal is not None:
+                self._begin(goal)
+        if goal is None or self._run is None:
+            return
+        if goal.cancel_requested:
+            self._leave()
+            goal.canceled()
+        elif (end := self._run.end) is not None:
+            self._run = None
+            told = RunMission.Result(end.words or end.result)
+            if end.result == "success":
+                goal.succeeded(told)
+            else:
+                goal.aborted(told.message, told)
+
+    def _begin(self, goal: Order) -> None:
+        request, known = goal.request, self._inputs_of(goal.request.mission)
+        given = {name: text for name, text in zip(request.inputs, request.values, strict=False) if name in known}
+        try:
+            self._run = self._begin_mission(request.mission, given, lent=frozenset(request.lends))
+        except Refused as refusal:
+            goal.aborted(str(refusal), RunMission.Result(str(refusal)))
+
+    def _leave(self) -> None:
+        """End the mission of a goal that nobody wants any more."""
+        if self._run is not None and not self._run.is_over:
+            self._end_mission(self._run)
+        self._run = None

@@ -11,30 +11,22 @@ from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Query, Refused
+from rbxcompose.missions.analysis.examined import claims_of
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.exchange import Exchanged
 from rbxcompose.missions.engine.inputs import NoSuchState, bind_texts, start_at
 from rbxcompose.missions.engine.interventions import NotPossible
 from rbxcompose.missions.engine.logbook import LogRecord
 from rbxcompose.missions.engine.snapshot import from_plain
-from rbxcompose.missions.engine.value_text import show
-from rbxcompose.missions.engine.world import PLAIN, Observer, Settings
-from rbxcompose.missions.execution.breakpoints import Breakpoints
-from rbxcompose.missions.execution.errands import Equipment
-from rbxcompose.missions.execution.mission_run import LeftMission, LogStore, MakeWorld, MissionRun, claims_of
-from rbxcompose.missions.execution.requests import (
-    ListedInput,
-    ListedMission,
-    ListMissions,
-    LogPart,
-    LookAtAll,
-    PictureData,
-    Seen,
-)
+from rbxcompose.missions.engine.world import PLAIN, Observer, Settings, show
+from rbxcompose.missions.execution import requests
+from rbxcompose.missions.execution.debugging import Breakpoints
+from rbxcompose.missions.execution.equipment import MissionConfig
+from rbxcompose.missions.execution.mission_run import LeftMission, LogStore, MakeWorld, MissionRun
 from rbxcompose.missions.execution.snapshots import differences, identity_of
 from rbxcompose.missions.program.linker import link
-from rbxcompose.missions.program.machines import Input
 from rbxcompose.missions.program.outcomes import IDLE, NAMES
+from rbxcompose.missions.program.parts import Input
 from rbxcompose.missions.program.program import Program
 from rbxcompose.missions.view.picture import picture_of, picture_to_data
 from rbxcompose.sdk.bound import Window
@@ -54,7 +46,7 @@ class RunningMissions:
     """The running missions, in the order in which they began, and ended ones until they run again."""
 
     def __init__(
-        self, equipment: Equipment, make: MakeWorld, on_line: OnLine, publish: Callable[[LogRecord], None]
+        self, equipment: MissionConfig, make: MakeWorld, on_line: OnLine, publish: Callable[[LogRecord], None]
     ) -> None:
         self._equipment, self.make, self._on_line, self._publish = equipment, make, on_line, publish
         self.observer: Observer | None = None  # of all that begin from now on
@@ -119,7 +111,7 @@ class RunningMissions:
 
     # Other missions and places
 
-    def followed(self, equipment: Equipment) -> list[Followed]:
+    def followed(self, equipment: MissionConfig) -> list[Followed]:
         """Return how the missions that run would go on with what has changed; nothing is done so far.
 
         Raises:
@@ -127,13 +119,13 @@ class RunningMissions:
         """
         found = [followed for run in self if (followed := self._followed(run, equipment)) is not None]
         claims = {run.name: run.claims for run in self}
-        now = {**claims, **{one.run.name: claims_of(one.engine.program, equipment.names.skills) for one in found}}
+        now = {**claims, **{one.run.name: claims_of(one.engine.program, equipment.names) for one in found}}
         for name, other in combinations(claims, 2):
             if common := sorted((now[name] & now[other]) - (claims[name] & claims[other])):
                 raise Refused(f"missions {name} and {other} run, and both would use {' and '.join(common)}")
         return found
 
-    def _followed(self, run: MissionRun, equipment: Equipment) -> Followed | None:
+    def _followed(self, run: MissionRun, equipment: MissionConfig) -> Followed | None:
         """Return how a mission would go on; None if nothing changes for it."""
         program = equipment.names.missions.get(run.name)
         if program is None:
@@ -150,7 +142,7 @@ class RunningMissions:
         except NotPossible as error:
             raise Refused(f"mission {run.name} cannot go on: {error}") from error
 
-    def follow(self, equipment: Equipment, found: Iterable[Followed], now: float) -> tuple[str, ...]:
+    def follow(self, equipment: MissionConfig, found: Iterable[Followed], now: float) -> tuple[str, ...]:
         """Go on as `followed` has found; return the breakpoints that are gone."""
         gone = self.breakpoints.follow(equipment)
         self._equipment = equipment
@@ -193,7 +185,7 @@ class RunningMissions:
         self.runs[name].breakpoints = self.breakpoints.of(name)
         return self.runs[name]
 
-    def seen(self, name: str, since: int = 0) -> Seen:
+    def seen(self, name: str, since: int = 0) -> requests.Seen:
         """Return what has changed in a mission since the version that a viewer has; 0 gives the full state.
 
         Raises:
@@ -210,7 +202,7 @@ class RunningMissions:
         main = self._begun(name).engine.main
         return {name: main.show(name, value) for name, value in main.data.items()}
 
-    def picture(self, name: str) -> PictureData:
+    def picture(self, name: str) -> requests.PictureData:
         """Return the picture of a mission, as data; of one that has not been running, as it would run.
 
         Raises:
@@ -244,22 +236,24 @@ class RunningMissions:
             raise Refused(f"no mission is {word}")
         raise Refused(f"several missions are {word}: {', '.join(run.name for run in found)}; name one")
 
-    def listed(self) -> tuple[ListedMission, ...]:
+    def listed(self) -> tuple[requests.ListedMission, ...]:
         """Return all missions of the robot with their states."""
         return tuple(self._listed(name, program) for name, program in self._equipment.programs.items())
 
-    def _listed(self, name: str, program: Program) -> ListedMission:
+    def _listed(self, name: str, program: Program) -> requests.ListedMission:
         run, names = self.runs.get(name), self._equipment.names
-        claims = sorted(claims_of(link(program, names.missions), names.skills)) if name in names.missions else []
+        claims = sorted(claims_of(program, names)) if name in names.missions else []
         inputs = tuple(map(_listed_input, program.inputs.values()))
         states = program.nodes[program.main].step.states
         starts = states.names if states else ()
         at = ", ".join(stop["place"] for stop in run.stopped_at) if run else ""
-        return ListedMission(name, program.about, run.state if run else NAMES[IDLE], tuple(claims), inputs, starts, at)
+        return requests.ListedMission(
+            name, program.about, run.state if run else NAMES[IDLE], tuple(claims), inputs, starts, at
+        )
 
-    def since(self, number: int) -> LogPart:
+    def since(self, number: int) -> requests.LogPart:
         """Return the records of the log after the first `number`."""
-        return LogPart(self._log.written, self._log.since(number))
+        return requests.LogPart(self._log.written, self._log.since(number))
 
     def _begun(self, name: str) -> MissionRun:
         if name not in self.runs:
@@ -288,7 +282,7 @@ class RunningMissions:
 
     def _clashes(self, linked: Program, lent: frozenset[str]) -> Iterator[tuple[MissionRun, list[str]]]:
         """Yield the running missions that need parts of the robot that a mission needs as well, each with these."""
-        wanted = claims_of(linked, self._equipment.names.skills) - lent
+        wanted = claims_of(linked, self._equipment.names) - lent
         for other in self:
             if common := sorted(wanted & other.claims):
                 yield other, common
@@ -315,7 +309,7 @@ class Broadcast:
     """A window for each mission of a robot."""
 
     def __init__(self, names: Iterable[str], open_window: Open) -> None:
-        self._list = open_window(PATH, ListMissions())
+        self._list = open_window(PATH, requests.ListMissions())
         self._open, self._feeds = open_window, dict[str, MissionFeed]()
         self.follow(names)
 
@@ -323,7 +317,7 @@ class Broadcast:
         """Open windows for missions that have none yet."""
         for name in names:
             if name not in self._feeds:
-                self._feeds[name] = MissionFeed(self._open(f"{PATH}/{name}", LookAtAll(name)))
+                self._feeds[name] = MissionFeed(self._open(f"{PATH}/{name}", requests.LookAtAll(name)))
 
     def publish(self, missions: RunningMissions) -> None:
         """Publish what has changed; nothing is prepared without a viewer."""
@@ -357,12 +351,12 @@ class MissionFeed:
         self._window.put(fresh)
 
 
-def _picture(engine: Engine) -> PictureData:
+def _picture(engine: Engine) -> requests.PictureData:
     return picture_to_data(picture_of(engine.program, engine.robot))
 
 
-def _listed_input(given: Input) -> ListedInput:
+def _listed_input(given: Input) -> requests.ListedInput:
     choices = ("false", "true") if given.type == FLAG else given.type.choices
-    return ListedInput(
+    return requests.ListedInput(
         given.name, given.type.detail, choices, None if given.default is None else show(given.type, given.default.value)
     )

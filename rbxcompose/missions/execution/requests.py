@@ -3,7 +3,7 @@
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import field
-from typing import Any
+from typing import Any, TypeVar
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import Command, Query, Refused
@@ -11,17 +11,30 @@ from rbxcompose.base.requests import Command, Query, Refused
 MISSION = "mission"
 _SET, _FROM = "--set", "--from"
 
+A = TypeVar("A")
+
 Seen = Mapping[str, Any]
 """The state of a mission, as `Running.seen` returns it."""
 PictureData = Mapping[str, Any]
 """A picture of a mission, as `picture_to_data` returns it."""
 
 
-@dataclass(frozen=True, slots=True)
-class RunMission(Command):
-    """Start a mission, with inputs as text, in the state `start` of its machines if one is named."""
+class _Command(Command):
+    """A command about missions."""
 
     about = MISSION
+
+
+class _Query(Query[A]):
+    """A query about missions."""
+
+    about = MISSION
+
+
+@dataclass(frozen=True, slots=True)
+class RunMission(_Command):
+    """Start a mission, with inputs as text, in the state `start` of its machines if one is named."""
+
     mission: str
     inputs: Mapping[str, str] = field(default_factory=dict)
     start: str = ""
@@ -36,10 +49,9 @@ class RunMission(Command):
 
 
 @dataclass(frozen=True, slots=True)
-class _OfMission(Command):
+class _OfMission(_Command):
     """A command to a running mission; without a name, to the only one."""
 
-    about = MISSION
     mission: str = ""
 
     @property
@@ -79,25 +91,34 @@ class StepMission(_OfMission):
     """Let a mission go on to the start of its next leaf, or to the next transition of a machine."""
 
 
-@dataclass(frozen=True, slots=True)
-class SetBreakpoint(Command):
-    """Stop a mission at a node or a transition: `patrol.yaml:12`, a name, a state, `away->home`, or a number."""
+def _in(mission: str) -> list[str]:
+    return ["--mission", mission] if mission else []
 
-    about = MISSION
-    where: str
-    mission: str = ""
+
+class _InMission(_Command):
+    """A command about what is in a mission, which may be named."""
+
+    mission: str
 
     @property
     def words(self) -> str:
         """Return it as written on the command line."""
-        return shlex.join(["break", self.where, *_in(self.mission)])
+        return shlex.join([*(word.format(self) for word in self.written.split()), *_in(self.mission)])
 
 
 @dataclass(frozen=True, slots=True)
-class ClearBreakpoints(Command):
+class SetBreakpoint(_InMission):
+    """Stop a mission at a node or a transition: `patrol.yaml:12`, a name, a state, `away->home`, or a number."""
+
+    written = "break {0.where}"
+    where: str
+    mission: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ClearBreakpoints(_Command):
     """Clear the breakpoint at `where`; without it, all of them."""
 
-    about = MISSION
     where: str = ""
     mission: str = ""
 
@@ -122,32 +143,24 @@ class ListedBreakpoint:
 
 
 @dataclass(frozen=True, slots=True)
-class ListBreakpoints(Query[tuple[ListedBreakpoint, ...]]):
+class ListBreakpoints(_Query[tuple[ListedBreakpoint, ...]]):
     """Query the list of breakpoints."""
-
-    about = MISSION
 
 
 @dataclass(frozen=True, slots=True)
-class ForceNode(Command):
+class ForceNode(_InMission):
     """Halt a node that runs, and let it end with this outcome."""
 
-    about = MISSION
+    written = "force {0.where} {0.outcome}"
     where: str
     outcome: str
     mission: str = ""
 
-    @property
-    def words(self) -> str:
-        """Return it as written on the command line."""
-        return shlex.join(["force", self.where, self.outcome, *_in(self.mission)])
-
 
 @dataclass(frozen=True, slots=True)
-class SetMissionData(Command):
+class SetMissionData(_Command):
     """Set data of a mission that runs, given as text."""
 
-    about = MISSION
     values: Mapping[str, str]
     mission: str = ""
 
@@ -158,17 +171,12 @@ class SetMissionData(Command):
 
 
 @dataclass(frozen=True, slots=True)
-class JumpMission(Command):
+class JumpMission(_InMission):
     """Let a machine that runs leave its state and enter this one."""
 
-    about = MISSION
+    written = "jump {0.state}"
     state: str
     mission: str = ""
-
-    @property
-    def words(self) -> str:
-        """Return it as written on the command line."""
-        return shlex.join(["jump", self.state, *_in(self.mission)])
 
 
 OutcomesByNode = Mapping[str, Sequence[str]]
@@ -176,10 +184,9 @@ OutcomesByNode = Mapping[str, Sequence[str]]
 
 
 @dataclass(frozen=True, slots=True)
-class ListOutcomes(Query[OutcomesByNode]):
+class ListOutcomes(_Query[OutcomesByNode]):
     """Query in which outcomes the nodes of a mission may be forced to end."""
 
-    about = MISSION
     mission: str
 
 
@@ -195,15 +202,10 @@ class ListedDatum:
 
 
 @dataclass(frozen=True, slots=True)
-class ListData(Query[tuple[ListedDatum, ...]]):
+class ListData(_Query[tuple[ListedDatum, ...]]):
     """Query the data of a mission that runs, as `SetMissionData` takes them."""
 
-    about = MISSION
     mission: str
-
-
-def _in(mission: str) -> list[str]:
-    return ["--mission", mission] if mission else []
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,10 +235,8 @@ class ListedMission:
 
 
 @dataclass(frozen=True, slots=True)
-class ListMissions(Query[tuple[ListedMission, ...]]):
+class ListMissions(_Query[tuple[ListedMission, ...]]):
     """Query the list of missions."""
-
-    about = MISSION
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,10 +256,8 @@ class ListedSnapshot:
 
 
 @dataclass(frozen=True, slots=True)
-class ListSnapshots(Query[tuple[ListedSnapshot, ...]]):
+class ListSnapshots(_Query[tuple[ListedSnapshot, ...]]):
     """Query the runs that did not end and may go on."""
-
-    about = MISSION
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,34 +282,29 @@ class ListedTrigger:
 
 
 @dataclass(frozen=True, slots=True)
-class ListTriggers(Query[tuple[ListedTrigger, ...]]):
+class ListTriggers(_Query[tuple[ListedTrigger, ...]]):
     """Query the list of triggers."""
-
-    about = MISSION
 
 
 @dataclass(frozen=True, slots=True)
-class ShowPicture(Query[PictureData]):
+class ShowPicture(_Query[PictureData]):
     """Ask for the picture of a mission."""
 
-    about = MISSION
     mission: str
 
 
 @dataclass(frozen=True, slots=True)
-class LookAtMission(Query[Seen]):
+class LookAtMission(_Query[Seen]):
     """Query what has changed in a mission since a version; 0 gives the full state."""
 
-    about = MISSION
     mission: str
     since: int = 0
 
 
 @dataclass(frozen=True, slots=True)
-class LookAtAll(Query[Seen]):
+class LookAtAll(_Query[Seen]):
     """Query the full state of a mission, with its picture under `picture`."""
 
-    about = MISSION
     mission: str
 
 
@@ -324,10 +317,9 @@ class LogPart:
 
 
 @dataclass(frozen=True, slots=True)
-class ReadLog(Query[LogPart]):
+class ReadLog(_Query[LogPart]):
     """Query the records of the log after the first `after`."""
 
-    about = MISSION
     after: int = 0
 
 

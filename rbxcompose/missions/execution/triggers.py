@@ -17,7 +17,7 @@ from rbxcompose.base.expressions.values import NOT_ARRIVED, EvaluationError, Not
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.requests import Refused, from_data, to_data
 from rbxcompose.missions.engine.events import MissionEnded
-from rbxcompose.missions.engine.scopes import RobotValues, RunScope, SinceScope
+from rbxcompose.missions.engine.world import RobotValues, RunScope, SinceScope
 from rbxcompose.missions.execution.mission_run import MissionRun
 from rbxcompose.missions.execution.missions import RunningMissions
 from rbxcompose.missions.execution.requests import ListedTrigger, RunMission
@@ -79,32 +79,25 @@ class Executive(Protocol):
     @property
     def now(self) -> float:
         """Return robot time [s]."""
-        ...
 
     @property
     def stamp(self) -> int:
         """Return wall-clock time [ns]."""
-        ...
 
     def run(self, request: RunMission) -> str:
         """Begin a mission; raise Refused if it cannot run."""
-        ...
 
     def end(self, run: MissionRun) -> None:
         """End a mission that runs."""
-        ...
 
     def info(self, text: str) -> None:
         """Log an event."""
-        ...
 
     def warn(self, text: str) -> None:
         """Log a warning."""
-        ...
 
     def look_soon(self) -> None:
         """Request a wake at this instant."""
-        ...
 
 
 class Triggering:

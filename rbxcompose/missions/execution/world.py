@@ -9,8 +9,8 @@ from rbxcompose.base.levels import level_of
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.world import POSE
 from rbxcompose.missions.execution import errands
-from rbxcompose.missions.execution.python_skills import PythonErrand
-from rbxcompose.missions.execution.topic_skills import Desks, TopicErrand
+from rbxcompose.missions.execution.equipment import CALLS, PUBLISHES, SKILL, port_name
+from rbxcompose.missions.execution.errands import Desks, PythonErrand, TopicErrand
 from rbxcompose.missions.program.goals import filled, goal_of, message_of
 from rbxcompose.missions.program.outcomes import Result
 from rbxcompose.missions.sources import SkillWay, ValueSource
@@ -111,16 +111,13 @@ class RobotWorld:
         """Call a service."""
         request = message_of(registry.service(self._shell.equipment.services[service]).Request, fields)
         self._begin(
-            leaf,
-            errands.CallErrand(
-                self._shell, self._done(leaf), service, errands.port_name(errands.CALLS, service), request
-            ),
+            leaf, errands.CallErrand(self._shell, self._done(leaf), service, port_name(CALLS, service), request)
         )
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
         """Publish a message; raises ValueError if a field does not fit."""
         message = registry.message(self._shell.equipment.topics[topic].message)
-        self._shell.bound[errands.port_name(errands.PUBLISHES, topic)](message_of(message, fields))
+        self._shell.bound[port_name(PUBLISHES, topic)](message_of(message, fields))
 
     def halt(self, leaf: int, /) -> None:
         """Stop the request of a leaf."""
@@ -169,7 +166,7 @@ class RobotWorld:
                 return errands.GoalErrand(self._shell, done, source.skill, goal)
             case SkillWay.SERVICE:
                 request = filled(registry.service(source.action).Request, arguments)
-                return errands.CallErrand(self._shell, done, skill, errands.SKILL + skill, request)
+                return errands.CallErrand(self._shell, done, skill, SKILL + skill, request)
             case SkillWay.TOPIC:
                 order = filled(registry.message(source.action), arguments, source.skill.entries)
                 return TopicErrand(self._shell, done, self._desks.of(source), source, order)

@@ -1,1 +1,1 @@
-"""The kinds of mission nodes: one file each, which defines how it is read and how it runs."""
+"""The kinds of mission nodes: a file for each subject, which defines how they are read and how they run."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rbxcompose.base.config import MISSION
 from rbxcompose.missions import sdk
-from rbxcompose.missions.engine.resume_points import LAST
+from rbxcompose.missions.language.grammar import LAST
 
 
 class UseTask(sdk.WithHistory):

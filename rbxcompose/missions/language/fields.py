@@ -9,11 +9,9 @@ from typing import Any, ClassVar, Self
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.types import COUNT, UNKNOWN
 from rbxcompose.manifest.tree import ScalarNode
-from rbxcompose.missions.engine.resume_points import HISTORIES
-from rbxcompose.missions.language.grammar import KeySlot, Takes
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.language.value_reader import FOREVER
-from rbxcompose.missions.program.answers import Counted
+from rbxcompose.missions.language.grammar import HISTORIES, KeySlot, Takes
+from rbxcompose.missions.language.node_reader import FOREVER, NodeReader
+from rbxcompose.missions.program.parts import Counted
 
 HISTORY = "Where it restarts after it was halted: `last` at the child it was in, `deep` also inside that child."
 _FIELD = "field of a mission"  # in the metadata of a dataclass's field

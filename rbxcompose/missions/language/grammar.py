@@ -1,4 +1,4 @@
-"""The places of a mission's grammar: what each takes, for the slips that are recognised there."""
+"""The places of a mission's grammar: what each takes, for the slips that are recognised there; and its words."""
 
 from collections.abc import Collection, Mapping
 from enum import StrEnum
@@ -145,3 +145,35 @@ def is_reported(node: TreeNode | None) -> bool:
     if isinstance(node, MappingNode) and "" in node:
         node = node.entries[""].key
     return isinstance(node, ScalarNode) and node.filled is BROKEN
+
+
+BODIES = ("do", "machine")
+STATE_KEYS = (*BODIES, "on_enter", "on_exit", "next")
+
+
+_OURS = {
+    "fallback": "selector sel priority_selector",
+    "sequence": "seq steps sequential",
+    "parallel": "par simultaneously together concurrently",
+    "repeat": "loop",
+    "for": "foreach for_each",
+    "wait": "sleep delay pause",
+    "choose": "switch match case",
+    "log": "print echo",
+    "use": "subtree sub_tree submission include",
+    "run": "exec script",
+    "end": "return stop exit abort terminate",
+    "wait_for": "wait_until await wait_template wait_for_trigger",
+}
+FOREIGN: Mapping[str, str] = {name: ours for ours, names in _OURS.items() for name in names.split()}
+"""Our word for each of another mission language or of a behaviour tree."""
+
+OUTCOMES: Mapping[str, str] = {
+    **dict.fromkeys(("succeeded", "succeed", "succeeds", "done", "ok", "true"), "success"),
+    **dict.fromkeys(("aborted", "failed", "fail", "fails", "error", "preempted", "canceled", "false"), "failure"),
+}
+"""Our outcome for each of other mission languages."""
+
+
+NO_HISTORY, LAST, DEEP = "none", "last", "deep"
+HISTORIES = (NO_HISTORY, LAST, DEEP)  # the default first

@@ -1,14 +1,13 @@
-"""Literal values in a manifest, and whether the value of a typed argument or input can be of that type."""
+"""Literal values in a manifest: of the type that is wanted, poses that are written out, nodes in the data."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 
-from rbxcompose.base.expressions.text import TextSlot, parse_template, refuse_foreign
-from rbxcompose.base.expressions.tree import ExpressionError
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.tree import Expression, ExpressionNode, FieldAccess, Index, Variable
 from rbxcompose.base.expressions.types import (
     COUNT,
     FLAG,
     TEXT,
-    UNKNOWN,
     Type,
     TypeKind,
     accepts,
@@ -17,28 +16,21 @@ from rbxcompose.base.expressions.types import (
     quantity_of,
 )
 from rbxcompose.base.expressions.values import Value
-from rbxcompose.base.findings import DID_YOU_MEAN, Finding, FindingKind, surely_meant
+from rbxcompose.base.findings import DID_YOU_MEAN, Finding, FindingKind, Span, surely_meant
+from rbxcompose.base.printable import plain
 from rbxcompose.base.units import NUMBER, Quantity, UnitError, parse_quantity, to_si
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode, describe, plain_value
-from rbxcompose.missions import codes
-from rbxcompose.missions.analysis.scope_types import View
-from rbxcompose.missions.language.asked import expression_of, inner_span
-from rbxcompose.missions.program.machines import Datum
-
-
-def check_written(view: View, scalar: ScalarNode, wanted: Type, kind: FindingKind) -> Iterator[Finding]:
-    """Yield the findings on a value that must have a type; a wrong type is a finding of the given kind."""
-    try:
-        if wanted.kind is not TypeKind.TEXT:
-            yield from view.typed(expression_of(scalar), wanted, scalar, kind)
-            return
-        refuse_foreign(scalar.text)
-        for slot in parse_template(scalar.text).parts:
-            if isinstance(slot, TextSlot):
-                part = ScalarNode(slot.value.text, inner_span(scalar, slot.start, slot.end))
-                yield from view.typed(slot.value, UNKNOWN, part, kind)
-    except ExpressionError as error:
-        yield codes.NO_EXPRESSION.at(inner_span(scalar, error.start, error.end), error.message, help=error.help)
+from rbxcompose.manifest.tree import (
+    Key,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+    children,
+    describe,
+    plain_value,
+)
+from rbxcompose.missions.engine.world import show
+from rbxcompose.missions.program.parts import Datum, Input
 
 
 class WrongValue(ValueError):  # noqa: N818 - a user's mistake, told apart from errors of ours
@@ -49,6 +41,10 @@ class WrongValue(ValueError):  # noqa: N818 - a user's mistake, told apart from 
         self.message = message
         self.label = label
         self.help = help
+
+    def finding(self, kind: FindingKind, span: Span, what: str) -> Finding:
+        """Return the finding on this value; `what` is the subject of its message."""
+        return kind.at(span, f"{what} {self.message}", label=self.label, help=self.help)
 
 
 def literal(node: TreeNode) -> Datum:
@@ -132,3 +128,158 @@ def _typed(value: object) -> tuple[Value, Type]:
             return value, quantity_of(NUMBER)
         case _:
             return str(value), TEXT
+
+
+MAP = "map"
+_FRAMES = ("frame", "frame_id")
+_COORDINATES: Mapping[str, tuple[str, str]] = {  # ours, and the unit of a bare number in messages of ROS
+    **{"x": ("x", "m"), "y": ("y", "m")},
+    **dict.fromkeys(("heading", "theta", "yaw"), ("heading", "rad")),
+}
+_AROUND = ("header", "orientation", "point", "pose", "position", "translation", "z")
+_ORDER = ("x", "y", "heading")
+POSE_WORDS = frozenset((*_FRAMES, *_COORDINATES, *_AROUND))
+"""Keys of a pose that is written out."""
+
+
+def is_pose(keys: Collection[str]) -> bool:
+    """Return whether keys are those of a pose, a point, or what messages have around them."""
+    return bool(keys) and POSE_WORDS.issuperset(keys)
+
+
+def help_with_place(nodes: Mapping[str, TreeNode]) -> str:
+    """Return what to do with a pose that is written out: declare a place, with its own numbers."""
+    found = dict(_coordinates(nodes))
+    frame = next((frame for frame in _frames(nodes) if frame != MAP), "")
+    shown = ", ".join(f"{name}: {found[name]}" for name in _ORDER if name in found)
+    place = f"'NAME: {{{shown}}}'" if {"x", "y"} <= found.keys() else "a place"
+    reason = f"there are no poses in '{plain(frame, 60)}', all are in '{MAP}': " if frame else ""
+    return f"{reason}declare {place} under 'places' of the robot, and write its name"
+
+
+def nodes_of(node: TreeNode) -> Mapping[str, TreeNode]:
+    """Return what is below a node by its key; the items of a list are coordinates in their usual order."""
+    if isinstance(node, SequenceNode):
+        return dict(zip(_ORDER, node.items, strict=False))
+    return {str(key): below for key, below in children(node)}
+
+
+def _scalars(nodes: Mapping[str, TreeNode]) -> Iterator[tuple[str, ScalarNode]]:
+    waiting: list[tuple[Key, TreeNode]] = list(nodes.items())
+    while waiting:
+        key, node = waiting.pop()
+        if isinstance(node, ScalarNode):
+            yield str(key), node
+        waiting += children(node)
+
+
+def _frames(nodes: Mapping[str, TreeNode]) -> Iterator[str]:
+    return (scalar.text for key, scalar in _scalars(nodes) if key in _FRAMES)
+
+
+def _coordinates(nodes: Mapping[str, TreeNode]) -> Iterator[tuple[str, str]]:
+    """Yield the coordinates with their units, as far as they are numbers."""
+    for key, scalar in _scalars(nodes):
+        if key in _COORDINATES:
+            name, unit = _COORDINATES[key]
+            try:
+                parse_quantity(scalar.text)
+            except UnitError:
+                continue
+            is_bare = scalar.text.strip()[-1:].isdigit()
+            yield name, f"{scalar.text.strip()} {unit}" if is_bare else scalar.text.strip()
+
+
+ANY_ENTRY = None  # matches any entry of a list or a map
+ITEM = ""  # matches any item of a list in a loop; over a map, a loop iterates over the keys
+NodeKey = tuple[str, ...]  # where a node is in the data: ("chores", "kitchen", "0")
+PathPattern = tuple[str | None, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HeldNode:
+    """A value that is a node of the mission; `text` is how it is shown."""
+
+    key: NodeKey
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def pattern_of(expression: Expression, items: Mapping[str, PathPattern]) -> PathPattern | None:
+    """Return where in the data an expression points, None for nowhere; `items` are the patterns of the loops' items."""
+    return _pattern(expression.tree, items)
+
+
+def _pattern(tree: ExpressionNode, items: Mapping[str, PathPattern]) -> PathPattern | None:
+    match tree:
+        case Variable(name=name):
+            return items.get(name, (name,))
+        case Index(of=operand):
+            inner = _pattern(operand, items)
+            return None if inner is None else (*inner, ANY_ENTRY)
+        case FieldAccess(of=operand, name=name):
+            inner = _pattern(operand, items)
+            return None if inner is None else (*inner, name)
+    return None
+
+
+def matching(data: Mapping[str, TreeNode], pattern: PathPattern) -> Iterator[tuple[NodeKey, TreeNode]]:
+    """Yield the parts of the data that match a pattern, each with its key."""
+    name = pattern[0] or ""
+    if name in data:
+        yield from _below((name,), data[name], pattern[1:])
+
+
+def _below(key: NodeKey, node: TreeNode, pattern: PathPattern) -> Iterator[tuple[NodeKey, TreeNode]]:
+    if not pattern:
+        yield key, node
+        return
+    first, rest = pattern[0], pattern[1:]
+    for name, entry in _entries(node):
+        if first in (ANY_ENTRY, name) or (first == ITEM and isinstance(node, SequenceNode)):
+            yield from _below((*key, name), entry, rest)
+
+
+def _entries(node: TreeNode) -> Iterator[tuple[str, TreeNode]]:
+    if isinstance(node, MappingNode):
+        yield from ((name, entry.value) for name, entry in node.entries.items())
+    elif isinstance(node, SequenceNode):
+        yield from ((str(index), item) for index, item in enumerate(node.items))
+
+
+def brief(node: TreeNode) -> str:
+    """Return a node as people would say it: `mop 7 s`."""
+    match node:
+        case ScalarNode(text=text):
+            return text
+        case MappingNode(entries=entries) if entries:
+            name, entry = next(iter(entries.items()))
+            return f"{name} {brief(entry.value)}".strip() if isinstance(entry.value, ScalarNode) else name
+        case SequenceNode(items=items):
+            return ", ".join(brief(item) for item in items[:3])
+    return ""
+
+
+def with_held(value: Value, nodes: Mapping[NodeKey, TreeNode], key: NodeKey) -> Value:
+    """Return a value of the data, at this key, with its nodes replaced by `HeldNode`s."""
+    if key in nodes:
+        return HeldNode(key, brief(nodes[key]))
+    if isinstance(value, dict):
+        return {name: with_held(entry, nodes, (*key, name)) for name, entry in value.items()}
+    if isinstance(value, list):
+        return [with_held(entry, nodes, (*key, str(index))) for index, entry in enumerate(value)]
+    return value
+
+
+def range_trouble(declared: Input, given: Datum) -> str:
+    """Return why a value is out of the range of its input, as words that follow its name; else nothing."""
+    value = given.value
+    if not isinstance(value, float):
+        return ""
+    if declared.least is not None and value < declared.least:
+        return f"is below its 'min' of {show(declared.type, declared.least)}: {show(declared.type, value)}"
+    if declared.most is not None and value > declared.most:
+        return f"is above its 'max' of {show(declared.type, declared.most)}: {show(declared.type, value)}"
+    return ""

@@ -5,26 +5,151 @@ from dataclasses import replace
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.tree import Expression
-from rbxcompose.base.expressions.types import UNKNOWN
+from rbxcompose.base.expressions.types import TYPES, UNKNOWN, Type, TypeKind, choice_of
 from rbxcompose.base.findings import Finding, Related, Report, Span
+from rbxcompose.manifest.arguments import CHOICE, unknown_type
 from rbxcompose.manifest.documents import misspelt_keys, with_keys
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, count, scalars
 from rbxcompose.missions import codes
-from rbxcompose.missions.analysis.held_nodes import ITEM, PathPattern, matching, pattern_of, with_held
-from rbxcompose.missions.analysis.uses import TOO_MUCH
-from rbxcompose.missions.language.asked import Asked
-from rbxcompose.missions.language.grammar import LEVELS, long_form
-from rbxcompose.missions.language.header import read_data, read_inputs, read_rate
-from rbxcompose.missions.language.keys import find_key
-from rbxcompose.missions.language.machine_reader import STATE_KEYS, as_state
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.language.repair import Repairs
-from rbxcompose.missions.language.value_reader import NAME, NAME_HELP, invalid_name
-from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
+from rbxcompose.missions.engine.world import show
+from rbxcompose.missions.language.grammar import BODIES, LEVELS, STATE_KEYS, is_reported, long_form
+from rbxcompose.missions.language.literals import (
+    ITEM,
+    PathPattern,
+    WrongValue,
+    literal,
+    matching,
+    pattern_of,
+    range_trouble,
+    typed,
+    with_held,
+)
+from rbxcompose.missions.language.node_reader import NAME, NAME_HELP, NodeReader, Nodes, invalid_name, unknown_keys
 from rbxcompose.missions.program import program
-from rbxcompose.missions.program.machines import STATE
-from rbxcompose.missions.program.program import AFTERWARDS, RESTART, Interrupt, Program, Target
-from rbxcompose.missions.program.registry import SKILL, StepType, all_kinds, kinds
+from rbxcompose.missions.program.linker import TOO_MUCH
+from rbxcompose.missions.program.parts import STATE, Asked, Datum, Input
+from rbxcompose.missions.program.program import AFTERWARDS, RATE, RESTART, Interrupt, Program, Target
+from rbxcompose.missions.program.registry import SKILL, StepType, all_kinds, anywhere, kinds, modifier_keys, modifiers
+from rbxcompose.missions.slips import Repairs
+
+INPUT_KEYS = ("type", "default", "min", "max", "choices", "about")
+FASTEST = 1000.0  # [Hz]
+
+
+def read_data(node: TreeNode | None, report: Report) -> dict[str, Datum]:
+    """Return the initial values under `data:`."""
+    entries = _named(node, "data", report)
+    return {name: replace(literal(entry.value), span=entry.key.span) for name, entry in entries.items()}
+
+
+def read_inputs(node: TreeNode | None, report: Report) -> dict[str, Input]:
+    """Return the inputs under `inputs:`; one whose type cannot be read may have any."""
+    return {name: _input(name, entry, report) for name, entry in _named(node, "inputs", report).items()}
+
+
+def read_rate(node: TreeNode | None, report: Report) -> float:
+    """Return how often conditions are evaluated whose changes nothing announces [Hz]."""
+    rate = _value(node, TYPES["frequency"], "'rate'", report) if node else None
+    if not rate or not isinstance(rate.value, float):
+        return RATE
+    if not 0 < rate.value <= FASTEST:
+        report.add(codes.WRONG_TYPE.at(rate.span, f"'rate' must be above 0 and at most {FASTEST:.0f} Hz"))
+        return RATE
+    return rate.value
+
+
+def _named(node: TreeNode | None, section: str, report: Report) -> dict[str, Entry]:
+    """Return the entries of a section whose names may be used in expressions."""
+    if node is None or (isinstance(node, ScalarNode) and node.plain and not node.text):
+        return {}
+    if not isinstance(node, MappingNode):
+        report.add(codes.WRONG_SHAPE.at(node.span, f"'{section}' needs names with their values below it"))
+        return {}
+    for name, entry in node.entries.items():
+        if not NAME.fullmatch(name):
+            report.add(invalid_name(entry.key))
+        elif name in kinds():
+            report.add(codes.NAME_CLASH.at(entry.key.span, f"'{name}' is a word of the language"))
+    return node.entries
+
+
+def _input(name: str, entry: Entry, report: Report) -> Input:
+    value, place = entry.value, entry.key.span
+    if not isinstance(value, MappingNode):
+        message = f"the input '{name}' needs its 'type' below it"
+        report.add(codes.WRONG_SHAPE.at(value.span, message, help="give 'type' and perhaps 'default'"))
+        return Input(name, UNKNOWN, place, is_sound=False)
+    report.extend(unknown_keys(value, INPUT_KEYS, f"the input '{name}'", "an input"))
+    if (wanted := _type(name, value, entry, report)) is None:
+        return Input(name, UNKNOWN, place, is_sound=False)
+    default, least, most = (_value(value.get(key), wanted, f"'{key}'", report) for key in ("default", "min", "max"))
+    if default and wanted.kind in (TypeKind.LIST, TypeKind.MAP):
+        wanted = default.type
+    is_sound = value.entries.keys() <= {*INPUT_KEYS} and (default is not None or "default" not in value)
+    read = Input(name, wanted, place, default, _number(least), _number(most), is_sound)
+    if least and read.least is not None and read.most is not None and read.least > read.most:
+        message = f"'min' of '{name}' is above its 'max' of {show(wanted, read.most)}: no value fits"
+        report.add(codes.WRONG_TYPE.at(least.span, message, help="exchange them"))
+        return replace(read, least=None, most=None)
+    if default and (trouble := range_trouble(read, default)):
+        report.add(codes.WRONG_TYPE.at(default.span, f"the default of '{name}' {trouble}"))
+    return read
+
+
+def _type(name: str, value: MappingNode, entry: Entry, report: Report) -> Type | None:
+    word = value.get("type")
+    if not isinstance(word, ScalarNode):
+        report.add(codes.MISSING.at(word.span if word else entry.key.span, f"the input '{name}' needs a 'type'"))
+        return None
+    if word.text == CHOICE:
+        choices = value.get("choices")
+        if isinstance(choices, SequenceNode) and choices.items:
+            return choice_of(*(item.text for item in choices.items if isinstance(item, ScalarNode)))
+        report.add(codes.MISSING.at(entry.key.span, f"the input '{name}' needs 'choices': a list of words"))
+        return None
+    if word.text not in TYPES:
+        report.add(unknown_type(codes.NOT_A_CHOICE, word.span, word.text))
+        return None
+    return TYPES[word.text]
+
+
+def _value(node: TreeNode | None, wanted: Type, what: str, report: Report) -> Datum | None:
+    if node is None:
+        return None
+    try:
+        return typed(node, wanted)
+    except WrongValue as error:
+        report.add(error.finding(codes.WRONG_TYPE, node.span, what))
+        return None
+
+
+def _number(datum: Datum | None) -> float | None:
+    return datum.value if datum and isinstance(datum.value, float) else None
+
+
+def _cure(step: MappingNode) -> str:
+    """Return what to do with a step that has only settings, or nothing at all."""
+    first = next(iter(step.entries), "")
+    if not first:
+        return "a step is a word such as 'sequence' or 'wait', or the name of a skill"
+    value = step.entries[first].value
+    shown = f" {value.text}" if isinstance(value, ScalarNode) and value.text else ""
+    return f"'{first}' is a setting of a step: write '{first}:{shown}' without a dash, right below the word of its step"
+
+
+def find_key(step: MappingNode, nodes: Nodes) -> tuple[str, StepType | None]:
+    """Return the key of a step and its kind, None for a skill; if there is neither, an empty key, with a finding."""
+    if is_reported(step):
+        return "", None
+    own = [key for key in step.entries if key not in anywhere()]
+    key = next((key for key in own if key in kinds()), own[0] if own else "")
+    if not own:
+        nodes.add(codes.WRONG_SHAPE.at(step.span, "there is no step here", help=_cure(step)))
+    elif not key.strip():
+        nodes.add(codes.MISSING.at(step.entries[key].key.span, "a step is missing here"))
+        return "", None
+    return key, kinds().get(key)
+
 
 MOST_HELD = 5_000  # values, names and operators of nodes in the data, counted for each `run` that may get them
 MOST_WRITTEN = 30_000  # names and operators in all texts
@@ -61,7 +186,6 @@ def operators(scalar: ScalarNode) -> int:
     return 0 if len(text) <= _SHORT else sum(map(text.count, _OPERATORS))
 
 
-BODIES = ("do", "machine")
 KEYS = ("rbx", "kind", "name", "about", "inputs", "data", "outputs", "interrupts", "rate", *BODIES)
 INTERRUPT_KEYS = ("when", "do", "afterwards")
 
@@ -80,12 +204,7 @@ def read_program(
         return None
     repairs = Repairs.of(report, skills)
     whole, root = root, repairs.mission(root)
-    for name, entry in root.entries.items():
-        if name not in KEYS:
-            message = f"unknown key '{name}' in a mission"
-            report.add(
-                codes.UNKNOWN_KEY.misspelt(entry.key.span, message, name, KEYS, "keys of a mission", taken=root.entries)
-            )
+    report.extend(unknown_keys(root, KEYS, "a mission"))
     is_open = _is_open(root)
     root = with_keys(root, misspelt_keys(root, KEYS))
     inputs, data = read_inputs(root.get("inputs"), report), read_data(root.get("data"), report)
@@ -198,11 +317,7 @@ class _Reader:
         self.paths.append(f"{self.paths[-1]}.{name}")
         state = all_kinds()[STATE]
         self.nodes[number] = self.read(NodeReader(mapping, name, number, self), state, parent, name, entry.key.span)
-        for key, one in mapping.entries.items():
-            if key not in (*STATE_KEYS, *modifier_keys()):
-                message, what = f"unknown key '{key}' in the state '{name}'", "keys of a state"
-                valid, taken = (*STATE_KEYS, *modifier_keys()), mapping.entries
-                self.add(codes.UNKNOWN_KEY.misspelt(one.key.span, message, key, valid, what, taken=taken))
+        self.report.extend(unknown_keys(mapping, (*STATE_KEYS, *modifier_keys()), f"the state '{name}'", "a state"))
         self.paths.pop()
         return number
 
@@ -336,11 +451,7 @@ class _Reader:
         if not isinstance(value, MappingNode):
             self.add(codes.WRONG_SHAPE.at(value.span, f"the interrupt '{name}' needs 'when' and 'do'"))
             return None
-        for key, unknown in value.entries.items():
-            if key not in INTERRUPT_KEYS:
-                message, what = f"unknown key '{key}' in the interrupt '{name}'", "keys of an interrupt"
-                taken = value.entries
-                self.add(codes.UNKNOWN_KEY.misspelt(unknown.key.span, message, key, INTERRUPT_KEYS, what, taken=taken))
+        self.report.extend(unknown_keys(value, INTERRUPT_KEYS, f"the interrupt '{name}'", "an interrupt"))
         reader = NodeReader(value, "when", len(self.nodes), self)
         if "when" not in value:
             self.add(codes.MISSING.at(entry.key.span, f"the interrupt '{name}' needs 'when': a condition"))
@@ -368,3 +479,8 @@ class _Reader:
             for name in dict.fromkeys((node.name, node.item)):
                 found.setdefault(name, []).append(Target(node.number, node.item == name))
         return {name: tuple(targets) for name, targets in found.items() if name}
+
+
+def as_state(entry: Entry) -> MappingNode:
+    """Return the mapping of a state, even if it was written wrongly."""
+    return entry.value if isinstance(entry.value, MappingNode) else MappingNode({}, entry.key.span)

@@ -11,9 +11,8 @@ from typing import Any
 
 from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode
-from rbxcompose.missions.program.branches import Branches
-from rbxcompose.missions.program.in_turn import InTurn
-from rbxcompose.missions.program.machines import MachineStates, Next
+from rbxcompose.missions.program.families import InTurn
+from rbxcompose.missions.program.parts import Branches, MachineStates, Next
 from rbxcompose.missions.program.program import MissionNode, Program
 
 _ABOUT_CHILDREN = (Branches, MachineStates, Next)

@@ -17,16 +17,100 @@ from rbxcompose.base.expressions.types import Type
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import MappingNode, ScalarNode
-from rbxcompose.missions.engine.resume_points import NO_HISTORY
-from rbxcompose.missions.engine.value_text import show
-from rbxcompose.missions.language.asked import Asked, WrittenArgument
+from rbxcompose.missions.engine.world import show
 from rbxcompose.missions.language.fields import Declared
-from rbxcompose.missions.program.answers import Advice, NodeEffects, NodeFlow, NodeLook, Possibility, Skipped
-from rbxcompose.missions.program.branches import BranchChoice, Branches
-from rbxcompose.missions.program.machines import Datum, Input, MachineStates, Next
-from rbxcompose.missions.program.modifier import Modifier
+from rbxcompose.missions.language.grammar import NO_HISTORY
 from rbxcompose.missions.program.outcomes import Outcomes
+from rbxcompose.missions.program.parts import (
+    Advice,
+    Asked,
+    BranchChoice,
+    Branches,
+    Datum,
+    Input,
+    MachineStates,
+    ModifierScope,
+    Moments,
+    Next,
+    NodeEffects,
+    NodeFlow,
+    NodeLook,
+    Possibility,
+    Skipped,
+    WrittenArgument,
+)
 from rbxcompose.msgs.fields import ArrayEntries, NumberRange
+
+
+class Modifier(Declared, ABC):
+    """A setting of a node, with its options; only some modifiers override what is not abstract."""
+
+    __slots__ = ()
+    only_states: ClassVar[bool]  # it is for states of machines only
+
+    @abstractmethod
+    def changed(self, inner: Outcomes) -> Outcomes:
+        """Return the outcomes of a node with this modifier; `inner` are those without it."""
+
+    @property
+    @abstractmethod
+    def may_skip(self) -> bool:
+        """Return whether it may keep the node from starting."""
+
+    @property
+    @abstractmethod
+    def serves(self) -> ModifierScope:
+        """Return which nodes it is meant for."""
+
+    @property
+    @abstractmethod
+    def value(self) -> Expression | None:
+        """Return the expression behind its key."""
+
+    @abstractmethod
+    def clause(self) -> str:
+        """Return what it adds to the sentence of its node, read aloud: 'for at most 30 s'; empty for nothing."""
+
+    @property
+    def said(self) -> str:
+        """Return the text to draw behind its key."""
+        return self.value.text if self.value else ""
+
+    @property
+    def repeats(self) -> bool:
+        """Return whether it may start the node inside more than once."""
+        return False
+
+    @property
+    def endless(self) -> Advice | None:
+        """Return the advice to give if the node inside takes no time."""
+        return None
+
+    @property
+    def limit(self) -> Expression | None:
+        """Return the time limit of the node."""
+        return None
+
+    @property
+    def attempt_limit(self) -> Expression | None:
+        """Return the time limit of each attempt."""
+        return None
+
+    @property
+    def forgives(self) -> bool:
+        """Return whether a failure may count as success."""
+        return False
+
+    @property
+    def saved(self) -> ScalarNode | None:
+        """Return the name under which the result is saved."""
+        return None
+
+    @property
+    def moments(self) -> Moments | None:
+        """Return what its hooks do."""
+        return None
+
 
 ROOT = 0  # number of the node under `do`
 RATE = 20.0  # [Hz] for polling conditions that change without a message
@@ -100,15 +184,12 @@ class Endings(Protocol):
     @property
     def constants(self) -> Mapping[str, Value]:
         """Return the data that nothing changes."""
-        ...
 
     def of(self, number: int, /) -> Outcomes:
         """Return how a node may end, its modifiers included."""
-        ...
 
     def of_mission(self, name: str, /) -> Outcomes:
         """Return how another mission may end."""
-        ...
 
 
 class Step(Declared, ABC):
@@ -317,6 +398,11 @@ class MissionNode:
     def may_be_left_out(self) -> bool:
         """Return whether a modifier may keep it from starting."""
         return any(modifier.may_skip for modifier in self.modifiers.values())
+
+    @property
+    def comes_again(self) -> bool:
+        """Return whether it may run its children, or a modifier it, more than once."""
+        return self.step.comes_again or any(modifier.repeats for modifier in self.modifiers.values())
 
     @property
     def is_forgiven(self) -> bool:

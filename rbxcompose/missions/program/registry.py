@@ -1,15 +1,16 @@
-"""The registry of mission node kinds: each is one file in `missions/kinds`, registered by a decorator."""
+"""The registries of the kinds of mission nodes and of their modifiers: how each is declared, and in which order."""
 
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import TypeAlias, TypeVar
 
 from rbxcompose.missions import kinds as package
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.program.program import Step
+from rbxcompose.missions.language.grammar import BELOW, Takes
+from rbxcompose.missions.program.program import Modifier, Step
 
 StepType: TypeAlias = type[Step]
 S = TypeVar("S", bound=Step)
@@ -73,3 +74,76 @@ def all_kinds() -> dict[str, StepType]:
     for module in pkgutil.iter_modules(package.__path__):
         importlib.import_module(f"{package.__name__}.{module.name}")
     return dict(sorted(KINDS.items()))
+
+
+# Outermost first, whatever the order in the text: a rule of the language.
+MODULES = ("starts", "results")
+
+
+M = TypeVar("M", bound=Modifier)
+MODIFIERS: dict[str, type[Modifier]] = {}
+_DECORATORS: dict[type[Modifier], Callable[[Modifier, Site, Task], Task]] = {}
+
+
+def modifier(
+    name: str, task: Callable[[Site, M, Task], Task], *, only_states: bool = False
+) -> Callable[[type[M]], type[M]]:
+    """Register a modifier under its key, inside those that its module registered before.
+
+    Raises:
+        TypeError: if the modifier does not implement all abstract members.
+    """
+
+    def register(cls: type[M]) -> type[M]:
+        if inspect.isabstract(cls):
+            raise TypeError(f"the modifier '{name}' does not answer {', '.join(sorted(cls.__abstractmethods__))}")
+
+        def make(options: Modifier, site: Site, inner: Task) -> Task:
+            if not isinstance(options, cls):
+                raise TypeError(f"'{site.node.path}' has no '{name}'")
+            return task(site, options, inner)
+
+        cls.bind(name)
+        cls.only_states = only_states
+        MODIFIERS[name], _DECORATORS[cls] = cls, make
+        return cls
+
+    return register
+
+
+def decorator_of(options: Modifier, site: Site, inner: Task) -> Task:
+    """Return the task that carries out a modifier of a node, around another one."""
+    return _DECORATORS[type(options)](options, site, inner)
+
+
+@cache
+def modifiers() -> Mapping[str, type[Modifier]]:
+    """Return all modifiers by key, outermost first."""
+    found: dict[str, type[Modifier]] = {}
+    for module in MODULES:
+        name = importlib.import_module(f"rbxcompose.missions.modifiers.{module}").__name__
+        found.update((key, cls) for key, cls in MODIFIERS.items() if cls.__module__ == name)
+    return found
+
+
+@cache
+def modifier_keys() -> Mapping[str, type[Modifier]]:
+    """Return every key that modifiers of nodes read, with its modifier."""
+    found = ((key, cls) for cls in modifiers().values() for key in cls.fields if not cls.only_states)
+    return dict(found)
+
+
+@cache
+def anywhere() -> tuple[str, ...]:
+    """Return the keys that any node may have."""
+    return ("name", *modifier_keys())
+
+
+@cache
+def keys_taking(*taken: Takes) -> frozenset[str]:
+    """Return the keys of steps, states, machines and interrupts that take one of these."""
+    of_kinds = (field for kind in kinds().values() for field in kind.fields.values())
+    below = ((key, slot.takes) for slots in BELOW.values() for key, slot in slots.items())
+    return frozenset(
+        key for key, takes in (*below, *((field.key, field.takes) for field in of_kinds)) if takes in taken
+    )

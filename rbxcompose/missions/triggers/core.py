@@ -7,8 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.missions.triggers.schedule import Local
-from rbxcompose.missions.triggers.trigger import INTERRUPT, QUEUE, Trigger
+from rbxcompose.missions.triggers.trigger import INTERRUPT, QUEUE, Local, Trigger
 
 LATE = 60.0  # [s] after a time of day, it counts as missed
 CHECK = 30.0  # [s] between looks at the wall clock, which may be set
@@ -23,23 +22,18 @@ class Effects(Protocol):
 
     def in_the_way(self, mission: str, /) -> Sequence[str]:
         """Return the missions that run and keep this one from starting, itself included."""
-        ...
 
     def begin(self, trigger: Trigger, /) -> str:
         """Start its mission; return why that is refused, or nothing."""
-        ...
 
     def cancel(self, mission: str, trigger: Trigger, /) -> None:
         """End a mission for good."""
-        ...
 
     def leave_out(self, trigger: Trigger, why: str, /) -> None:
         """Report that a trigger starts nothing this time."""
-        ...
 
     def wait(self, trigger: Trigger, missions: Sequence[str], /) -> None:
         """Report that a trigger waits until these missions have ended."""
-        ...
 
 
 @dataclass(slots=True)

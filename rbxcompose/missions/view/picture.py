@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.text import condition_in_words
-from rbxcompose.missions.program.answers import Form
 from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.program.parts import Form
 from rbxcompose.missions.program.program import CONTINUE, END, RESTART, Interrupt, MissionNode, Program, RobotNames
 
 LONGEST = 60  # characters of the text in a node

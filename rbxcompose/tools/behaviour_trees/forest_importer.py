@@ -22,9 +22,8 @@ from rbxcompose.domains.body.xml_reader import XmlElement
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.language.grammar import LEVELS
-from rbxcompose.missions.language.value_reader import NAME as _NAME
-from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
-from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.language.node_reader import NAME as _NAME
+from rbxcompose.missions.program.registry import kinds, modifier_keys, modifiers
 from rbxcompose.tools.behaviour_trees import nodes
 from rbxcompose.tools.behaviour_trees.forest import Forest, below, type_of
 from rbxcompose.tools.behaviour_trees.nodes import CONDITIONS, DIFFERS, EXPLICIT, MISTAKE, NODES, NOT_SAID

@@ -14,8 +14,7 @@ from rbxcompose.base.expressions.parser import parse
 from rbxcompose.base.expressions.tree import ExpressionError
 from rbxcompose.base.findings import Severity, kind
 from rbxcompose.base.units import NUMBER, TIME
-from rbxcompose.missions.language.keys import anywhere
-from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.program.registry import anywhere, kinds
 from rbxcompose.tools.behaviour_trees.scripts import ScriptError, condition, script_of, text_of, unplaced
 
 MISTAKE = kind("RBX2264")

@@ -16,11 +16,10 @@ from rbxcompose.domains.body.xml_reader import quoted
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.reader import read_source, read_text
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
-from rbxcompose.missions.language.asked import expression_of
 from rbxcompose.missions.language.grammar import long_form
-from rbxcompose.missions.language.keys import anywhere
 from rbxcompose.missions.language.reader import read_program
-from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.program.parts import expression_of
+from rbxcompose.missions.program.registry import anywhere, kinds
 from rbxcompose.tools.behaviour_trees import nodes
 from rbxcompose.tools.behaviour_trees.forest_importer import assignments_script, queue_of
 from rbxcompose.tools.behaviour_trees.nodes import CANNOT_EXPORT, NODES, TWIN

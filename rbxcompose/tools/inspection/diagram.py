@@ -13,7 +13,7 @@ from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, Robo
 from rbxcompose.compiler.model.values import triggers_of
 from rbxcompose.compiler.plan.model import BusPlan
 from rbxcompose.domains.muxes.sections.muxes import muxes
-from rbxcompose.missions.analysis.effects import sent_by
+from rbxcompose.missions.analysis.facts import sent_by
 from rbxcompose.missions.engine.world import POSE
 from rbxcompose.missions.sources import SkillWay
 from rbxcompose.missions.triggers.trigger import Trigger

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from rbxcompose.commands.layout import MOST_EFFORT, TOO_TANGLED, Layout, LayoutItem, NotDrawnError, effort, lay_out
-from rbxcompose.missions.program.answers import Form
 from rbxcompose.missions.program.outcomes import IDLE, NAMES
+from rbxcompose.missions.program.parts import Form
 from rbxcompose.missions.view.picture import Drawn, MissionPicture
 from rbxcompose.tools.inspection.mission_text import MARKS, status_of
 

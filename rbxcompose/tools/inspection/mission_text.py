@@ -4,8 +4,8 @@ import json
 from collections.abc import Iterator, Sequence
 
 from rbxcompose.base.printable import fitted, plain
-from rbxcompose.missions.program.answers import Form
 from rbxcompose.missions.program.outcomes import FAILURE, IDLE, NAMES, RUNNING, SKIPPED, SUCCESS
+from rbxcompose.missions.program.parts import Form
 from rbxcompose.missions.view.picture import Drawn, MissionPicture
 
 MARKS = {IDLE: "·", RUNNING: "▶", SUCCESS: "✓", FAILURE: "✗", SKIPPED: "-"}

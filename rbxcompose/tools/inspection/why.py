@@ -23,8 +23,8 @@ from rbxcompose.domains.muxes.sections.muxes import muxes
 from rbxcompose.manifest.registry import naming, robot_keys
 from rbxcompose.manifest.section import SetScope
 from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at, key_span
-from rbxcompose.missions.engine.value_text import show as show_value
-from rbxcompose.missions.program.machines import Input
+from rbxcompose.missions.engine.world import show as show_value
+from rbxcompose.missions.program.parts import Input
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Serves, ServesAction, ServesTopic
 from rbxcompose.tools.inspection.diagram import does, keys_of, qos_of
 from rbxcompose.tools.inspection.origin import Origin, as_data, expand_below, origin_of, shown

@@ -16,13 +16,11 @@ from rbxcompose.manifest import tree
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.registry import naming
-from rbxcompose.missions.analysis.scope_types import base_names, views
+from rbxcompose.missions.analysis.examined import base_names, views
 from rbxcompose.missions.engine.world import POSE
 from rbxcompose.missions.language.grammar import Takes
-from rbxcompose.missions.language.keys import keys_taking
-from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.program.program import Program
-from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.program.registry import keys_taking, kinds, modifier_keys
 from rbxcompose.tools.lsp.document import Document, Spot, quick_tree
 from rbxcompose.tools.lsp.names import SKILL, below_profile, named_by_key
 from rbxcompose.tools.lsp.project import MISSION, kind_of

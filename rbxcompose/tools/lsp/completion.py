@@ -11,7 +11,7 @@ from rbxcompose.base.units import NUMBER_TEXT, Dimension, units_of
 from rbxcompose.compiler.schema.guide import Guide, GuidedValue
 from rbxcompose.compiler.schema.scalars import Schema
 from rbxcompose.manifest.documents import KINDS
-from rbxcompose.missions.language.keys import anywhere
+from rbxcompose.missions.program.registry import anywhere
 from rbxcompose.tools.lsp.answers import fills, variables
 from rbxcompose.tools.lsp.document import Document, Spot
 from rbxcompose.tools.lsp.names import SKILL, named_by_key

@@ -12,7 +12,7 @@ from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.registry import section_named
 from rbxcompose.manifest.section import ROBOT
 from rbxcompose.manifest.tree import NOWHERE, ScalarNode
-from rbxcompose.missions.language.value_reader import NAME, invalid_name
+from rbxcompose.missions.language.node_reader import NAME, invalid_name
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.tools.lsp.mentions import Mention, SymbolIndex
 from rbxcompose.tools.lsp.project import Project

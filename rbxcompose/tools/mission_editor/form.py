@@ -23,8 +23,7 @@ from rbxcompose.compiler.schema.guide import Guide, GuidedValue
 from rbxcompose.compiler.schema.mission import ITEM_NAME, skills_of
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions.language.fields import first_line
-from rbxcompose.missions.language.keys import anywhere
-from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.program.registry import anywhere, kinds
 from rbxcompose.tools.lsp.answers import variables
 from rbxcompose.tools.lsp.document import Cursor, Document, Spot, quick_tree
 from rbxcompose.tools.lsp.names import SKILL, KnownNames

@@ -13,8 +13,7 @@ from typing import Any
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.missions.language.fields import Field
 from rbxcompose.missions.language.grammar import Takes
-from rbxcompose.missions.language.keys import anywhere
-from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.program.registry import anywhere, kinds
 from rbxcompose.tools.mission_editor.yaml_places import Path, PlacedNode, TextLines, placed
 
 ONE, SEVERAL, NAMED = "one", "several", "named"

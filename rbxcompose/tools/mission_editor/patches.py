@@ -14,8 +14,8 @@ from typing import Any
 
 from rbxcompose.base.requests import Refused
 from rbxcompose.manifest.yaml_nodes import compose
-from rbxcompose.missions.language.machine_reader import RESULTS
-from rbxcompose.missions.program.machines import FINISHED
+from rbxcompose.missions.kinds.machine import RESULTS
+from rbxcompose.missions.program.parts import FINISHED
 from rbxcompose.missions.program.program import RESTART
 from rbxcompose.tools.mission_editor.outline import INTERRUPT, INTERRUPTS, STATE, MissionOutline, Slot
 from rbxcompose.tools.mission_editor.patch import BY_HAND, Patch, as_item, path_of, scalar_text

@@ -8,8 +8,8 @@ from typing import Any
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Span
 from rbxcompose.missions.engine.events import InterruptStarted, MissionEvent, SkillEnded, Transition
-from rbxcompose.missions.program.answers import StateKey, cut, ended, led, skipped, started
 from rbxcompose.missions.program.outcomes import SKIPPED
+from rbxcompose.missions.program.parts import StateKey, cut, ended, led, skipped, started
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.tools.mission_tests.model import missions_in
 

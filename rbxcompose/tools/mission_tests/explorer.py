@@ -17,8 +17,7 @@ from rbxcompose.missions.engine.events import MissionEnded, MissionEvent, Report
 from rbxcompose.missions.engine.run import STILL_HOLDS
 from rbxcompose.missions.engine.snapshot import restore, save
 from rbxcompose.missions.engine.task import Task
-from rbxcompose.missions.engine.value_text import show_briefly
-from rbxcompose.missions.engine.world import POSE
+from rbxcompose.missions.engine.world import POSE, show_briefly
 from rbxcompose.missions.program.outcomes import IDLE, RUNNING, Result
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.tools.mission_tests.model import FAILS, SUCCEEDS, missions_in

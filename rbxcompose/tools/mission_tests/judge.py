@@ -10,7 +10,7 @@ from rbxcompose.base.expressions.types import Type
 from rbxcompose.base.expressions.values import NOT_ARRIVED, Value
 from rbxcompose.base.findings import Span
 from rbxcompose.base.units import format_number
-from rbxcompose.missions.engine.value_text import show
+from rbxcompose.missions.engine.world import show
 from rbxcompose.tools.mission_tests.model import RUNS, Expectations, ExpectedStep
 from rbxcompose.tools.mission_tests.record import Done, TrialRecord
 from rbxcompose.tools.mission_tests.scope import agrees

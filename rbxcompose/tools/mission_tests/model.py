@@ -11,8 +11,8 @@ from rbxcompose.base.findings import Span
 from rbxcompose.base.requests import Command
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
-from rbxcompose.missions.analysis.effects import sent_by
 from rbxcompose.missions.analysis.examined import Ending
+from rbxcompose.missions.analysis.facts import sent_by
 from rbxcompose.missions.engine.world import POSE
 from rbxcompose.missions.program.outcomes import FAILURE, NAMES, RUNNING, SUCCESS
 from rbxcompose.missions.program.program import Program, RobotNames, Skill

@@ -37,9 +37,8 @@ from rbxcompose.manifest.tree import (
     value_span,
 )
 from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of, to_plain, validate
-from rbxcompose.missions.analysis.held_nodes import brief
 from rbxcompose.missions.engine.inputs import bind_inputs
-from rbxcompose.missions.language.literals import literal
+from rbxcompose.missions.language.literals import brief, literal
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
 from rbxcompose.msgs import registry

@@ -10,12 +10,11 @@ from rbxcompose.base.expressions.values import NOT_ARRIVED, EvaluationError, Not
 from rbxcompose.base.requests import Refused
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.manifest.test_file import LONGEST_TEST
-from rbxcompose.missions.components.mission import Mission, MissionConfig
+from rbxcompose.missions.components.mission import Mission
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEvent
-from rbxcompose.missions.engine.scopes import RobotValues
-from rbxcompose.missions.engine.value_text import show_briefly
-from rbxcompose.missions.engine.world import Settings, World
+from rbxcompose.missions.engine.world import RobotValues, Settings, World, show_briefly
+from rbxcompose.missions.execution.equipment import MissionConfig
 from rbxcompose.missions.execution.requests import CancelMission, PauseMission, ResumeMission
 from rbxcompose.missions.execution.world import RobotWorld
 from rbxcompose.missions.program.outcomes import IDLE, RUNNING, Result

@@ -9,13 +9,12 @@ from rbxcompose.base.expressions.types import POSE, UNKNOWN, Type, TypeKind
 from rbxcompose.base.expressions.values import NotArrived, Value, is_named_pose, is_number, is_same
 from rbxcompose.base.findings import Finding
 from rbxcompose.manifest.tree import ScalarNode, TreeNode
-from rbxcompose.missions.analysis.scope_types import NodeScope, View
-from rbxcompose.missions.engine import value_text
-from rbxcompose.missions.engine.scopes import RobotValues
+from rbxcompose.missions.analysis.examined import NodeScope, View, check_written
+from rbxcompose.missions.engine.instant_actions import PLACED
 from rbxcompose.missions.engine.world import POSE as POSE_NAME
-from rbxcompose.missions.language.asked import expression_of
-from rbxcompose.missions.language.literals import WrongValue, check_written, literal, typed
-from rbxcompose.missions.language.written import PLACED
+from rbxcompose.missions.engine.world import RobotValues, show
+from rbxcompose.missions.language.literals import WrongValue, literal, typed
+from rbxcompose.missions.program.parts import expression_of
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.tools.mission_tests import codes
 from rbxcompose.tools.mission_tests.model import ValueSetting
@@ -73,7 +72,7 @@ def setting_of(node: TreeNode, wanted: Type, robot: RobotNames) -> ValueSetting:
         return lambda scope: constant
     if wanted.kind is TypeKind.TEXT:
         template = parse_template(node.text)
-        return lambda scope: fill(template, scope, lambda name, value: value_text.show(robot.values.get(name), value))
+        return lambda scope: fill(template, scope, lambda name, value: show(robot.values.get(name), value))
     expression = expression_of(node)
     if wanted.kind in PLACED:
         return lambda scope: _placed(evaluate(expression, scope), robot)

@@ -11,7 +11,7 @@ from rbxcompose.commands.finding_pages import all_kinds
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.compiler.check_runner import all_checks
 from rbxcompose.compiler.compile import compile_robot
-from rbxcompose.missions.analysis.check_runner import mission_checks
+from rbxcompose.missions.analysis.examined import mission_checks
 from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.sdk import ArrayEntries, Component, Config, ServesAction, component, skill
 from rbxcompose.testing.golden import Golden

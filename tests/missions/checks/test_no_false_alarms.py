@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rbxcompose.base.findings import Report
-from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.analysis.examined import check_program
 from rbxcompose.missions.analysis.facts import constants_of
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import Program

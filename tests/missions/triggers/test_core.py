@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.clock import universal_time
 from rbxcompose.missions.triggers.core import CHECK, Triggers
-from rbxcompose.missions.triggers.schedule import daily, parse_cron
-from rbxcompose.missions.triggers.trigger import INTERRUPT, QUEUE, SKIP, Trigger
+from rbxcompose.missions.triggers.trigger import INTERRUPT, QUEUE, SKIP, Trigger, daily, parse_cron
 
 HOUR, DAY = 3600.0, 86400.0
 MONDAY = datetime(2026, 11, 23, tzinfo=UTC).timestamp()

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.clock import universal_time
-from rbxcompose.missions.triggers.schedule import DAYS, MONTHS, Local, Schedule, daily, instant_of, parse_cron
+from rbxcompose.missions.triggers.trigger import DAYS, MONTHS, Local, Schedule, daily, instant_of, parse_cron
 from tests.loops import for_all
 
 BERLIN, LORD_HOWE = ZoneInfo("Europe/Berlin"), ZoneInfo("Australia/Lord_Howe")

@@ -1,4 +1,8 @@
-"""A skill of the robot: computes its arguments, sends a request to the world, and gets the result later."""
+"""Steps that ask something of the robot and wait for the answer: its skills, and those with a word of their own.
+
+`call`: call a service and wait for its response.
+`set_parameter`: change a setting of a component while the robot runs.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +10,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 from typing import Self
 
+from rbxcompose.base.config import RUNNING, SERVICE
 from rbxcompose.base.expressions.values import is_named_pose
 from rbxcompose.base.units import written_unit
 from rbxcompose.manifest.tree import MappingNode, SequenceNode, TreeNode
 from rbxcompose.missions import sdk
-from rbxcompose.missions.engine.value_text import show
+from rbxcompose.missions.engine.world import show
 from rbxcompose.missions.program.registry import SKILL
+from rbxcompose.msgs import registry
 
 
 class SkillTask(sdk.Leaf):
@@ -40,16 +46,10 @@ class SkillTask(sdk.Leaf):
 
     def ask(self) -> int:
         """Start the skill; this happens again after a pause."""
-        self.started, self.status = self.engine.now, sdk.RUNNING
+        self.started = self.engine.now
         text = f"{self.skill.name} {', '.join(self._shown())}".rstrip()
         self.engine.say(sdk.SkillStarted(self.number, self.skill.name, self.arguments, text))
-        self.is_asked = True
-        try:
-            self.engine.world.start(self.number, self.skill.name, self.arguments)
-        except (Exception, SystemExit):
-            self.is_asked = False
-            raise
-        return sdk.RUNNING
+        return self.request(lambda: self.engine.world.start(self.number, self.skill.name, self.arguments))
 
     def _shown(self) -> Iterator[str]:
         """Yield the arguments as they were written, where that is no expression, and else their values."""
@@ -161,3 +161,143 @@ def _written(value: TreeNode) -> str:
             return ", ".join(map(_written, value.items))
         case MappingNode():
             return ", ".join(f"{key} {_written(entry.value)}" for key, entry in value.entries.items())
+
+
+class CallTask(sdk.Leaf):
+    """Sends a request to the world, and returns its response."""
+
+    __slots__ = ("message",)
+
+    def __init__(self, site: sdk.Site, step: CallStep) -> None:
+        super().__init__(site)
+        self.message = step.message
+
+    def begin(self) -> int:
+        """Send the request."""
+        return self.ask()
+
+    def ask(self) -> int:
+        """Send the request."""
+        service = self.message.target.text
+        request = registry.service(self.engine.robot.services[service]).Request
+        fields = sdk.fields_of(self.message, request, self)
+        return self.request(lambda: self.engine.world.call(self.number, service, fields))
+
+
+@sdk.kind("call", CallTask)
+@sdk.dataclass(frozen=True, slots=True)
+class CallStep(sdk.LeafStep):
+    """Call a service of the robot; a response with `success: false` is a failure.
+
+    Example:
+        do:
+          call: set_battery_level
+          request: 100
+          timeout: 2 s
+    """
+
+    message: sdk.MessageTemplate = sdk.message("request", SERVICE)
+    request = sdk.contents("The fields of the request; a single value stands for the only field.")
+
+    waits = True
+    has_result = True
+    lasts = None
+    only_asks = False
+
+    may_end = sdk.ends(sdk.ANY)
+
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say the service."""
+        return f"Call {self.message.target.text}"
+
+    def text(self, node: sdk.MissionNode) -> str:
+        """Return the service."""
+        return self.message.target.text
+
+    @property
+    def effects(self) -> sdk.NodeEffects:
+        """Return the request."""
+        return sdk.NodeEffects(called=self.message)
+
+
+_ENCODED = {  # the number of `rcl_interfaces/ParameterType` and the field of the value, by the type of a setting
+    sdk.TypeKind.FLAG: (1, "bool_value"),
+    sdk.TypeKind.COUNT: (2, "integer_value"),
+    sdk.TypeKind.QUANTITY: (3, "double_value"),
+    sdk.TypeKind.TEXT: (4, "string_value"),
+    sdk.TypeKind.CHOICE: (4, "string_value"),
+}
+
+
+class SetParameterTask(sdk.Leaf):
+    """Computes the value, sends it to the component, and waits until that has it."""
+
+    __slots__ = ("get", "setting", "value", "wanted")
+    saved = (*sdk.Leaf.saved, "value")
+
+    def __init__(self, site: sdk.Site, step: SetParameterStep) -> None:
+        super().__init__(site)
+        self.setting = step.setting
+        self.wanted: sdk.Type = self.engine.robot.settings[self.setting.component.text][self.setting.parameter.text]
+        self.get = sdk.getter(step.arguments[0].value, self.wanted)
+        self.value: sdk.Value = 0.0
+
+    def begin(self) -> int:
+        """Compute the value and send it."""
+        self.value = self.get(self)
+        return self.ask()
+
+    def ask(self) -> int:
+        """Send the value; this happens again after a pause."""
+        number, key = _ENCODED[self.wanted.kind]
+        parameter = {"name": self.setting.parameter.text, "value": {"type": number, key: self.value}}
+        fields: dict[str, sdk.Value] = {"parameters": [parameter], "by": f"mission {self.run.program.name}"}
+        return self.request(lambda: self.engine.world.call(self.number, self.setting.service, fields))
+
+
+@sdk.kind("set_parameter", SetParameterTask)
+@sdk.dataclass(frozen=True, slots=True)
+class SetParameterStep(sdk.LeafStep):
+    """Change a setting of a component that may change while the robot runs; it fails if the component refuses.
+
+    Example:
+        do:
+          set_parameter: {component: battery, parameter: runtime, value: 30 s}
+    """
+
+    given: tuple[sdk.ScalarNode, ...] = sdk.record(
+        "a map with 'component', 'parameter' and 'value'",
+        component=sdk.new_name("the name of a component", "The component.", names=RUNNING),
+        parameter=sdk.word("the name of a setting", "One of its settings that may change while it runs."),
+        value=sdk.value("a value", "The new value, of the type of the setting."),
+    )
+
+    waits = True
+    has_result = False
+    lasts = None
+    only_asks = False
+
+    @property
+    def setting(self) -> sdk.WrittenSetting:
+        """Return the setting."""
+        return sdk.WrittenSetting(*self.given[:2])
+
+    @property
+    def arguments(self) -> tuple[sdk.WrittenArgument, ...]:
+        """Return the value."""
+        return (sdk.WrittenArgument("value", self.given[2], self.given[2].span),)
+
+    may_end = sdk.ends(sdk.ANY)
+
+    def sentence(self, node: sdk.MissionNode, robot: sdk.RobotNames) -> str:
+        """Say the setting, and its new value."""
+        return f"Set {self.setting.path} to {sdk.argument_in_words(self.given[2])}"
+
+    def text(self, node: sdk.MissionNode) -> str:
+        """Return the setting and its value."""
+        return f"{self.setting.path} {self.given[2].text}".strip()
+
+    @property
+    def effects(self) -> sdk.NodeEffects:
+        """Return the setting."""
+        return sdk.NodeEffects(setting=self.setting)

@@ -1,33 +1,48 @@
-"""What people ask for while they debug missions, with the names they use, as interventions in a run."""
+"""What people see and ask for while they debug missions, with the names they use, as interventions in a run."""
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterable, Iterator, Mapping
 
+from rbxcompose.base.expressions.types import FLAG, UNKNOWN, Type
+from rbxcompose.base.expressions.values import Value, is_named_pose
 from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.requests import Refused
+from rbxcompose.base.units import format_number, format_quantity
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import NOWHERE, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions.analysis.examined import Ending
 from rbxcompose.missions.analysis.facts import places_taken, texts_in
-from rbxcompose.missions.engine.addresses import ARROW, NodeAddress, find, is_line, is_number
 from rbxcompose.missions.engine.debugger import named
-from rbxcompose.missions.engine.interventions import ChangeData, ForceResult, JumpToState, NotPossible, SetBreakpoints
-from rbxcompose.missions.execution.errands import Equipment
+from rbxcompose.missions.engine.interventions import (
+    ARROW,
+    ChangeData,
+    ForceResult,
+    JumpToState,
+    NodeAddress,
+    NotPossible,
+    SetBreakpoints,
+    find,
+    is_line,
+    is_number,
+)
+from rbxcompose.missions.execution.equipment import MissionConfig
 from rbxcompose.missions.execution.mission_run import MissionRun
-from rbxcompose.missions.execution.requests import ListedBreakpoint, SetBreakpoint
+from rbxcompose.missions.execution.requests import ListedBreakpoint, ListedDatum, OutcomesByNode, SetBreakpoint
 from rbxcompose.missions.language.literals import WrongValue, typed
-from rbxcompose.missions.program.answers import Form
 from rbxcompose.missions.program.counterparts import Pairing
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.outcomes import SUCCEEDS
-from rbxcompose.missions.program.program import MissionNode, Program
+from rbxcompose.missions.program.parts import Form
+from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 
 
 class Breakpoints:
     """The breakpoints of a robot, by mission and by how they were written; they stay while missions come and go."""
 
-    def __init__(self, equipment: Equipment) -> None:
+    def __init__(self, equipment: MissionConfig) -> None:
         self._equipment = equipment
         self._set: dict[str, dict[str, tuple[NodeAddress, ...]]] = {}
 
@@ -108,7 +123,7 @@ class Breakpoints:
         equipment, self._equipment, self._set = self._equipment, old._equipment, old._set
         return self.follow(equipment)
 
-    def follow(self, equipment: Equipment) -> tuple[str, ...]:
+    def follow(self, equipment: MissionConfig) -> tuple[str, ...]:
         """Stay at the same nodes of changed missions; return those that are gone, as they were written."""
         gone = []
         before, self._equipment = {mission: self.linked(mission) for mission in self._set}, equipment
@@ -236,3 +251,43 @@ def _node(name: str, text: str) -> TreeNode:
     root, findings = read_text(f"{name}: {text}", "")
     is_read = isinstance(root, MappingNode) and root.entries.keys() == {name} and not findings
     return root.entries[name].value if is_read and isinstance(root, MappingNode) else ScalarNode(text, NOWHERE)
+
+
+_PLAIN = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+
+
+def outcomes_of(program: Program, robot: RobotNames) -> OutcomesByNode:
+    """Return the outcomes in which each node may end, by its number as text."""
+    ending = Ending(program, robot)
+    return {str(node.number): tuple(ending.of(node.number).words) for node in program.nodes}
+
+
+def data_of(run: MissionRun) -> Iterator[ListedDatum]:
+    """Yield the data of a mission, as they would be written to set them to what they are."""
+    values = run.engine.data
+    for name, datum in run.engine.program.data.items():
+        choices = ("false", "true") if datum.type == FLAG else datum.type.choices
+        yield ListedDatum(name, datum.type.detail, choices, written(values[name], datum.type))
+
+
+def written(value: Value, wanted: Type, *, within: bool = False) -> str | None:
+    """Return a value as it is written in a manifest, `within` a list or a map; None if it cannot be written."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return format_quantity(value, wanted.dimension) if wanted.dimension else format_number(value)
+    if isinstance(value, str):
+        return value if not within or _PLAIN.fullmatch(value) else json.dumps(value, ensure_ascii=False)
+    if is_named_pose(value):
+        return value.name or None
+    of = wanted.of or UNKNOWN
+    if isinstance(value, list | tuple):
+        parts = wanted.parts if len(wanted.parts) == len(value) else {}
+        items = [written(item, parts.get(f"{index}", of), within=True) for index, item in enumerate(value)]
+        return None if None in items else f"[{', '.join(filter(None, items))}]"
+    if isinstance(value, Mapping):
+        entries = {name: written(entry, wanted.parts.get(name, of), within=True) for name, entry in value.items()}
+        return (
+            None if None in entries.values() else f"{{{', '.join(f'{key}: {text}' for key, text in entries.items())}}}"
+        )
+    return None

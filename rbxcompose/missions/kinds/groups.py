@@ -1,20 +1,149 @@
-"""`parallel`: several nodes at the same time."""
+"""Several nodes.
+
+`sequence`: one node after the other, until one fails.
+`fallback`: one node after the other, until one succeeds.
+`parallel`: several nodes at the same time.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from rbxcompose.missions import sdk
-from rbxcompose.missions.program.branches import (
-    ALL,
-    ANY,
-    Branches,
-    BranchResult,
-    BranchScope,
-    OutcomeRule,
-    read_outcomes,
-)
-from rbxcompose.missions.sdk import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS  # looked up in every tick
+from rbxcompose.base.expressions.values import NotArrived, Value
+from rbxcompose.manifest.tree import ScalarNode
+from rbxcompose.missions import codes, sdk
+from rbxcompose.missions.engine.world import Inner, MissionScope
+from rbxcompose.missions.program.parts import ALL, ANY, CONDITIONAL, HALTED, OTHERWISE, RESULTS, Branches, OutcomeRule
+from rbxcompose.missions.sdk import FAILURE, IDLE, NAMES, RUNNING, SKIPPED, SUCCESS  # looked up in every tick
+
+
+class SequenceTask(sdk.InTurnTask):
+    """A list that ends at the first failure."""
+
+    __slots__ = ()
+    decides = sdk.FAILURE
+    is_kept_after_failure = True
+
+
+@sdk.kind("sequence", SequenceTask)
+class SequenceStep(sdk.InTurn):
+    """Do the nodes of a list in order, until one fails.
+
+    Example:
+        do:
+          sequence:                       # a bare list is one too
+            - go_to: dock
+            - recharge
+    """
+
+    __slots__ = ()
+    decides = sdk.FAILS
+    flow = sdk.NodeFlow.IN_TURN
+    look = sdk.NodeLook("→")
+    sentence = sdk.says("Do {in_order}")
+
+    @property
+    def goes_on_after(self) -> str:
+        """Return success."""
+        return "" if self.order == sdk.RANDOM else sdk.SUCCEEDS
+
+
+class FallbackTask(sdk.InTurnTask):
+    """A list that ends at the first success."""
+
+    __slots__ = ()
+    decides = sdk.SUCCESS
+
+
+@sdk.kind("fallback", FallbackTask)
+class FallbackStep(sdk.InTurn):
+    """Try the nodes of a list in order, until one succeeds; skipped ones are passed over.
+
+    Example:
+        do:
+          fallback:
+            - check: distance($pose, dock) < 15 cm
+            - go_to: dock
+    """
+
+    __slots__ = ()
+    decides = sdk.SUCCEEDS
+    flow = sdk.NodeFlow.FIRST
+    look = sdk.NodeLook("?")
+    sentence = sdk.says("Try {in_order}, until one succeeds")
+
+    @property
+    def goes_on_after(self) -> str:
+        """Return failure."""
+        return "" if self.order == sdk.RANDOM else sdk.FAILS
+
+    def possibilities(
+        self, node: sdk.MissionNode, nodes: tuple[sdk.MissionNode, ...], robot: sdk.RobotNames
+    ) -> Iterator[sdk.Possibility]:
+        """Yield each node but the first, which is always tried."""
+        for index, child in enumerate(node.children[1:], 2):
+            yield sdk.Possibility(nodes[child].span, f"{node.path}: alternative {index}", sdk.started(child))
+
+
+class BranchResult(str):
+    """The result of a branch as a text; an outcome of its own also equals the result it counts as."""
+
+    __slots__ = ("counts_as",)
+    counts_as: str
+
+    @classmethod
+    def of(cls, status: int, outcome: str) -> BranchResult:
+        """Return the result of a branch; one that has not ended was halted."""
+        plain = NAMES[status] if NAMES[status] in RESULTS else HALTED
+        ended = cls(outcome or plain)
+        ended.counts_as = plain
+        return ended
+
+    def __eq__(self, other: object) -> bool:
+        return str.__eq__(self, other) or (isinstance(other, str) and str.__eq__(self.counts_as, other))
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    __hash__ = str.__hash__
+
+
+class BranchScope(Inner):
+    """The scope of the conditions of a parallel's outcomes, which adds the result of each branch."""
+
+    def __init__(self, outer: MissionScope, ended: Mapping[str, BranchResult]) -> None:
+        super().__init__(outer)
+        self._ended = ended
+
+    def variable(self, name: str, /) -> Value | NotArrived:
+        """Return the result of a branch, or look the name up in the outer scope."""
+        return self._ended[name] if name in self._ended else self.outer.variable(name)
+
+
+def read_outcomes(reader: sdk.NodeReader, key: str) -> tuple[OutcomeRule, ...]:
+    """Read the outcomes of a parallel; `otherwise` comes last and must be there."""
+    value = reader.map_of(key, "a map from outcomes to conditions")
+    if value is None:
+        return ()
+    if not reader.names:
+        message = "'outcomes' needs branches with names"
+        reader.add(codes.WRONG_SHAPE.at(reader.key_span(key), message, help="write the branches as a map"))
+    read = []
+    for index, (name, entry) in enumerate(value.entries.items()):
+        is_last = index + 1 == len(value.entries)
+        is_otherwise = isinstance(entry.value, ScalarNode) and entry.value.text == OTHERWISE
+        if is_otherwise != is_last:
+            message = "'otherwise' comes last" if is_otherwise else f"the last outcome must be '{OTHERWISE}'"
+            help_text = f"add a line such as 'lost: {OTHERWISE}'"
+            reader.add(codes.WRONG_SHAPE.at(entry.value.span, message, help=help_text))
+        if reader.check_name(entry.key) and name in CONDITIONAL:
+            message = f"'{name}' belongs to conditions, so no outcome is named so"
+            reader.add(codes.WRONG_SHAPE.at(entry.key.span, message, help="choose another name, such as 'other'"))
+        asked = None if is_otherwise else reader.asked_later(value, name)
+        read.append(OutcomeRule(name, asked.expression if asked else None, asked))
+    return tuple(read)
+
 
 PLAIN = {sdk.SUCCEEDS: sdk.SUCCEEDS, sdk.FAILS: sdk.FAILS}
 

@@ -1,4 +1,4 @@
-"""Modifiers that decide whether a node starts; if not, it is skipped."""
+"""Modifiers around the start of a node: the hooks of states, and what decides whether a node starts."""
 
 from __future__ import annotations
 
@@ -6,34 +6,82 @@ from typing import ClassVar
 
 from rbxcompose.missions import sdk
 
+ON_ENTER, ON_EXIT = "on_enter", "on_exit"
+
+
+class EnteringTask(sdk.Decorator):
+    """Runs the hooks when a state is entered and left."""
+
+    __slots__ = ("moments",)
+
+    def __init__(self, site: sdk.Site, options: Entering, inner: sdk.Task) -> None:
+        super().__init__(site, inner)
+        self.moments = options.moments
+
+    def begin(self) -> int:
+        """Run the hook of entering, and start."""
+        sdk.act(self.moments, ON_ENTER, self)
+        return self.proceed()
+
+    def proceed(self) -> int:
+        """Continue, and run the hook of leaving at the end."""
+        status = self.advance(self.inner)
+        if status != sdk.RUNNING:
+            sdk.act(self.moments, ON_EXIT, self)
+        return status
+
+    def suspend(self, from_start: bool) -> bool:
+        """Suspend the body: an interrupt halts leaves, not states; the state stays entered, its body starts again."""
+        if self.current is not None and self.inner.suspend(from_start):
+            self.current = None
+        return False
+
+    def halt(self) -> None:
+        """Stop the body, and run the hook of leaving unless the whole mission is ended from outside."""
+        super().halt()
+        if not self.engine.is_aborting:
+            sdk.act_safely(self.moments, ON_EXIT, self)
+
+
+@sdk.modifier(ON_ENTER, EnteringTask, only_states=True)
+class Entering(sdk.Acting):
+    """Act when a state is entered and left: `set`, `log` or `publish`.
+
+    A state is also left when something inside the mission halts it, and also entered when its history brings the
+    machine back to it.
+
+    Example:
+        machine:
+          start: away
+          states:
+            away:
+              do:
+                go_to: corner_1
+              on_enter:
+                log: Off we go
+              on_exit:
+                log: That was it
+              next:
+                success: finished
+                failure: failed
+    """
+
+    on_enter = sdk.hook()
+    on_exit = sdk.hook("What is set, logged or published when the state is left.")
+
 
 class ConditionalTask(sdk.Decorator):
     """Evaluates a condition once, before the node starts."""
 
-    __slots__ = ("condition",)
-    skips_if: ClassVar[bool]
+    __slots__ = ("condition", "skips_if")
 
     def __init__(self, site: sdk.Site, options: Conditional, inner: sdk.Task) -> None:
         super().__init__(site, inner)
-        self.condition = options.value
+        self.condition, self.skips_if = options.value, options.skips_if
 
     def begin(self) -> int:
         """Evaluate the condition once."""
         return sdk.SKIPPED if sdk.holds(self.condition, self.scope) == self.skips_if else self.advance(self.inner)
-
-
-class OnlyIfTask(ConditionalTask):
-    """Continues if the condition holds."""
-
-    __slots__ = ()
-    skips_if = False
-
-
-class SkipIfTask(ConditionalTask):
-    """Continues if the condition does not hold."""
-
-    __slots__ = ()
-    skips_if = True
 
 
 @sdk.dataclass(frozen=True, slots=True)
@@ -43,9 +91,10 @@ class Conditional(sdk.Skipping):
     value: sdk.Expression = sdk.condition()
 
     serves = sdk.ModifierScope.ALL
+    skips_if: ClassVar[bool]
 
 
-@sdk.modifier("only_if", OnlyIfTask)
+@sdk.modifier("only_if", ConditionalTask)
 class OnlyIf(Conditional):
     """Start only if the condition holds, else be skipped.
 
@@ -56,10 +105,11 @@ class OnlyIf(Conditional):
     """
 
     __slots__ = ()
+    skips_if = False
     clause = sdk.says("only if {value:if}")
 
 
-@sdk.modifier("skip_if", SkipIfTask)
+@sdk.modifier("skip_if", ConditionalTask)
 class SkipIf(Conditional):
     """Be skipped if the condition holds.
 
@@ -70,6 +120,7 @@ class SkipIf(Conditional):
     """
 
     __slots__ = ()
+    skips_if = True
     clause = sdk.says("not if {value:if}")
 
 
@@ -151,11 +202,10 @@ class CooldownTask(CountingTask):
 
     def begin(self) -> int:
         """Start if that time has passed, or if the node has not ended yet."""
-        is_cooling = self.has_ended and not self.engine.has_gone_by(self._seconds(), self.ended_at)
+        is_cooling = self.has_ended and not self.engine.has_gone_by(
+            self.number_of(self.duration, "'cooldown'"), self.ended_at
+        )
         return sdk.SKIPPED if is_cooling else self.proceed()
-
-    def _seconds(self) -> float:
-        return self.number_of(self.duration, "'cooldown'")
 
 
 @sdk.modifier("cooldown", CooldownTask)
