@@ -24,23 +24,13 @@ from rbxcompose.manifest.section import PART, ROBOT, TEST, Section
 from rbxcompose.manifest.test_file import STEP_KEYS
 from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at, entries_of, scalars
 from rbxcompose.missions.language.grammar import BODIES, STATE_KEYS, Takes
-from rbxcompose.missions.language.reader import BODIES, INTERRUPT_KEYS, read_program
+from rbxcompose.missions.language.reader import INTERRUPT_KEYS, read_program
 from rbxcompose.missions.program.parts import DEEDS, MACHINE_KEYS, Asked, WrittenArgument
 from rbxcompose.missions.program.program import Program, Skill
 from rbxcompose.missions.program.registry import keys_taking, kinds, modifier_keys
-from rbxcompose.tools.lsp.mentions import BRANCH, INTERRUPT, ITEM, NODE, STATE, VARIABLE, Mention
 from rbxcompose.tools.lsp.project import MISSION as MISSION_DOCUMENT
 from rbxcompose.tools.lsp.project import OVERLAY
-from rbxcompose.tools.lsp.project_files import (
-    NO_MEANING,
-    OVERLAY,
-    PART,
-    ROBOT,
-    Meanings,
-    NamePiece,
-    ProjectFiles,
-    Symbol,
-)
+from rbxcompose.tools.lsp.project_files import NO_MEANING, Meanings, NamePiece, ProjectFiles, Symbol
 
 VARIABLE, ITEM, STATE, NODE, BRANCH, INTERRUPT = "variable", "item", "state", "node", "branch", "interrupt"
 """Sorts of names that missions define; those of other manifests are named like the section that defines them."""
