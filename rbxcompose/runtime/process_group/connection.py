@@ -363,6 +363,8 @@ class SteppedDriver(Driver):
     instants; without any, the order of events is the same in every run.
     """
 
+    _clock: SteppedClock
+
     def __init__(
         self,
         scheduler: Scheduler,
@@ -419,6 +421,8 @@ class ExternalDriver(Driver):
 
     `turned` is called when outside time stops, runs again or has jumped.
     """
+
+    _clock: ExternalClock
 
     def __init__(
         self,
