@@ -7,7 +7,7 @@ from rbxcompose.base.clock import Clock
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.actions import ActionClient, ActionServer
 from rbxcompose.bus.graph import Writers
-from rbxcompose.bus.local import REQUESTS, BusProcess, Inbox, Participant, Refusing, Witness
+from rbxcompose.bus.local import REQUESTS, BusProcess, Gate, Inbox, Participant, Witness
 from rbxcompose.bus.services import Client, ServedRequest, Server, Services
 from rbxcompose.bus.tokens import publishers_pattern
 from rbxcompose.bus.topics import OrderPublisher, Publisher, Subscription, Topics
@@ -159,7 +159,7 @@ class Bus:
         return list(self._topics.subscriptions)
 
     @property
-    def gates(self) -> Sequence[Refusing]:
+    def gates(self) -> Sequence[Gate]:
         """Return the gates through which requests of other processes come."""
         return list(self._process.gates)
 

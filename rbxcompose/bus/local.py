@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import field
 from enum import StrEnum
 from itertools import chain, count
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from rbxcompose.base.clock import Clock
 from rbxcompose.base.dataclass import dataclass
@@ -229,14 +229,6 @@ class Registry(Generic[T]):
             del self._ends[route]
 
 
-class Refusing(Protocol):
-    """A place that refuses requests of other processes: its owner, its name, and its counts."""
-
-    owner: str
-    name: str
-    refusals: Refusals
-
-
 @dataclass(frozen=True, slots=True)
 class BusProcess:
     """What all ends of a process have in common."""
@@ -249,7 +241,7 @@ class BusProcess:
     namespace: str  # empty, or with a leading slash
     log: Callable[[str, str], None]  # owner, text
     ids: count[int] = field(default_factory=count)
-    gates: dict[Refusing, None] = field(default_factory=dict)  # an ordered set
+    gates: dict[Gate, None] = field(default_factory=dict)  # an ordered set
 
 
 @dataclass(frozen=True, slots=True)

@@ -385,7 +385,7 @@ class FromHost:
 LifecycleOrder = Configure | Activate | Start | Brake | Shutdown
 PlanOrder = Consider | Adopt | Retire | Prepare | Reconfigure
 ChannelOrder = LifecycleOrder | Stop | Release | Lost | Blocked | Ask | PlanOrder | SettingOrder | ToHosts
-ProgressWord = Configured | States | Failed | Repeated | AtRest | TimeIsUp | Summary | Alive
+ProgressWord = Configured | States | Failed | Repeated | StoppedByBus | AtRest | TimeIsUp | Summary | Alive
 AnswerWord = Answered | Refusal | Considered | Retired | Reconfigured
 ChannelWord = (
     ProgressWord | StoppedByBus | MissionOver | RobotHeld | ComponentNoted | AnswerWord | SettingWord | FromHost
