@@ -134,6 +134,7 @@ Witness = Callable[[WitnessedCall], None]
 
 
 T = TypeVar("T")
+C = TypeVar("C", bound=Closable)
 Post = Callable[[str, Callable[[], None]], object]  # makes the scheduler run a callback for an owner, soon
 
 
@@ -284,9 +285,10 @@ class Participant:
         """Announce an end to other processes; it must be ready."""
         return self.process.transport.announce(endpoint.token)
 
-    def keep(self, end: Closable) -> None:
-        """Close `end` together with the node."""
+    def keep(self, end: C) -> C:
+        """Close `end` together with the node, and return it."""
         self._declared.append(end)
+        return end
 
     def withdraw(self, end: Closable) -> None:
         """Close `end` now."""

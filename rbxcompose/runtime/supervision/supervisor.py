@@ -370,7 +370,7 @@ class Supervisor:
         """Restore files removed from the folder of this robot, so that `stop` and `down` find it."""
         try:
             self._folder.make()
-            lock = self._folder.lock() if self._folder.has_lost_lock(self._lock) else self._lock
+            lock = self._lock if self._folder.has_lock(self._lock) else self._folder.lock()
             if lock is None:
                 raise OSError("another supervisor holds the lock")
             if lock != self._lock:
