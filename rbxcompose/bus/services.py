@@ -104,12 +104,12 @@ class Server(Generic[Q, R]):
         self.route = endpoint.route
         self.malformed = 0  # requests that could not be read
         self._services, self._process, self._owner, self._service = services, node.process, node.owner, service
-        self._handle, self._client_left = handle, client_left
+        self._handle = handle
         self._require: Callable[[R], None] = partial(require_type, wanted=service.Response, name=self.route[0])
         self._open: list[ServedRequest[Q, R]] = []
         post, transport = self._process.scheduler.post, self._process.transport
         self._inbox: Inbox[ServedRequest[Q, R] | Question] = Inbox(node.owner, LONGEST_QUEUE, self._take, post)
-        self._left: Inbox[bytes] = Inbox(node.owner, None, self._leave, post)
+        self._left: Inbox[bytes] = Inbox(node.owner, None, client_left or (lambda client: None), post)
         if waits:
             self._inbox.hold()
             node.when_open(self._inbox.go_on)
@@ -148,10 +148,6 @@ class Server(Generic[Q, R]):
         transport = self._process.transport
         if not is_there and session_of(token) != transport.session:
             self._left.put(gid(token), transport.wake)
-
-    def _leave(self, client: bytes) -> None:
-        if self._client_left is not None:
-            self._client_left(client)
 
     def _take(self, item: ServedRequest[Q, R] | Question) -> None:
         request = item if isinstance(item, ServedRequest) else self._read(item)

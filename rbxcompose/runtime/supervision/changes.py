@@ -7,7 +7,7 @@ from enum import StrEnum
 from rbxcompose.base.config import HIDDEN, Config, Secret, leaves, may_be_applied
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.compiler.plan.diff import BOUNDS, WHOLE, Change, difference
-from rbxcompose.compiler.plan.model import Instance, OtherHost, Plan
+from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime.supervision.members import is_commanding
 from rbxcompose.sdk.registry import component_type
 
@@ -128,12 +128,8 @@ def changes(before: Plan, after: Plan, failed: Collection[str] = ()) -> Changes:
 
 
 def _links(plan: Plan) -> tuple[object, ...]:
-    share = plan.share and replace(plan.share, others=tuple(_named(other) for other in plan.share.others), version="")
-    return share, plan.exchange
-
-
-def _named(host: OtherHost) -> OtherHost:
-    return replace(host, instances=())
+    others = tuple(replace(other, instances=()) for other in plan.share.others) if plan.share else ()
+    return plan.share and replace(plan.share, others=others, version=""), plan.exchange
 
 
 def _moved(before: Plan, after: Plan) -> Iterator[str]:
