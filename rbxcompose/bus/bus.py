@@ -8,11 +8,10 @@ from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.actions import ActionClient, ActionServer
 from rbxcompose.bus.graph import Writers
 from rbxcompose.bus.local import REQUESTS, BusProcess, Gate, Inbox, Participant, Witness
-from rbxcompose.bus.services import Client, ServedRequest, Server, Services
+from rbxcompose.bus.services import Client, ServedRequest, Server, Services, Window
 from rbxcompose.bus.tokens import publishers_pattern
 from rbxcompose.bus.topics import OrderPublisher, Publisher, Subscription, Topics
 from rbxcompose.bus.transport import Closable, NoTransport, Transport
-from rbxcompose.bus.window import Window
 from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.msgs.types import Action, Message, Service
 from rbxcompose.sdk.ports import ORDINARY, MessageLimits, Qos

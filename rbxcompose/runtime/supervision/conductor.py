@@ -14,7 +14,6 @@ from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.channel import HostReport, RobotEnd
 from rbxcompose.runtime.folder import RunOptions
-from rbxcompose.runtime.supervision.changes import WORLD, Changes
 from rbxcompose.runtime.supervision.members import (
     LOOK,
     BlockedComponents,
@@ -26,7 +25,7 @@ from rbxcompose.runtime.supervision.members import (
     is_commanding,
 )
 from rbxcompose.runtime.supervision.other_hosts import OtherHosts
-from rbxcompose.runtime.supervision.plan_change import LONGEST, Changing, WhenDone, text_of
+from rbxcompose.runtime.supervision.plan_change import LONGEST, WORLD, Changes, Changing, WhenDone, text_of
 from rbxcompose.runtime.supervision.stop_latch import StopLatch
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.registry import component_type, declared
