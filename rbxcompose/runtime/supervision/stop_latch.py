@@ -7,8 +7,7 @@ its host knows of: one that was ordered meanwhile on the other side of a cut lin
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 
-from rbxcompose.runtime import channel as messages
-from rbxcompose.runtime.channel import HostReport, SharedStop, StopMark
+from rbxcompose.runtime.channel import HostReport, Release, SharedStop, Stop, StopMark
 from rbxcompose.runtime.folder import StopState
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member
 from rbxcompose.sdk.robot_events import RobotHeld
@@ -70,7 +69,7 @@ class StopLatch:
     def notify(self, member: Member) -> None:
         """Tell a process how it stands."""
         member.is_stopped = self.is_stopped
-        self._effects.send(member.name, messages.Stop() if self.is_stopped else messages.Release())
+        self._effects.send(member.name, Stop() if self.is_stopped else Release())
 
     def receive(self, member: Member, held: RobotHeld) -> None:
         """Stop everything for a component; its process has stopped by itself, and has logged the reason."""
