@@ -7,12 +7,11 @@ from rbxcompose.base.clock import Clock
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.actions import ActionClient, ActionServer
 from rbxcompose.bus.graph import Writers
-from rbxcompose.bus.local import REQUESTS, BusProcess, Inbox, Participant, Refusing, Witness
-from rbxcompose.bus.services import Client, ServedRequest, Server, Services
+from rbxcompose.bus.local import REQUESTS, BusProcess, Gate, Inbox, Participant, Witness
+from rbxcompose.bus.services import Client, ServedRequest, Server, Services, Window
 from rbxcompose.bus.tokens import publishers_pattern
 from rbxcompose.bus.topics import OrderPublisher, Publisher, Subscription, Topics
 from rbxcompose.bus.transport import Closable, NoTransport, Transport
-from rbxcompose.bus.window import Window
 from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.msgs.types import Action, Message, Service
 from rbxcompose.sdk.ports import ORDINARY, MessageLimits, Qos
@@ -22,7 +21,6 @@ Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 G = TypeVar("G", bound=Message)
 F = TypeVar("F", bound=Message)
-C = TypeVar("C", bound=Closable)
 
 
 class Bus:
@@ -59,12 +57,12 @@ class Bus:
     def publisher(self, owner: str, topic: str, message: type[M], qos: Qos) -> Publisher[M]:
         """Declare a publisher; call it with a message."""
         node = self._node(owner)
-        return _kept(node, Publisher(self._topics, node, topic, message, qos))
+        return node.keep(Publisher(self._topics, node, topic, message, qos))
 
     def orders(self, owner: str, topic: str, message: type[M], qos: Qos, servers: Collection[str]) -> OrderPublisher[M]:
         """Declare a publisher that knows whether the components `servers` are listening."""
         node = self._node(owner)
-        return _kept(node, OrderPublisher(self._topics, node, topic, message, qos, servers))
+        return node.keep(OrderPublisher(self._topics, node, topic, message, qos, servers))
 
     def subscribe(
         self,
@@ -91,7 +89,7 @@ class Bus:
         node = self._node(owner)
         kinds = {"waits": waits, "is_patient": is_patient, "is_light": is_light, "may_be_silent": may_be_silent}
         made = Subscription(self._topics, node, topic, message, qos, handler, max_rate, limits=limits, **kinds)
-        return _kept(node, made)
+        return node.keep(made)
 
     def serve(self, owner: str, name: str, service: type[Service[Q, R]], handler: Callable[[Q], R]) -> None:
         """Answer requests with what `handler` returns; if it raises, the caller gets the error instead.
@@ -99,7 +97,7 @@ class Bus:
         `Refused` is not an error of the handler; any other exception also goes to the scheduler's `on_error`.
         """
         node = self._node(owner)
-        _kept(node, Server(self._services, node, name, service, lambda asked: asked.reply(handler(asked.message))))
+        node.keep(Server(self._services, node, name, service, lambda asked: asked.reply(handler(asked.message))))
 
     def serve_later(
         self,
@@ -119,15 +117,14 @@ class Bus:
         `client_left` gets the GID of each client that is gone.
         """
         node = self._node(owner)
-        return _kept(
-            node,
-            Server(self._services, node, name, service, handle, client_left, waits=waits, rate=rate, limits=limits),
+        return node.keep(
+            Server(self._services, node, name, service, handle, client_left, waits=waits, rate=rate, limits=limits)
         )
 
     def client(self, owner: str, name: str, service: type[Service[Q, R]]) -> Client[Q, R]:
         """Declare a client of a service; call it with a request."""
         node = self._node(owner)
-        return _kept(node, Client(self._services, node, name, service))
+        return node.keep(Client(self._services, node, name, service))
 
     def serve_action(
         self,
@@ -144,14 +141,14 @@ class Bus:
         Goals of other processes beyond the `limits` are refused before that.
         """
         node = self._node(owner)
-        return _kept(
-            node, ActionServer(self._topics, self._services, node, name, action, accept, waits=waits, limits=limits)
+        return node.keep(
+            ActionServer(self._topics, self._services, node, name, action, accept, waits=waits, limits=limits)
         )
 
     def action_client(self, owner: str, name: str, action: type[Action[G, R, F]]) -> ActionClient[G, R, F]:
         """Declare a client of an action; call it with a goal."""
         node = self._node(owner)
-        return _kept(node, ActionClient(self._topics, self._services, node, name, action))
+        return node.keep(ActionClient(self._topics, self._services, node, name, action))
 
     @property
     def subscriptions(self) -> Sequence[Subscription[Any]]:
@@ -159,7 +156,7 @@ class Bus:
         return list(self._topics.subscriptions)
 
     @property
-    def gates(self) -> Sequence[Refusing]:
+    def gates(self) -> Sequence[Gate]:
         """Return the gates through which requests of other processes come."""
         return list(self._process.gates)
 
@@ -179,7 +176,7 @@ class Bus:
     def window(self, owner: str, key: str, answer: Callable[[], object]) -> Window:
         """Show tools outside a part of a component's state at a key; `answer` returns all of it as JSON."""
         node = self._node(owner)
-        return _kept(node, Window(node, key, answer))
+        return node.keep(Window(node, key, answer))
 
     def open(self, owner: str) -> None:
         """Deliver to a component the requests and goals that have waited for it."""
@@ -205,8 +202,3 @@ class Bus:
         if owner not in self._nodes:
             self._nodes[owner] = Participant(self._process, owner)
         return self._nodes[owner]
-
-
-def _kept(node: Participant, end: C) -> C:
-    node.keep(end)
-    return end

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import field
 from enum import StrEnum
 from itertools import chain, count
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from rbxcompose.base.clock import Clock
 from rbxcompose.base.dataclass import dataclass
@@ -134,6 +134,7 @@ Witness = Callable[[WitnessedCall], None]
 
 
 T = TypeVar("T")
+C = TypeVar("C", bound=Closable)
 Post = Callable[[str, Callable[[], None]], object]  # makes the scheduler run a callback for an owner, soon
 
 
@@ -229,14 +230,6 @@ class Registry(Generic[T]):
             del self._ends[route]
 
 
-class Refusing(Protocol):
-    """A place that refuses requests of other processes: its owner, its name, and its counts."""
-
-    owner: str
-    name: str
-    refusals: Refusals
-
-
 @dataclass(frozen=True, slots=True)
 class BusProcess:
     """What all ends of a process have in common."""
@@ -249,7 +242,7 @@ class BusProcess:
     namespace: str  # empty, or with a leading slash
     log: Callable[[str, str], None]  # owner, text
     ids: count[int] = field(default_factory=count)
-    gates: dict[Refusing, None] = field(default_factory=dict)  # an ordered set
+    gates: dict[Gate, None] = field(default_factory=dict)  # an ordered set
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,9 +285,10 @@ class Participant:
         """Announce an end to other processes; it must be ready."""
         return self.process.transport.announce(endpoint.token)
 
-    def keep(self, end: Closable) -> None:
-        """Close `end` together with the node."""
+    def keep(self, end: C) -> C:
+        """Close `end` together with the node, and return it."""
         self._declared.append(end)
+        return end
 
     def withdraw(self, end: Closable) -> None:
         """Close `end` now."""

@@ -1,7 +1,15 @@
-"""Services: requests go by reference within the process and over the transport to others; answers may come later."""
+"""Services: requests go by reference within the process and over the transport to others; answers may come later.
+
+Windows show state of a component to tools outside, at a key of the robot's own rather than a ROS 2 topic. A subscriber
+at the key receives updates, a query there returns the whole state. Both are JSON of one shape (`SCHEMA`): `source`
+names the window, `sequence` counts the updates from one, so that a subscriber notices what it missed, and `value` is
+the component's data. A whole state has the sequence of the last update that it contains. `missions/view/replica.py` is
+the other side.
+"""
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 from dataclasses import field
@@ -12,7 +20,7 @@ from typing import Any, Generic, TypeVar
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import Refused
 from rbxcompose.base.scheduler import ScheduledCallback
-from rbxcompose.bus.local import REQUESTS, Gate, Inbox, Participant, Registry, Witness, WitnessedCall
+from rbxcompose.bus.local import QUESTIONS, REQUESTS, Gate, Inbox, Participant, Registry, Witness, WitnessedCall
 from rbxcompose.bus.names import Attachment, decode_attachment
 from rbxcompose.bus.tokens import EntityKind, gid, session_of
 from rbxcompose.bus.transport import LONGEST_WAIT, Closable, Question, TransportReply
@@ -21,7 +29,7 @@ from rbxcompose.msgs.cdr import CdrLimitError, decode, encode
 from rbxcompose.msgs.fields import require_type
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.sdk.bound import Reply
-from rbxcompose.sdk.ports import ORDINARY, MessageLimits
+from rbxcompose.sdk.ports import ORDINARY, MessageLimits, Qos
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
@@ -104,12 +112,12 @@ class Server(Generic[Q, R]):
         self.route = endpoint.route
         self.malformed = 0  # requests that could not be read
         self._services, self._process, self._owner, self._service = services, node.process, node.owner, service
-        self._handle, self._client_left = handle, client_left
+        self._handle = handle
         self._require: Callable[[R], None] = partial(require_type, wanted=service.Response, name=self.route[0])
         self._open: list[ServedRequest[Q, R]] = []
         post, transport = self._process.scheduler.post, self._process.transport
         self._inbox: Inbox[ServedRequest[Q, R] | Question] = Inbox(node.owner, LONGEST_QUEUE, self._take, post)
-        self._left: Inbox[bytes] = Inbox(node.owner, None, self._leave, post)
+        self._left: Inbox[bytes] = Inbox(node.owner, None, client_left or (lambda client: None), post)
         if waits:
             self._inbox.hold()
             node.when_open(self._inbox.go_on)
@@ -148,10 +156,6 @@ class Server(Generic[Q, R]):
         transport = self._process.transport
         if not is_there and session_of(token) != transport.session:
             self._left.put(gid(token), transport.wake)
-
-    def _leave(self, client: bytes) -> None:
-        if self._client_left is not None:
-            self._client_left(client)
 
     def _take(self, item: ServedRequest[Q, R] | Question) -> None:
         request = item if isinstance(item, ServedRequest) else self._read(item)
@@ -327,3 +331,55 @@ class Client(Generic[Q, R]):
         if waiting is not None:
             waiting.forget()
             waiting.then(reply)
+
+
+SCHEMA = 1
+GRACE = 2.0  # [s] after a query in which somebody counts as listening: the transport may report a listener late
+
+
+class Window:
+    """Sends updates to subscribers; `answer` returns the whole state as data for JSON, or raises Refused."""
+
+    def __init__(self, node: Participant, key: str, answer: Callable[[], object]) -> None:
+        process, transport = node.process, node.process.transport
+        self._source = f"{transport.session}/{next(process.ids)}"
+        self._clock, self._answer = process.clock, answer
+        self._sequence = 0
+        self._asked_at: float | None = None  # [s]
+        self._remote = transport.publisher(key, Qos.STATE)  # a slow viewer must not hold us up
+        inbox: Inbox[Question] = Inbox(node.owner, None, self._asked, process.scheduler.post)
+        gate = Gate(node, key, QUESTIONS, lambda question: inbox.put(question, transport.wake))
+        self._declared: list[Closable] = [gate, transport.serve(key, gate), self._remote]
+
+    @property
+    def is_watched(self) -> bool:
+        """Return whether anybody would receive updates."""
+        if self._remote.has_match:
+            return True
+        return self._asked_at is not None and self._clock.now() - self._asked_at <= GRACE
+
+    def put(self, value: object) -> None:
+        """Send an update, as data for JSON."""
+        self._sequence += 1
+        self._remote.put(self._message(value), b"")
+
+    def close(self) -> None:
+        """Withdraw the window."""
+        for closable in self._declared:
+            closable.close()
+
+    def _asked(self, question: Question) -> None:
+        self._asked_at = self._clock.now()
+        try:
+            message = self._message(self._answer())
+        except Refused as refusal:
+            question.fail(str(refusal))
+        except (Exception, SystemExit) as error:
+            question.fail(f"{type(error).__name__}: {error}")
+            raise
+        else:
+            question.reply(message, b"")
+
+    def _message(self, value: object) -> bytes:
+        message = {"schema": SCHEMA, "source": self._source, "sequence": self._sequence, "value": value}
+        return json.dumps(message).encode()

@@ -43,10 +43,6 @@ class Topics:
     publishers: Registry[Publisher[Any]] = field(default_factory=Registry)
     subscriptions: Registry[Subscription[Any]] = field(default_factory=Registry)
 
-    def published_here(self, subscription: Subscription[Any], source: Attachment) -> bool:
-        """Return whether a message comes from a publisher in this process."""
-        return any(publisher.gid == source.gid for publisher in self.publishers.at(subscription.route))
-
 
 class Publisher(Generic[M]):
     """Publishes one message per call."""
@@ -249,7 +245,9 @@ class Subscription(Generic[M]):
     def _read(self, arrival: Arrival, source: Attachment | None) -> Delivery[M] | None:
         try:
             source = source or decode_attachment(arrival.attachment)
-            if self._qos is Qos.LATCHED and self._topics.published_here(self, source):
+            if self._qos is Qos.LATCHED and any(
+                publisher.gid == source.gid for publisher in self._topics.publishers.at(self.route)
+            ):
                 return None  # the history of a latched topic brings our own messages back
             message = decode(self._message, arrival.payload, self._limits.entries)
             if self._qos is Qos.COMMAND:

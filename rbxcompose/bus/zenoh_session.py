@@ -1,11 +1,13 @@
-"""Zenoh sessions: one peer for each process of a robot, and the router that lets them find each other."""
+"""Zenoh sessions: a peer for each process of a robot, the router that lets them find each other, links with others."""
+
+from __future__ import annotations
 
 import errno
 import itertools
 import json
 import os
 import socket
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import field
 from typing import Any
 
@@ -33,6 +35,12 @@ do not tell each other what they subscribe to and serve.
 """
 _RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2}
 _PRIORITIES = {"high": "interactive_high", "medium": "data", "low": "background"}
+_DIALS_FOREVER = {  # in the background: who is dialled may come later
+    "connect/retry": _RETRY,
+    "connect/timeout_ms": -1,  # 0 would mean once
+    "connect/exit_on_failure": False,
+}
+_LISTENS_OR_FAILS = {"listen/timeout_ms": 0, "listen/exit_on_failure": True}
 _TAKEN = ("os error 98", "Unable to acquire lock")  # what Zenoh says of an endpoint in use
 _session_numbers = itertools.count()
 _routers: list[zenoh.Session] = []
@@ -93,9 +101,7 @@ def peer_settings(router: str) -> dict[str, object]:
         "mode": "peer",
         "listen/endpoints": [_endpoint_beside(router)],  # other peers connect to it once they know of each other
         "connect/endpoints": [router],
-        "connect/retry": _RETRY,
-        "connect/timeout_ms": -1,  # retries forever, in the background; 0 would mean once
-        "connect/exit_on_failure": False,
+        **_DIALS_FOREVER,
     }
 
 
@@ -154,14 +160,11 @@ def router_settings(endpoint: str, link: RouterLink = NO_LINK) -> dict[str, obje
         **_common(link.lease),
         "mode": "router",
         "listen/endpoints": [endpoint, *link.listen],
-        "listen/timeout_ms": 0,
-        "listen/exit_on_failure": True,
+        **_LISTENS_OR_FAILS,
         "scouting/gossip/multihop": False,
         "connect/endpoints": list(link.connect),
-        "connect/retry": _RETRY,
-        "connect/timeout_ms": -1,  # forever: the other host may come later
+        **_DIALS_FOREVER,
         "transport/unicast/open_timeout": LEASE,  # QUIC waits that long for a host that is not there, and closing waits
-        "connect/exit_on_failure": False,
         **{f"transport/link/tls/{name}": value for name, value in link.tls.items()},
         **({"access_control": link.access} if link.access else {}),
         **_leaving(link),
@@ -192,12 +195,9 @@ def exchange_settings(link: RouterLink) -> dict[str, object]:
         "scouting/gossip/enabled": False,
         "mode": "peer",
         "listen/endpoints": list(link.listen),
-        "listen/timeout_ms": 0,
-        "listen/exit_on_failure": True,
+        **_LISTENS_OR_FAILS,
         "connect/endpoints": list(link.connect),
-        "connect/retry": _RETRY,
-        "connect/timeout_ms": -1,  # forever: the other robot may come later
-        "connect/exit_on_failure": False,
+        **_DIALS_FOREVER,
         **{f"transport/link/tls/{name}": value for name, value in link.tls.items()},
         "access_control": link.access,
     }
@@ -226,10 +226,7 @@ def open_lone(router: str) -> zenoh.Session:
     Raises:
         OSError: if the router does not answer; once it has, the session waits for it.
     """
-    try:
-        return _opened(lone_settings(router))
-    except zenoh.ZError as error:
-        raise OSError(errno.ECONNREFUSED, f"no router answers at {router}") from error
+    return _answered(lone_settings(router), router)
 
 
 def open_client(router: str) -> zenoh.Session:
@@ -238,8 +235,12 @@ def open_client(router: str) -> zenoh.Session:
     Raises:
         OSError: if `router` is no endpoint, or does not answer.
     """
+    return _answered(client_settings(router), router)
+
+
+def _answered(settings: Mapping[str, object], router: str) -> zenoh.Session:
     try:
-        return _opened(client_settings(router))
+        return _opened(settings)
     except zenoh.ZError as error:
         raise OSError(errno.ECONNREFUSED, f"no router answers at {router}") from error
 
@@ -281,9 +282,7 @@ def open_beside(endpoint: str) -> zenoh.Session:
             "mode": "peer",
             "listen/endpoints": [],
             "connect/endpoints": [endpoint],
-            "connect/retry": _RETRY,
-            "connect/timeout_ms": -1,
-            "connect/exit_on_failure": False,
+            **_DIALS_FOREVER,
         }
     )
 
@@ -298,3 +297,56 @@ def _config(settings: Mapping[str, object]) -> zenoh.Config:
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
     return config
+
+
+_REMOTE = zenoh.Locality.REMOTE
+
+
+class SessionLink:
+    """Finds what a session has at its keys without asking it.
+
+    Zenoh's admin space would list it, but a session that is asked can come to a standstill (zenoh 1.10): it holds the
+    lock of its routing tables while it answers and needs that lock again for each answer, behind anybody who wants to
+    write. On a link of its own, what matches is that session's, as is what is heard.
+    """
+
+    def __init__(self, endpoint: str, id: str, subscribed: Iterable[str], served: Iterable[str]) -> None:
+        """Link with the session that listens, or will listen, at an endpoint; look for what it has at these keys.
+
+        `id` is that of the session: somebody else may have taken its port.
+        """
+        self._session = session = open_beside(endpoint)
+        self._id = id
+        self._partners: dict[str, Any] = {}  # Zenoh's stubs have another type for how they match
+        for key in subscribed:
+            self._partners[key] = session.declare_publisher(key, allowed_destination=_REMOTE)
+        for key in served:
+            self._partners[key] = session.declare_querier(key, allowed_destination=_REMOTE)
+        self._heard: set[str] = set()
+        self._subscriber: zenoh.Subscriber[None] | None = None
+
+    @property
+    def is_linked(self) -> bool:
+        """Return whether that session is at the other end."""
+        return self._id in map(str, self._session.info.peers_zid())
+
+    def listen(self, keys: str | None) -> None:
+        """Hear from now on what it publishes at `keys`, an expression; with None, nothing."""
+        if self._subscriber is not None and keys is None:
+            self._subscriber.undeclare()  # type: ignore[no-untyped-call]
+            self._subscriber = None
+        elif self._subscriber is None and keys is not None:
+            hear = self._heard.add
+            self._subscriber = self._session.declare_subscriber(keys, lambda sample: hear(str(sample.key_expr)))
+
+    def heard(self) -> list[str]:
+        """Return the keys at which something was heard."""
+        return list(self._heard)
+
+    def matching(self) -> list[str]:
+        """Return the keys to which it subscribes, or which it serves, of those that are looked for."""
+        return [key for key, partner in self._partners.items() if partner.matching_status.matching]
+
+    def close(self) -> None:
+        """End the link."""
+        self._session.close()  # type: ignore[no-untyped-call]

@@ -382,12 +382,14 @@ class FromHost:
     report: HostReport
 
 
-Lifecycle = Configure | Activate | Start | Brake | Shutdown
+LifecycleOrder = Configure | Activate | Start | Brake | Shutdown
 PlanOrder = Consider | Adopt | Retire | Prepare | Reconfigure
-ChannelOrder = Lifecycle | Stop | Release | Lost | Blocked | Ask | PlanOrder | SettingOrder | ToHosts
-Progress = Configured | States | Failed | Repeated | AtRest | TimeIsUp | Summary | Alive
-Reply = Answered | Refusal | Considered | Retired | Reconfigured
-ChannelWord = Progress | StoppedByBus | MissionOver | RobotHeld | ComponentNoted | Reply | SettingWord | FromHost
+ChannelOrder = LifecycleOrder | Stop | Release | Lost | Blocked | Ask | PlanOrder | SettingOrder | ToHosts
+ProgressWord = Configured | States | Failed | Repeated | StoppedByBus | AtRest | TimeIsUp | Summary | Alive
+AnswerWord = Answered | Refusal | Considered | Retired | Reconfigured
+ChannelWord = (
+    ProgressWord | StoppedByBus | MissionOver | RobotHeld | ComponentNoted | AnswerWord | SettingWord | FromHost
+)
 ChannelMessage = ChannelOrder | ChannelWord
 
 MESSAGES: Family[ChannelMessage] = Family(get_args(ChannelMessage))

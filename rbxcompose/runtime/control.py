@@ -196,10 +196,6 @@ def supervisor_of(folder: RobotFolder) -> Process | None:
             return None
 
 
-def _micros(seconds: float) -> int:
-    return int(seconds % 1 * 1e6)
-
-
 def ask(folder: RobotFolder, request: Request[A], *, timeout: float = ANSWER) -> A:
     """Send a request to a robot's supervisor and return the answer.
 
@@ -228,7 +224,8 @@ def _exchange(folder: RobotFolder, line: bytes, timeout: float) -> bytes:
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection, _short_address(folder.path) as address:
             # Blocking, with a timeout: a non-blocking connection fails immediately while others wait at the door.
-            connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _TIMEVAL.pack(int(timeout), _micros(timeout)))
+            limit = _TIMEVAL.pack(int(timeout), int(timeout % 1 * 1e6))
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
             connection.connect(address)
             connection.settimeout(timeout)
             connection.sendall(line)

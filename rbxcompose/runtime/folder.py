@@ -343,11 +343,7 @@ class RobotFolder:
 
     def has_lost(self, lock: int) -> bool:
         """Return whether somebody has removed files of a running robot, which holds `lock`."""
-        return self.has_lost_lock(lock) or not all((self.path / name).exists() for name in (STATE, SOCKET, _BUS))
-
-    def has_lost_lock(self, lock: int) -> bool:
-        """Return whether the lock that is held is no longer the one that others would try to hold."""
-        return not self._is_current(lock)
+        return not (self.has_lock(lock) and all((self.path / name).exists() for name in (STATE, SOCKET, _BUS)))
 
     def lock(self) -> int | None:
         """Return a descriptor that holds the lock until it is closed, or None if someone else holds it."""
@@ -363,13 +359,14 @@ class RobotFolder:
                     return None
                 time.sleep(_LOOKING)
                 continue
-            if self._is_current(descriptor):
+            if self.has_lock(descriptor):
                 return descriptor
             os.close(descriptor)  # its previous holder removed it
 
-    def _is_current(self, descriptor: int) -> bool:
+    def has_lock(self, lock: int) -> bool:
+        """Return whether a lock that is held is the one that others would try to hold."""
         try:
-            return os.path.samestat(os.fstat(descriptor), os.stat(self.path / LOCK))
+            return os.path.samestat(os.fstat(lock), os.stat(self.path / LOCK))
         except FileNotFoundError:
             return False
 

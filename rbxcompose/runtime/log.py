@@ -255,12 +255,3 @@ class _Part:
         self._file.close()
         self._skipped += bool(self._rest)
         self._rest = b""
-
-
-def read_log(path: Path) -> list[Record]:
-    """Return all records of a log, none if it does not exist."""
-    follower = Follower(path)
-    try:
-        return follower.read()
-    finally:
-        follower.close()

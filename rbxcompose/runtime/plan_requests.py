@@ -7,7 +7,7 @@ from rbxcompose.base.requests import Command, Query
 from rbxcompose.compiler.plan.diff import Change
 from rbxcompose.runtime.folder import NO_LAYERS, ChosenLayers
 from rbxcompose.runtime.requests import ROBOT
-from rbxcompose.runtime.supervision.changes import Changes, Fate
+from rbxcompose.runtime.supervision.plan_change import Changes, Fate
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """The changes of parameters while the robot runs: who changed what, when, and from which value."""
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import field
 
 from rbxcompose.base.dataclass import dataclass
@@ -77,23 +77,14 @@ def to_undo(changes: Iterable[ParameterChange], wanted: str = "") -> list[Parame
         NothingToUndoError: if there is none, or something has changed the parameter again since.
     """
     known = in_order(changes)
-    undone = {
-        (parameter_change.component, parameter_change.undoes) for parameter_change in known if parameter_change.undoes
-    }
-    gone = {
-        parameter_change.together
-        for parameter_change in known
-        if parameter_change.together and (parameter_change.component, parameter_change.number) in undone
-    }
+    undone = {(change.component, change.undoes) for change in known if change.undoes}
+    taken_back = [change for change in known if (change.component, change.number) in undone]
+    gone = {change.together for change in taken_back if change.together}
     open_ones = [
-        parameter_change
-        for parameter_change in known
-        if not parameter_change.undoes
-        and (parameter_change.component, parameter_change.number) not in undone
-        and parameter_change.together not in gone
+        change for change in known if not change.undoes and change not in taken_back and change.together not in gone
     ]
     if wanted:
-        chosen = next((parameter_change for parameter_change in known if identity(parameter_change) == wanted), None)
+        chosen = next((change for change in known if identity(change) == wanted), None)
         if chosen is None:
             raise NothingToUndoError(f"no change '{wanted}' is known")
         if chosen not in open_ones:
@@ -102,11 +93,8 @@ def to_undo(changes: Iterable[ParameterChange], wanted: str = "") -> list[Parame
         raise NothingToUndoError("there is no change to take back")
     else:
         chosen = open_ones[-1]
-    found = [
-        parameter_change
-        for parameter_change in open_ones
-        if parameter_change is chosen or (chosen.together and parameter_change.together == chosen.together)
-    ]
+    together = chosen.together
+    found = [change for change in open_ones if change is chosen or (together and change.together == together)]
     for change in found:
         if later := _changed_since(known, change):
             name = f"{change.component}.{change.name}"
@@ -116,14 +104,6 @@ def to_undo(changes: Iterable[ParameterChange], wanted: str = "") -> list[Parame
 
 def _changed_since(known: Sequence[ParameterChange], change: ParameterChange) -> ParameterChange | None:
     """Return the last change of the same parameter since then, unless what followed was taken back again."""
-    since = list(_later(known, change))
-    return since[-1] if since and since[-1].after != change.after else None
-
-
-def _later(known: Sequence[ParameterChange], change: ParameterChange) -> Iterator[ParameterChange]:
-    for parameter_change in known:
-        if (parameter_change.component, parameter_change.name) == (
-            change.component,
-            change.name,
-        ) and parameter_change.number > change.number:
-            yield parameter_change
+    same = [other for other in known if (other.component, other.name) == (change.component, change.name)]
+    last = next((other for other in reversed(same) if other.number > change.number), None)
+    return last if last is not None and last.after != change.after else None

@@ -1,7 +1,7 @@
 """What a window tells of something with named parts: all of them at first, then those that have changed.
 
 An update is `{"whole": bool, "changed": {...}, "gone": [...]}`; a whole one replaces what was known. The messages
-around them are those of `bus/window.py`.
+around them are those of `Window` in `bus/services.py`.
 """
 
 from collections.abc import Mapping

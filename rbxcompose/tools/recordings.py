@@ -12,10 +12,9 @@ from rbxcompose.base.findings import Finding, Report, Severity
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import NotDoneError, table, write_report
 from rbxcompose.commands.guest import NO_NAME
-from rbxcompose.runtime.recording.codes import RECOVERED, UNREADABLE
 from rbxcompose.runtime.recording.files import recover_all
 from rbxcompose.runtime.recording.reader import NotARecordingError, RecordingReader
-from rbxcompose.runtime.recording.topics import RecordedTopic, by_name
+from rbxcompose.runtime.recording.topics import RECOVERED, UNREADABLE, RecordedTopic, by_name
 
 
 @contextmanager

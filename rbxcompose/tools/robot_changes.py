@@ -22,8 +22,7 @@ from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.manifest.files import PREFIX
 from rbxcompose.runtime.folder import ChosenLayers, RobotFolder
 from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
-from rbxcompose.runtime.supervision.changes import Fate
-from rbxcompose.runtime.supervision.plan_change import LONGEST
+from rbxcompose.runtime.supervision.plan_change import LONGEST, Fate
 from rbxcompose.tools.inspection.plan_text import changes_text, with_places
 
 _COMPARE = 10.0  # [s] for the supervisor to read a plan

@@ -21,7 +21,7 @@ from rbxcompose.compiler.systems.exchange import exchange_of
 from rbxcompose.compiler.systems.model import PlacedRobot, System
 from rbxcompose.compiler.systems.share import robots_on, share_of
 from rbxcompose.runtime.folder import ChosenLayers, RobotFolder, RunOptions
-from rbxcompose.runtime.supervision.changes import Fate
+from rbxcompose.runtime.supervision.plan_change import Fate
 from rbxcompose.tools.commands.security import certificate_findings
 from rbxcompose.tools.inspection.plan_text import changes_text
 from rbxcompose.tools.live_rules import LiveRules

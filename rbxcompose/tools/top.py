@@ -14,8 +14,8 @@ from rbxcompose.base.units import UNITS
 from rbxcompose.bus.graph import Graph, GraphName
 from rbxcompose.bus.local import Inbox
 from rbxcompose.bus.names import admin_key
+from rbxcompose.bus.services import SCHEMA
 from rbxcompose.bus.transport import LONGEST_WAIT, TransportReply
-from rbxcompose.bus.window import SCHEMA
 from rbxcompose.commands.guest import LONGEST_QUEUE, Guest, ReceivedMessage
 from rbxcompose.commands.guest import NAME as VISITOR
 from rbxcompose.commands.lookup import known_state

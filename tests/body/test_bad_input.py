@@ -15,11 +15,11 @@ from rbxcompose.base import processes as fence
 from rbxcompose.base.findings import Finding
 from rbxcompose.base.printable import FORBIDDEN
 from rbxcompose.commands.main import main
+from rbxcompose.domains.body.commands.body import tree_of
 from rbxcompose.domains.body.files import FORMATS, mesh_problem
 from rbxcompose.domains.body.lint import lint
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.picture import draw
-from rbxcompose.domains.body.text import tree_of
 from rbxcompose.domains.body.urdf import LARGEST, read_body
 from rbxcompose.domains.body.xml_reader import read_urdf
 from rbxcompose.testing.manifests import check_file, check_text

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.findings import Finding, Span
 from rbxcompose.base.geometry import Transform3, quaternion_about, quaternion_from_rpy, rotate
+from rbxcompose.domains.body.commands.body import joints_of, links_of, tree_of
 from rbxcompose.domains.body.model import Body, BodyJoint
-from rbxcompose.domains.body.text import joints_of, links_of, tree_of
 from rbxcompose.domains.body.urdf import read_body
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 from tests.loops import for_all

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from rbxcompose.base.findings import KINDS, Finding, Span
 from rbxcompose.base.fixes import apply
 from rbxcompose.commands.finding_pages import body_of
-from rbxcompose.domains.body.xacro import Expanded, expand
+from rbxcompose.domains.body.xacro import Expanded
 from rbxcompose.manifest.files import library_root, shown_name
 from rbxcompose.testing.manifests import Checked, check_file, check_text
 from rbxcompose.tools.commands.check import fix
-from tests.body.described import described
+from tests.body.described import described, expand
 from tests.soak import Soak, rare
 
 ROBOT = "rbx: 1\nkind: Robot\nname: cart\nbody:\n  xacro: cart.xacro\n"

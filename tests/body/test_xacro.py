@@ -14,9 +14,10 @@ import pytest
 from rbxcompose.base.findings import Finding, Span, one_compile
 from rbxcompose.base.requests import to_data
 from rbxcompose.domains.body import xacro as xacro_answers
-from rbxcompose.domains.body.xacro import Expanded, XacroFile, expand, expand_all
+from rbxcompose.domains.body.xacro import Expanded, XacroFile, expand_all
 from rbxcompose.domains.body.xacro_answer import BareFile, BareTag, XacroAnswer, read_answer
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
+from tests.body.described import expand
 from tests.loops import for_all
 from tests.soak import rare
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.bus.liveness import CALLS, MOST_CALLS, PeerCheck, roll_key
+from rbxcompose.runtime.process_group.connection import CALLS, MOST_CALLS, PeerCheck, roll_key
 
 NAMES = ("mission", "robot", "router", "world")
 Reaches = Callable[[str, str, int], bool]

@@ -10,8 +10,7 @@ import pytest
 import zenoh
 
 from rbxcompose.bus.endpoints import tcp_endpoint
-from rbxcompose.bus.session_link import SessionLink
-from rbxcompose.bus.zenoh_session import as_file, guest_settings, open_peer, open_router
+from rbxcompose.bus.zenoh_session import SessionLink, as_file, guest_settings, open_peer, open_router
 from tests.programs.test_child import eventually
 from tests.systems.test_links import free_port
 

@@ -9,8 +9,8 @@ import pytest
 
 from rbxcompose.base.requests import Refused
 from rbxcompose.bus.names import admin_key
+from rbxcompose.bus.services import GRACE, Window
 from rbxcompose.bus.transport import LONGEST_WAIT, TransportReply
-from rbxcompose.bus.window import GRACE, Window
 from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Alone, Connected, Network
 

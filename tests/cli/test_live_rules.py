@@ -14,7 +14,7 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.diff import difference
 from rbxcompose.compiler.plan.dump import dump, load
 from rbxcompose.msgs.rcl_interfaces import Parameter
-from rbxcompose.runtime.supervision.changes import Fate, changes
+from rbxcompose.runtime.supervision.plan_change import Fate, changes
 from rbxcompose.sdk.parameters import changed, to_message
 from rbxcompose.testing import check_text
 from rbxcompose.tools.live_rules import LiveRules

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.diagnostics.limits import LimitCore, Limits
+from rbxcompose.domains.diagnostics.monitors import LimitCore, Limits
 
 NUMBERS = st.floats(-10, 10)
 SORTED = st.lists(st.floats(-5, 5), min_size=4, max_size=4).map(sorted)

@@ -16,13 +16,13 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.bus.liveness import probe_key
 from rbxcompose.bus.transport import LONGEST_WAIT, TransportReply
 from rbxcompose.bus.zenoh_session import open_client
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.runtime import control
 from rbxcompose.runtime.control import ControlServer, ask
 from rbxcompose.runtime.folder import SOCKET, RobotFolder
+from rbxcompose.runtime.process_group.connection import probe_key
 from rbxcompose.runtime.requests import RobotStatus
 from tests.exposure.attacks import ON_CONTROL, ON_ROUTER, REQUESTS, sending
 from tests.exposure.sockets import Listener, listeners

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.findings import Span
 from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.body.commands.body import axis_words, body_dot, draw_graph
 from rbxcompose.domains.body.model import Body, BodyJoint, BodyLink
-from rbxcompose.domains.body.text import axis_words, body_dot, draw_graph
 from rbxcompose.domains.body.urdf import read_body
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.testing.golden import Golden

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rbxcompose.base.requests import to_data
 from rbxcompose.runtime.plan_requests import PlanComparison
-from rbxcompose.runtime.supervision.changes import changes
+from rbxcompose.runtime.supervision.plan_change import changes
 from rbxcompose.testing import Golden
 from rbxcompose.tools.inspection.plan_text import changes_text, with_places
 from tests.conftest import ROOT

@@ -21,7 +21,7 @@ from rbxcompose.commands.new_files import write_new
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
-from rbxcompose.runtime.log import NAME, PREVIOUS, LogFile, Record, read_log, start_new
+from rbxcompose.runtime.log import NAME, PREVIOUS, LogFile, Record, start_new
 from rbxcompose.runtime.process_group.group import Taping
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.runtime.recording.files import recover_all
@@ -30,6 +30,7 @@ from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
 from rbxcompose.runtime.supervision.supervisor import Supervisor
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.tools.commands.check import fix
+from tests.runtime.real_robot import read_log
 
 OLD, NEW = b"old: 1\n" * 3000, b"new: 2\n" * 4000
 MESSAGES = 12

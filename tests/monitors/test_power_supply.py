@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.domains.diagnostics.monitors import Supply, batteries
+from rbxcompose.domains.diagnostics.components.host_battery import Supply, batteries
 
 
 def made(folder: Path, name: str, **properties: str) -> None:

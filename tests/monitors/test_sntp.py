@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.domains.diagnostics.monitors import ERA, NoTimeError, measure, offset, question
+from rbxcompose.domains.diagnostics.components.clock_monitor import ERA, NoTimeError, measure, offset, question
 
 NOW = 1_700_000_000.0
 ANSWER = struct.Struct("!BBbb5I2I2I2I")

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.domains.muxes.account import MuxAccount
-from rbxcompose.domains.muxes.core import StampedTwistRamp, grown, is_zeroed, rest_of, zeroed
+from rbxcompose.domains.muxes.core import MuxAccount, StampedTwistRamp, grown, is_zeroed, rest_of, zeroed
 from rbxcompose.msgs.geometry_msgs import Twist, TwistStamped, Vector3
 from rbxcompose.msgs.std_msgs import Float64, Float64MultiArray, Header
 from tests.mux.velocities import Driven, Input, twist

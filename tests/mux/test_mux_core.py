@@ -10,8 +10,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from rbxcompose.domains.muxes.account import MuxAccount
-from rbxcompose.domains.muxes.core import LockSource, MuxCore, MuxSource
+from rbxcompose.domains.muxes.core import LockSource, MuxAccount, MuxCore, MuxSource
 
 INPUTS = {"safety": MuxSource(200, 0.2), "teleop": MuxSource(100, 0.5), "navigation": MuxSource(10, 0.5)}
 LOCKS = {"door": LockSource(150, 0.3)}

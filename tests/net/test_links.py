@@ -11,12 +11,11 @@ from random import Random
 import pytest
 
 from rbxcompose.bus.endpoints import tcp_endpoint
-from rbxcompose.bus.liveness import MISSES, ProbeResult, probe_key
 from rbxcompose.bus.zenoh_session import open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger
-from rbxcompose.runtime.process_group.connection import answer
+from rbxcompose.runtime.process_group.connection import MISSES, ProbeResult, answer, probe_key
 from rbxcompose.sdk.ports import Qos
 from tests.net.proxy import Proxy
 from tests.runtime.test_lifeline import ROBOT, Probed, Visitor, until

@@ -15,12 +15,12 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.runtime.log import NAME, Record, read_log
+from rbxcompose.runtime.log import NAME, Record
 from rbxcompose.runtime.processes import Process
 from tests.forked import RBXCOMPOSE, Forked
 from tests.programs.foreign import PATROL, patrol
 from tests.programs.foreign import robot as manifest
-from tests.runtime.real_robot import PATIENCE, ROOT, Robot, eventually
+from tests.runtime.real_robot import PATIENCE, ROOT, Robot, eventually, read_log
 
 SECRET = "a_secret_of_the_test"
 TALKER = [sys.executable, str(Path(__file__).with_name("bare_talker.py"))]

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rbxcompose.runtime.folder import RobotFolder
-from rbxcompose.runtime.log import NAME, PREVIOUS, read_log
+from rbxcompose.runtime.log import NAME, PREVIOUS, Follower, Record
 from rbxcompose.runtime.processes import Process, titled
 from tests.commands import command
 from tests.forked import Forked
@@ -21,6 +21,15 @@ ROOT = Path(__file__).parents[2]
 TOY = [sys.executable, str(Path(__file__).with_name("toy_robot.py"))]
 LOG_FILES = {NAME, PREVIOUS}
 PATIENCE = 60.0  # [s]; how long things may take is for their tests to say
+
+
+def read_log(path: Path) -> list[Record]:
+    """Return all records of a log, none if it does not exist."""
+    follower = Follower(path)
+    try:
+        return follower.read()
+    finally:
+        follower.close()
 
 
 def eventually(holds: Callable[[], bool]) -> None:

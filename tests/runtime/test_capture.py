@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.base.levels import Level
-from rbxcompose.runtime.process_group.capture import Capture, take_printed
+from rbxcompose.runtime.process_group.group import Capture, take_printed
 
 Told = list[tuple[Level, str]]
 

@@ -9,7 +9,7 @@ import pytest
 from rbxcompose.base.config import Restart, with_values
 from rbxcompose.compiler.plan.dump import dump, load
 from rbxcompose.compiler.plan.model import BusPlan, Plan
-from rbxcompose.runtime.supervision.changes import Changes, Fate, changes
+from rbxcompose.runtime.supervision.plan_change import Changes, Fate, changes
 from rbxcompose.testing.bench import instance
 from tests.conftest import ROOT
 from tests.manifests import turtlebot

@@ -11,7 +11,7 @@ from rbxcompose.compiler.plan.dump import load
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.folder import RunOptions
-from rbxcompose.runtime.supervision.changes import changes
+from rbxcompose.runtime.supervision.plan_change import changes
 from tests.runtime.stage import Stage, placed, robot
 from tests.runtime.test_giving_up import NEVER, with_never
 

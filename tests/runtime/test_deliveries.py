@@ -18,7 +18,7 @@ from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.runtime.process_group.host import PERIOD, Deliveries
-from rbxcompose.runtime.process_group.hosted import Statuses
+from rbxcompose.runtime.process_group.provided import Statuses
 from rbxcompose.sdk.ports import Qos
 
 GOOD = encode(Float32(data=0.5))

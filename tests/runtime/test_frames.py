@@ -19,7 +19,7 @@ from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStampe
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.runtime.process_group.live_ports import MOST_LOGGED, Frames, Lookup
+from rbxcompose.runtime.process_group.provided import MOST_LOGGED, Frames, Lookup
 from rbxcompose.sdk.ports import Qos
 
 

@@ -12,7 +12,7 @@ from rbxcompose.base.levels import Level
 from rbxcompose.missions.execution.requests import CancelMission, PauseMission, ResumeMission
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.runtime.process_group.hosted import Lifecycle
+from rbxcompose.runtime.process_group.host import Lifecycle
 from rbxcompose.sdk import Component, Config, Out, Refused, component
 from rbxcompose.testing import Bench, instance
 from tests.manifests import turtlebot

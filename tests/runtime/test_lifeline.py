@@ -17,14 +17,22 @@ from rbxcompose.base.clock import MonotonicClock
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.endpoints import tcp_endpoint
-from rbxcompose.bus.liveness import MISSES, Probe, ProbeResult, probe_key
 from rbxcompose.bus.renewal import RenewableTransport
 from rbxcompose.bus.transport import LONGEST_WAIT, TransportReply
 from rbxcompose.bus.zenoh_session import open_client, open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger
-from rbxcompose.runtime.process_group.connection import LIFELINE_BEATS, Lifeline, PeerChecker, answer
+from rbxcompose.runtime.process_group.connection import (
+    LIFELINE_BEATS,
+    MISSES,
+    Lifeline,
+    PeerChecker,
+    Probe,
+    ProbeResult,
+    answer,
+    probe_key,
+)
 from rbxcompose.sdk.bound import Reply
 from rbxcompose.sdk.ports import Qos
 

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import threading
 
-from rbxcompose.bus.liveness import MISSES
 from rbxcompose.bus.renewal import RenewableTransport
 from rbxcompose.bus.transport import NoTransport, OnReply, Transport
-from rbxcompose.runtime.process_group.connection import BEAT, FIRST_PAUSE, LIFELINE_BEATS, LONGEST_PAUSE, Lifeline
+from rbxcompose.runtime.process_group.connection import (
+    BEAT,
+    FIRST_PAUSE,
+    LIFELINE_BEATS,
+    LONGEST_PAUSE,
+    MISSES,
+    Lifeline,
+)
 
 OPENED_ANEW = "the session on the bus no longer carries anything; opening it again"
 

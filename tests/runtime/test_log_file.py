@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.levels import Level
-from rbxcompose.runtime.log import NAME, PARTS, PREVIOUS, Follower, LogFile, Record, read_log, start_new
+from rbxcompose.runtime.log import NAME, PARTS, PREVIOUS, Follower, LogFile, Record, start_new
+from tests.runtime.real_robot import read_log
 
 
 def record(number: int, text: str = "text") -> Record:

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.runtime.folder import RobotFolder
-from rbxcompose.runtime.log import NAME, read_log
+from rbxcompose.runtime.log import NAME
 from rbxcompose.runtime.processes import titled
 from tests.cli.live_robot import Robot
-from tests.runtime.real_robot import eventually
+from tests.runtime.real_robot import eventually, read_log
 
 ROBOT = """
 rbx: 1

@@ -9,10 +9,10 @@ from rbxcompose.compiler.plan.model import OtherHost, Plan, Share
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import HostReport, RobotEnd
 from rbxcompose.runtime.folder import ClockOffset
-from rbxcompose.runtime.supervision.changes import changes
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.runtime.supervision.other_hosts import SILENT
+from rbxcompose.runtime.supervision.plan_change import changes
 from rbxcompose.sdk.component import MissionOver
 from tests.runtime.stage import Stage, robot
 

@@ -9,9 +9,9 @@ import time
 
 import pytest
 
-from rbxcompose.runtime.log import NAME, read_log
+from rbxcompose.runtime.log import NAME
 from rbxcompose.runtime.processes import titled, wait_until_ended
-from tests.runtime.real_robot import PATIENCE, Robot, eventually
+from tests.runtime.real_robot import PATIENCE, Robot, eventually, read_log
 from tests.soak import rare
 
 

@@ -23,8 +23,8 @@ from rbxcompose.runtime.folder import RobotState, RunOptions
 from rbxcompose.runtime.plan_requests import AdoptSaved, ApplyPlan, ComparePlan, PlanComparison, RevertPlan
 from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import BringDown, NoteInLog, ReleaseRobot, RobotStatus, StopRobot
-from rbxcompose.runtime.supervision.changes import Fate
 from rbxcompose.runtime.supervision.conductor import Conductor
+from rbxcompose.runtime.supervision.plan_change import Fate
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
 from rbxcompose.runtime.supervision.setting_changes import SettingChanges, WhenJudged
 from rbxcompose.sdk import Component, Config, component

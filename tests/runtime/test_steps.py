@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.scheduler import Scheduler
-from rbxcompose.runtime.process_group.hosted import GoalSteps
+from rbxcompose.runtime.process_group.provided import GoalSteps
 
 PERIOD = 0.05
 

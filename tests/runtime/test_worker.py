@@ -22,8 +22,7 @@ from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.runtime.log import Record
 from rbxcompose.runtime.process_group.connection import CallbackInbox
-from rbxcompose.runtime.process_group.host import Host
-from rbxcompose.runtime.process_group.hosted import Lifecycle
+from rbxcompose.runtime.process_group.host import Host, Lifecycle
 from rbxcompose.runtime.process_group.worker import CONFIGURE, LONGEST, Worker
 from rbxcompose.sdk import Calls, Component, Config, In, Out, Refused, Reply, Serves, ServesAction, component
 from rbxcompose.sdk.ports import Qos

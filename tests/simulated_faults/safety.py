@@ -7,7 +7,7 @@ from dataclasses import field
 
 from rbxcompose.base.clock import NANOSECONDS
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.bus.goals import GoalState
+from rbxcompose.bus.actions import GoalState
 from rbxcompose.bus.names import ActionNames
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.domains.muxes.config import MuxConfig

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.bus.goals import GoalState
+from rbxcompose.bus.actions import GoalState
 from rbxcompose.testing import check_file
 from tests.simulated_faults.safety import (
     ROBOT,

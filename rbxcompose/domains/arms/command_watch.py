@@ -11,8 +11,8 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.local import Inbox
 from rbxcompose.bus.names import admin_key
+from rbxcompose.bus.services import SCHEMA
 from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, Transport, TransportReply
-from rbxcompose.bus.window import SCHEMA
 from rbxcompose.commands.console import NotDoneError, emit
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import NO_ANSWER, known_state, place_of

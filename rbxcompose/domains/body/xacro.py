@@ -221,13 +221,6 @@ def expand_all(xacros: Sequence[XacroFile]) -> list[tuple[Expanded | Finding, Se
     ]
 
 
-def expand(
-    path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path], roots: Sequence[Path], span: Span
-) -> tuple[Expanded | Finding, Sequence[Path]]:
-    """Expand one xacro file."""
-    return expand_all([XacroFile(path, arguments, packages, roots, span)])[0]
-
-
 def _result(xacro: XacroFile, answer: XacroAnswer | None) -> tuple[Expanded | Finding, Sequence[Path]]:
     if answer is None:
         message = f"'{plain(shown_name(xacro.path))}' does not end within its limits of time and memory"

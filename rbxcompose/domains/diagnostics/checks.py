@@ -169,9 +169,9 @@ def matched_twice(robot: Robot) -> Iterator[Finding]:
     first: dict[str, tuple[tuple[str, ...], int]] = {}
     for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
         shown = analyzer.conditions if analyzer.kind in SHOWN else ()
-        for index, pattern in (
-            (index, condition) for index, condition in enumerate(shown) if isinstance(condition, str)
-        ):
+        for index, pattern in enumerate(shown):
+            if not isinstance(pattern, str):
+                continue
             other = first.setdefault(pattern, (path, index))
             if other != (path, index):
                 yield matched_twice.at(

@@ -564,7 +564,8 @@ class Aggregator:
         """Return the item of a new name; it replaces a placeholder for its component."""
         component = component_of(name)
         if component != name and component in self._items and self._items[component].status is None:
-            self._forget(self._items[component], now)
+            for member in list(self._items[component].members):
+                self._leave(member, now)
         return self._place(Item(name, now, is_own=self._is_own(name)))
 
     def _place(self, item: Item) -> Item:
@@ -599,10 +600,6 @@ class Aggregator:
         member.group.move(member, level)
         self.history.add(now, member.path, old, level, member.message())
         self._touch(member.group)
-
-    def _forget(self, item: Item, now: float) -> None:
-        for member in list(item.members):
-            self._leave(member, now)
 
     def _leave(self, member: GroupItem, now: float) -> None:
         member.group.drop(member, now)

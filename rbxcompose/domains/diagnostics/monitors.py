@@ -1,33 +1,68 @@
-"""What monitors of this computer share: how much is in use, its batteries, its clock."""
+"""What monitors share: a number against its limits, with hysteresis and patience; how much of something is in use."""
 
 from __future__ import annotations
 
-import socket
-import struct
-from collections.abc import Callable, Mapping
-from pathlib import Path
+import math
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, TypeVar
 
 from pydantic import Field
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.diagnostics.limits import LimitCore, Limits
 from rbxcompose.sdk import Capability, Component, Config, Live, NeedsExtra, Ratio, Setting, Time, Warns
 
 C = TypeVar("C", bound=Config)
 NEEDS_PSUTIL = NeedsExtra(Setting("psutil"), Setting("monitors"))
-FOLDER = Path("/sys/class/power_supply")
-MICRO = 1e-6
-PORT = 123
-SIZE = 48  # [bytes] of a packet
-ERA = 2_208_988_800  # [s] from the beginning of NTP's time, 1900, to that of Unix
-_HEADER = struct.Struct("!BBbb11I")
-_CLIENT = 0x23  # version 4, mode 3
-_SERVER = 4  # mode
-_UNSYNCHRONISED = 3  # leap indicator
-_FRACTION = 2**32
 HYSTERESIS = 0.02  # of the share
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Where a number is a warning or an error, below and above.
+
+    A level that it has reached lasts until the number is back by `hysteresis`; a worse one counts once the number has
+    been there for `patience` [s].
+    """
+
+    warn_below: float = -math.inf
+    error_below: float = -math.inf
+    warn_above: float = math.inf
+    error_above: float = math.inf
+    hysteresis: float = 0.0
+    patience: float = 0.0
+
+    def level(self, number: float, *, since: Level = Level.OK) -> Level:
+        """Return the level of a number if the level before was `since`; what is not finite is an ERROR."""
+        if not math.isfinite(number):
+            return Level.ERROR
+        error, warn = (self.hysteresis if since >= level else 0.0 for level in (Level.ERROR, Level.WARN))
+        if number < self.error_below + error or number > self.error_above - error:
+            return Level.ERROR
+        if number < self.warn_below + warn or number > self.warn_above - warn:
+            return Level.WARN
+        return Level.OK
+
+
+class LimitCore:
+    """The level of a number over time; all times in [s]."""
+
+    def __init__(self, limits: Limits) -> None:
+        self.limits = limits
+        self.level = Level.OK
+        self._worse_since: float | None = None  # the number has been beyond another limit
+
+    def feed(self, now: float, number: float) -> Level:
+        """Take a number and return the level."""
+        found = self.limits.level(number, since=self.level)
+        if found <= self.level:
+            self.level, self._worse_since = found, None
+            return self.level
+        if self._worse_since is None:
+            self._worse_since = now
+        if now - self._worse_since >= self.limits.patience:
+            self.level, self._worse_since = found, None
+        return self.level
 
 
 class HostMonitor(Component[C]):
@@ -45,129 +80,6 @@ class HostMonitor(Component[C]):
             self.measure(dt)
         else:
             self.status(Level.OK, "not measured: time is simulated")
-
-
-@dataclass(frozen=True, slots=True)
-class Supply:
-    """A battery: `charge` and `health` from 0 to 1, None where Linux does not know; [V], [A]."""
-
-    name: str
-    status: str
-    charge: float | None
-    health: float | None
-    voltage: float | None
-    current: float | None
-
-
-def batteries(folder: Path = FOLDER) -> tuple[Supply, ...]:
-    """Return the batteries that are present, by name; none where there is no such folder.
-
-    Batteries of devices, such as a mouse, have the scope `Device` and do not count.
-    """
-    try:
-        found = sorted(folder.iterdir())
-    except OSError:
-        return ()
-    return tuple(_supply(path) for path in found if _is_own_battery(path))
-
-
-def _is_own_battery(folder: Path) -> bool:
-    is_battery = _text(folder, "type") == "Battery" and _text(folder, "scope") != "Device"
-    return is_battery and _text(folder, "present") != "0"
-
-
-def _supply(folder: Path) -> Supply:
-    full = _number(folder, "energy_full", "charge_full")
-    design = _number(folder, "energy_full_design", "charge_full_design")
-    now = _number(folder, "energy_now", "charge_now")
-    percent = _number(folder, "capacity")
-    charge = percent / 100 if percent is not None else _share(now, full)
-    voltage, current = _number(folder, "voltage_now"), _number(folder, "current_now")
-    return Supply(
-        folder.name,
-        _text(folder, "status") or "Unknown",
-        charge,
-        _share(full, design),
-        voltage * MICRO if voltage is not None else None,
-        current * MICRO if current is not None else None,
-    )
-
-
-def _share(part: float | None, whole: float | None) -> float | None:
-    return part / whole if part is not None and whole else None
-
-
-def _number(folder: Path, *names: str) -> float | None:
-    for name in names:
-        text = _text(folder, name)
-        if text.lstrip("-").isdecimal():
-            return float(text)
-    return None
-
-
-def _text(folder: Path, name: str) -> str:
-    try:
-        with (folder / name).open(encoding="utf-8", errors="replace") as file:
-            return file.read(64).strip()
-    except OSError:  # Linux shows only what the battery reports, and a battery may be taken out while it is read
-        return ""
-
-
-class NoTimeError(Exception):
-    """Raised when a server does not answer, or not as one; the text says what happened."""
-
-
-def question(sent: float) -> bytes:
-    """Return a question that is sent at `sent` [s, Unix]."""
-    seconds, fraction = _ntp(sent)
-    return _HEADER.pack(_CLIENT, 0, 0, 0, *(0,) * 9, seconds, fraction)
-
-
-def offset(answer: bytes, sent: float, received: float) -> float:
-    """Return by how much the server's clock is ahead of ours [s], half of what the way takes being the error.
-
-    Raises:
-        NoTimeError: if it is no answer to the question of that time, or the server does not know the time.
-    """
-    if len(answer) < SIZE:
-        raise NoTimeError(f"an answer of {len(answer)} bytes")
-    first, stratum, _, _, *words = _HEADER.unpack(answer[:SIZE])
-    if first & 7 != _SERVER or tuple(words[5:7]) != _ntp(sent):
-        raise NoTimeError("an answer to another question")
-    if first >> 6 == _UNSYNCHRONISED or not 0 < stratum < 16:
-        raise NoTimeError("the server does not know the time")
-    arrived, left = (_unix(*words[at : at + 2]) for at in (7, 9))
-    return ((arrived - sent) + (left - received)) / 2
-
-
-def measure(server: str, timeout: float, clock: Callable[[], float], port: int = PORT) -> float:
-    """Ask a server, and return by how much it is ahead of `clock` [s, Unix].
-
-    Raises:
-        NoTimeError: if it does not answer within `timeout` [s].
-    """
-    try:
-        family, kind, protocol, _, address = socket.getaddrinfo(server, port, type=socket.SOCK_DGRAM)[0]
-        with socket.socket(family, kind, protocol) as link:
-            link.settimeout(timeout)
-            link.connect(address)
-            sent = clock()
-            link.send(question(sent))
-            answer = link.recv(1024)
-            return offset(answer, sent, clock())
-    except OSError as error:
-        raise NoTimeError(str(error) or type(error).__name__) from error
-
-
-def _ntp(unix: float) -> tuple[int, int]:
-    seconds, part = divmod(unix + ERA, 1)
-    return int(seconds) % _FRACTION, int(part * _FRACTION)
-
-
-def _unix(seconds: int, fraction: int) -> float:
-    # The first era ends in 2036; numbers of the next one are small.
-    era = _FRACTION if seconds < _FRACTION // 2 else 0
-    return era + seconds + fraction / _FRACTION - ERA
 
 
 @dataclass(frozen=True, slots=True)

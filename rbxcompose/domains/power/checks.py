@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from rbxcompose.base.config import Place
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.tree import Comparison, Junction, Variable
 from rbxcompose.base.findings import MISSIONS, OWN, WIRING, Finding, Related, Severity
@@ -77,11 +78,10 @@ def charge_and_call(robot: Robot) -> Iterator[Finding]:
 def charge_anywhere(robot: Robot) -> Iterator[Finding]:
     """A reaction to a low battery charges wherever the robot is."""
     levels = batteries(robot)
-    for mission in robot.missions.values():
-        program, ways = mission.program, ways_of(robot, mission)
-        if ways is None or not ways.driving.skill:
+    for mission, ways in _walked(robot):
+        program = mission.program
+        if not ways.driving.skill:
             continue
-        list(too_short(ways, constants(mission)))  # consumed for its side effect: it walks the whole mission
         for interrupt in program.interrupts:
             tree = interrupt.when.expression.tree
             is_low = isinstance(tree, Comparison) and isinstance(tree.left, Variable) and tree.left.name in levels
@@ -104,6 +104,14 @@ def charge_anywhere(robot: Robot) -> Iterator[Finding]:
                     )
 
 
+def _walked(robot: Robot) -> Iterator[tuple[RobotMission, Ways]]:
+    """Yield the missions that drive, with their ways, which were walked to the end."""
+    for mission in robot.missions.values():
+        if (ways := ways_of(robot, mission)) is not None:
+            list(too_short(ways, constants(mission)))  # consumed for its side effect: it walks the whole mission
+            yield mission, ways
+
+
 def _may_move(robot: Robot, node: MissionNode) -> bool:
     """Return whether a step may bring the robot to another place, as everything may that is not ours to know."""
     effects = node.step.effects
@@ -114,36 +122,36 @@ def _may_move(robot: Robot, node: MissionNode) -> bool:
 
 def _counts(program: Program, node: MissionNode) -> bool:
     """Return whether a step is always done in its turn, and its failure is that of the reaction."""
-    mission_node: MissionNode | None = node
-    while mission_node is not None:
-        above = None if mission_node.parent is None else program.nodes[mission_node.parent]
-        if (
-            mission_node.may_be_left_out
-            or mission_node.is_forgiven
-            or (above and above.step.flow is not NodeFlow.IN_TURN)
-        ):
-            return False
-        mission_node = above
-    return True
+    return not any(
+        inner.may_be_left_out or inner.is_forgiven or (above and above.step.flow is not NodeFlow.IN_TURN)
+        for inner, above in _upwards(program, node)
+    )
+
+
+def _upwards(program: Program, node: MissionNode) -> Iterator[tuple[MissionNode, MissionNode | None]]:
+    """Yield a node and all that it is in, each with the one above it."""
+    inner: MissionNode | None = node
+    while inner is not None:
+        above = None if inner.parent is None else program.nodes[inner.parent]
+        yield inner, above
+        inner = above
 
 
 def _elsewhere(ways: Ways, charges: Charges) -> str:
     """Return a place that the mission drives to and that is out of reach of the charger."""
-    if charges.place is None:
-        return ""
-    dock, reach = charges.place.value, charges.reach.value if charges.reach else 0.0
-    far = (name for name, place in ways.visited.items() if distance(place, dock) > reach + ways.driving.tolerance)
-    return next(far, "")
+    return next((name for name, place in ways.visited.items() if _is_away(ways, place, charges)), "")
+
+
+def _is_away(ways: Ways, here: Place, charges: Charges) -> bool:
+    """Return whether the robot may be out of reach of a charger when it is at a place."""
+    reach = charges.reach.value if charges.reach else 0.0
+    return charges.place is not None and distance(here, charges.place.value) > reach + ways.driving.tolerance
 
 
 @check("RBX4130", closed=(WIRING, "places"))
 def charge_elsewhere(robot: Robot) -> Iterator[Finding]:
     """A mission charges where there is no dock."""
-    for mission in robot.missions.values():
-        ways = ways_of(robot, mission)
-        if ways is None:
-            continue
-        list(too_short(ways, constants(mission)))  # consumed for its side effect: it walks the whole mission
+    for mission, ways in _walked(robot):
         for number, here in ways.starts_at.items():
             node = mission.program.nodes[number]
             charger, charges = charger_of(robot, node.skill) or (None, None)
@@ -151,8 +159,7 @@ def charge_elsewhere(robot: Robot) -> Iterator[Finding]:
             if charger is None or charges is None or charges.place is None or may_fail:
                 continue
             dock = charges.place.value
-            reach = charges.reach.value if charges.reach else 0.0
-            if distance(here, dock) > reach + ways.driving.tolerance:
+            if _is_away(ways, here, charges):
                 yield charge_elsewhere.at(
                     node.span,
                     f"'{node.skill}' works only at '{dock.name}', but here the robot is at '{here.name}'",
@@ -218,13 +225,10 @@ def _least_level(asked: Asked, call: ChargeInterrupt, known: Constants) -> float
 
 def _counts_failures(program: Program, node: MissionNode) -> bool:
     """Return whether nothing else follows a failure of a step, which may then not be meant."""
-    mission_node: MissionNode | None = node
-    while mission_node is not None:
-        above = None if mission_node.parent is None else program.nodes[mission_node.parent]
-        if mission_node.is_forgiven or (above and above.step.flow in (NodeFlow.FIRST, NodeFlow.OPEN)):
-            return False
-        mission_node = above
-    return True
+    return not any(
+        inner.is_forgiven or (above and above.step.flow in (NodeFlow.FIRST, NodeFlow.OPEN))
+        for inner, above in _upwards(program, node)
+    )
 
 
 @check("RBX3505", Severity.WARNING, closed=())
@@ -289,12 +293,9 @@ def _is_dock(robot: Robot, mission: RobotMission, node: MissionNode) -> bool:
 @check("RBX4124", Severity.WARNING)
 def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
     """The battery may be empty before the robot reaches its dock."""
-    for mission in robot.missions.values():
-        ways, known = ways_of(robot, mission), constants(mission)
-        if ways is None:
-            continue
+    for mission, ways in _walked(robot):
+        known = constants(mission)
         lost = {place.name for place in far_places(robot)}  # reported as RBX3512
-        list(too_short(ways, known))  # consumed for its side effect: it walks the whole mission
         for call in calls(robot, mission):
             goals = (
                 goal_place(node, ways.driving.main, known, ways.places)

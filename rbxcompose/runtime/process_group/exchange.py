@@ -8,8 +8,8 @@ from rbxcompose.base.clock import Clock
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.access_control import AllowedHost, exchange_access
+from rbxcompose.bus.actions import MOST_KEPT, CancelCode, GoalState
 from rbxcompose.bus.bus import Bus
-from rbxcompose.bus.goals import MOST_KEPT, CancelCode, GoalState
 from rbxcompose.bus.local import GOALS
 from rbxcompose.bus.names import EXCHANGE_DOMAIN, ActionNames
 from rbxcompose.bus.services import Client, ServedRequest, Server

@@ -1,31 +1,43 @@
-"""The host of a process: takes its components through their lifecycle and isolates their faults."""
+"""The host of a process: takes its components through their lifecycle, binds their ports and isolates their faults."""
 
+from __future__ import annotations
+
+import sys
 from collections.abc import Callable, Mapping, Sequence
+from enum import StrEnum
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from rbxcompose.base.clock import Clock
-from rbxcompose.base.config import leaves, value_at, with_values
+from rbxcompose.base.config import Config, leaves, value_at, with_values
 from rbxcompose.base.levels import Level
-from rbxcompose.base.requests import Command, Refused, Request, UnreadableError, as_data
+from rbxcompose.base.requests import Command, Query, Refused, Request, UnreadableError, as_data, to_data
 from rbxcompose.base.scheduler import Scheduler
+from rbxcompose.bus.actions import ActionServer
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.local import sentence
+from rbxcompose.bus.names import admin_key, resolve
+from rbxcompose.bus.services import ServedRequest
 from rbxcompose.bus.topics import Subscription
+from rbxcompose.bus.wire import queue_depth
 from rbxcompose.compiler.plan.model import Instance, Plan
+from rbxcompose.missions.sources import PAUSE
 from rbxcompose.msgs.rcl_interfaces import Log
 from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.runtime.channel import Failed, Repeated, States
 from rbxcompose.runtime.faults import RestartPolicy, explain
 from rbxcompose.runtime.log import Record, WriteRecord
-from rbxcompose.runtime.process_group.hosted import Hosted, Lifecycle, Statuses
-from rbxcompose.runtime.process_group.live_ports import Frames
 from rbxcompose.runtime.process_group.parameters import NOBODY_ELSE, Deciders, Parameters
-from rbxcompose.runtime.process_group.worker import Post, Worker
+from rbxcompose.runtime.process_group.provided import Frames, GoalSteps, Lookup, Statuses, paced
+from rbxcompose.runtime.process_group.worker import ACTIVATE, CONFIGURE, Call, HandedOver, Post, Worker, handed_over
+from rbxcompose.sdk import ports
+from rbxcompose.sdk.bound import Later, Window
 from rbxcompose.sdk.capabilities import RunsMissions
-from rbxcompose.sdk.component import Component, RobotEvent
-from rbxcompose.sdk.ports import Looks, Qos
+from rbxcompose.sdk.component import BusAddress, Component, MissionOver, RobotEvent, RobotHeld
+from rbxcompose.sdk.ports import In, Looks, Port, Qos, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type, declared
+from rbxcompose.sdk.updater import DiagnosticTask
 
 TOPIC = "/rosout"
 _LEVELS = {Level.OK: Log.INFO, Level.WARN: Log.WARN, Level.ERROR: Log.ERROR, Level.STALE: Log.WARN}
@@ -495,3 +507,460 @@ class Host:
             component = hosted.component
             if component is not None and hosted.state is Lifecycle.ACTIVE:
                 self._guarded(name, partial(hosted.do, method, partial(getattr(component, method), *arguments)))
+
+
+LONGEST_GOODBYE = 0.3  # [s] to wait for a component's own thread to end
+
+
+class Lifecycle(StrEnum):
+    """Lifecycle states, as `ps` shows them."""
+
+    UNCONFIGURED = "unconfigured"
+    INACTIVE = "inactive"
+    ACTIVE = "active"
+    FAILED = "failed"
+
+
+class Hosted:
+    """An instance and, while it lives, its component. It is the component's context, too."""
+
+    def __init__(self, host: Host, instance: Instance) -> None:
+        self.host, self.instance = host, instance
+        self.clock: Clock = host.clock
+        self.state = Lifecycle.UNCONFIGURED
+        self.config = instance.config  # the current one: parameters may have changed it
+        self.component: Component[Any] | None = None
+        self.worker: Worker | None = None  # the thread of a component that may block
+        self._ends: dict[str, Any] = {}  # of the ports, on the bus
+        self._claiming: list[Any] = []  # those ports that serve an action which claims a part of the robot
+        self._repeated: Sequence[Command] = ()  # requests that it gets again after a restart in place
+        self.is_again = False  # the component was already started since the robot came up
+        self._was_started = False
+        self._wakes: set[float] = set()  # robot times [s] at which to wake the component
+
+    @property
+    def file(self) -> str | None:
+        """Return the file that defines the component's type."""
+        return sys.modules[component_type(self.instance.type).__module__].__file__
+
+    # Lifecycle
+
+    def configure(self) -> None:
+        """Create the component, bind its ports, and configure it."""
+        cls = component_type(self.instance.type)
+        self.worker = self.host.worker(self.instance.name, cls.configures_within) if cls.blocking else None
+        self.is_again = self.host.is_restart or self._was_started
+        made = cls(self.instance.name, self.config, self if self.worker is None else HandedOver(self, self.worker))
+        self.component = made
+        self.host.statuses.forget_tasks(self.instance.name)
+        bind(self, made)
+        self._ends = dict(made.bound)
+        ports = cls.ports(self.config)
+        self._claiming = [
+            end
+            for name, end in made.bound.items()
+            if isinstance(port := ports[name], ServesAction) and port.claims and not port.is_elsewhere
+        ]
+        if self.worker is not None:
+            made.bound = {name: handed_over(end, ports[name], self.worker) for name, end in self._ends.items()}
+        if cls.has_parameters:
+            self.host.parameters.serve(self)
+        self.do(CONFIGURE, made.configure, then=self._configured)
+
+    def _configured(self) -> None:
+        self._enter(Lifecycle.INACTIVE)
+        self.host.statuses.set(self.instance.name, Level.OK, "ready", {})
+        if self.worker is not None:
+            self.host.ready(self.instance.name)
+
+    def reconfigure(self, config: Config) -> None:
+        """Apply another configuration to the component; if it raises, the old one stays."""
+        if self.is_busy:
+            raise Refused(f"'{self.instance.name}' is busy")
+        component, old = self._made(), self.config
+        component.config = config
+        try:
+            component.reconfigure(old)
+        except BaseException:
+            component.config = old
+            raise
+        self.config = config
+
+    def activate(self) -> None:
+        """Activate the component; like the others, it learns that the robot has started, is stopped or goes down."""
+        component = self._made()
+        self.host.statuses.set(self.instance.name, Level.OK, "active", {})
+        self.do(ACTIVATE, component.activate, then=self._activated)
+
+    def _activated(self) -> None:
+        component = self._made()
+        self._enter(Lifecycle.ACTIVE)
+        if (rate := component.rate_of(component.config)) > 0:
+            self._step_with(component, rate)
+        if self.host.is_stopped:
+            self.do("stop", component.stop)
+        if self.host.is_held:
+            self.do("hold", component.hold)
+        if self.host.is_braking:
+            self.do("brake", component.brake)
+        if self.host.has_started:
+            self.do("start", component.start)
+            self.note_start()
+            for request in self._repeated:
+                self.do("command", partial(self._repeat, component, request, self._repeated))
+        self.host.bus.open(self.instance.name)  # those who found it before it was active have waited
+
+    def note_start(self) -> None:
+        """Note that the component, if it is active, was told of the start."""
+        self._was_started = self._was_started or self.state is Lifecycle.ACTIVE
+
+    def _step_with(self, component: Component[Any], rate: float) -> None:
+        scheduler, owner, period, step = self.host.scheduler, self.instance.name, 1.0 / rate, component.step
+
+        def run(dt: float) -> None:
+            self.do("step", lambda: step(dt), depth=1)
+
+        if component.steps_for_goals:
+            servers = [end for end in self._ends.values() if isinstance(end, ActionServer)]
+            GoalSteps(scheduler, owner, period, run, servers)
+        else:
+            scheduler.every(period, owner, run)
+
+    def close(self) -> None:
+        """Deactivate and clean up, as far as it got, and release its ports."""
+        self.host.scheduler.remove(self.instance.name)
+        component, state = self.component, self.state
+        try:
+            if component and self._taken_back(component) and state is Lifecycle.ACTIVE:
+                component.deactivate()
+            if component and self.worker is None and state in (Lifecycle.ACTIVE, Lifecycle.INACTIVE):
+                component.cleanup()
+        finally:
+            self.abandon()
+            self.host.bus.close_owner(self.instance.name)
+
+    def abandon(self) -> None:
+        """Drop the component without calling it again; what it holds is released, in its own thread if it has one."""
+        worker, component = self.worker, self.component
+        self.component = self.worker = None
+        if worker is not None:
+            in_turn = partial(worker.post, self.instance.name)
+            worker.close(0.0, partial(self._release, component, in_turn) if component else None)
+        elif component is not None:
+            self._release(component, lambda call: call())
+        self._claiming = []
+        self._wakes.clear()
+        self.state = Lifecycle.UNCONFIGURED
+
+    def _release(self, component: Component[Any], in_turn: Callable[[Callable[[], None]], None]) -> None:
+        try:
+            component.at_end.close()
+        except (Exception, SystemExit) as error:  # whatever it raises, all the rest has been released
+            words, detail = explain(error, self.file)
+            in_turn(partial(self.host.log, self.instance.name, Level.WARN, f"not all is released: {words}", detail))
+
+    def _taken_back(self, component: Component[Any]) -> bool:
+        """Return the component to the scheduler's thread; return whether its own thread has let go of it."""
+        if self.worker is None:
+            return True
+        label, _ = self.worker.busy_for()
+        if not self.worker.close(LONGEST_GOODBYE):
+            self.host.log(self.instance.name, Level.WARN, f"does not return from {label}: it is left behind")
+            return False
+        self.worker, component.context, component.bound = None, self, self._ends
+        return True
+
+    def do(
+        self, label: str, call: Callable[[], None], *, depth: int | None = None, then: Callable[[], None] | None = None
+    ) -> None:
+        """Run a call of the component, now or, if it has a thread, there; `then` follows in the scheduler's thread.
+
+        Of waiting calls with the same label, the newest `depth` are kept.
+        """
+        worker = self.worker
+        if worker is not None:
+            worker.submit(label, call if then is None else partial(_in_turn, call, partial(worker.send, then)), depth)
+            return
+        self.host.doing = label
+        call()
+        if then is not None:
+            then()
+
+    @property
+    def is_busy(self) -> bool:
+        """Return whether the component is in a call in its own thread, so that no other thread must use it."""
+        return self.worker is not None and self.worker.is_busy
+
+    def has_to(self, label: str) -> bool:
+        """Return whether such a call of the component has been handed to its own thread and has not returned."""
+        return self.worker is not None and self.worker.has_to(label)
+
+    @property
+    def moves(self) -> str:
+        """Return in words how it moves the robot or is about to; empty if it does not."""
+        component = self.component
+        if component is None or self.state is not Lifecycle.ACTIVE:
+            return ""
+        if not component.is_at_rest:
+            return f"'{self.instance.name}' moves"
+        if any(server.current is not None for server in self._claiming):
+            return f"'{self.instance.name}' carries out a goal"
+        return component.occupation if component.claims else ""
+
+    def cancel_claimed(self) -> None:
+        """Request the end of the goals that claim a part of the robot."""
+        for server in self._claiming:
+            server.cancel_all()
+
+    def refusal(self, port: Port[Any]) -> str:
+        """Return why a message, request or goal cannot be taken now; empty if it can."""
+        if self.state is not Lifecycle.ACTIVE:
+            return f"'{self.instance.name}' is not active"
+        is_claiming = isinstance(port, ServesAction | ServesTopic) and bool(port.claims)
+        if is_claiming and self.host.is_braking:
+            return "the robot is going down"
+        if is_claiming and self.host.is_stopped:
+            return "the robot is stopped"
+        if isinstance(port, ServesAction) and self.is_busy and hasattr(self.component, f"accept_{port.name}"):
+            return f"'{self.instance.name}' is busy"
+        return ""
+
+    def _made(self) -> Component[Any]:
+        if self.component is None:
+            raise RuntimeError(f"'{self.instance.name}' is not configured")
+        return self.component
+
+    def _enter(self, state: Lifecycle) -> None:
+        self.state = state
+        self.host.changed(self.instance.name)
+
+    # The component's context
+
+    @property
+    def is_stopped(self) -> bool:
+        """Return whether the robot is held by a stop."""
+        return self.host.is_stopped
+
+    @property
+    def starts_mission(self) -> bool:
+        """Return whether the mission of `start` is to start."""
+        return self.host.starts_mission
+
+    @property
+    def is_over(self) -> bool:
+        """Return whether nobody waits any more: never for what runs in the scheduler's thread."""
+        return False
+
+    @property
+    def address(self) -> BusAddress:
+        """Return where the robot is on the bus."""
+        bus = self.host.plan.bus
+        return BusAddress(self.host.plan.robot, self.host.router, bus.domain, bus.namespace, bus.wire)
+
+    def log(self, level: Level, text: str) -> None:
+        """Write one event of the robot's story."""
+        self.host.log(self.instance.name, level, text)
+
+    def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
+        """Report the component's state to diagnostics."""
+        made = self.component
+        self.host.statuses.set(self.instance.name, level, message, values, made.hardware_id if made is not None else "")
+
+    def watch(self, name: str, task: DiagnosticTask) -> None:
+        """Report how `task` stands to diagnostics, once a second while the component is active."""
+        self.host.statuses.watch(self.instance.name, name, task)
+
+    def wake_at(self, time: float) -> None:
+        """Call the component's `wake` at robot time `time` [s]."""
+        time = max(time, self.clock.now())
+        if time not in self._wakes:  # a wake that requests the next one would otherwise multiply
+            self._wakes.add(time)
+            self.host.scheduler.at(time, self.instance.name, lambda: self._wake(time))
+
+    def _wake(self, time: float) -> None:
+        self._wakes.discard(time)
+        self.do("wake", self._made().wake)
+
+    def notify(self, event: RobotEvent) -> None:
+        """Report something that concerns the whole robot to the supervisor; what must stop stops here at once."""
+        if isinstance(event, RobotHeld) and event.reason:
+            self.host.scheduler.at(self.clock.now(), self.instance.name, self.host.stop)
+        self.host.starts_mission &= not isinstance(event, MissionOver)
+        self.host.notify(event)
+
+    def repeat(self, requests: Sequence[Command]) -> None:
+        """Send these to the component again after it, or its process, was restarted."""
+        self._repeated = requests
+        self.host.notify(Repeated(self.instance.name, [as_data(request) for request in requests]))
+
+    def window(self, path: str, question: Query[Any]) -> Window:
+        """Open a window for tools outside at `path` of the robot's own keys."""
+        name = self.instance.name
+        key = admin_key(self.host.plan.robot, path)
+        return self.host.bus.window(name, key, lambda: to_data(self.host.ask(name, question)))
+
+    def listen(self, port: In[Any]) -> None:
+        """Subscribe to the topic of an input, instead of what its name had before."""
+        try:
+            topic = resolve(port.topic, self.host.plan.bus.namespace)
+        except ValueError as error:
+            raise Refused(str(error)) from error
+        if any(wire.topic == topic for wire in self.instance.wires if wire.kind == "out"):
+            raise Refused(f"'{self.instance.name}' publishes on '{topic}' itself")
+        self.mute(port.name)
+        component = self._made()
+        self._ends[port.name] = component.bound[port.name] = subscribe(self, component, topic, port)
+
+    def mute(self, name: str) -> None:
+        """End the subscription of an input."""
+        end = self._ends.pop(name, None)
+        self._made().bound.pop(name, None)
+        if end is not None:
+            self.host.bus.withdraw(self.instance.name, end)
+
+    def _repeat(self, component: Component[Any], request: Command, requests: Sequence[Command]) -> None:
+        try:
+            component.handle(request)
+        except Refused as refusal:
+            self.log(Level.WARN, f"{request.words}: {refusal}")
+        except Exception:  # it must not fail again at each restart
+            self.repeat([one for one in requests if one is not request])
+            raise
+
+
+def _in_turn(*calls: Callable[[], None]) -> None:
+    for call in calls:
+        call()
+
+
+def bind(hosted: Hosted, component: Component[Any]) -> None:
+    """Fill `component.bound`; incoming data go to its handlers unless there is a reason to refuse them.
+
+    Of an end that a program of others has, there is only the absolute name.
+    """
+    for name, port in type(component).ports(component.config).items():
+        topic = hosted.instance.topic
+        component.bound[name] = topic(name) if port.is_elsewhere else _end(hosted, component, name, port)
+
+
+def subscribe(hosted: Hosted, component: Component[Any], topic: str, port: ports.In[Any]) -> Any:
+    """Subscribe to a topic; its messages go to the handler of the port."""
+    interface = cast(Any, port.interface)
+    return hosted.host.bus.subscribe(
+        hosted.instance.name,
+        topic,
+        interface,
+        port.qos,
+        _on_message(hosted, component, port.name, port),
+        max_rate=port.max_rate,
+        limits=port.limits,
+        waits=isinstance(port, ServesTopic),  # like goals: a sender that waits for a listener relies on it
+        is_light=hosted.worker is None,
+        may_be_silent=port.may_be_silent,
+    )
+
+
+def _end(hosted: Hosted, component: Component[Any], name: str, port: Port[Any]) -> object:
+    bus, instance, interface = hosted.host.bus, hosted.instance, cast(Any, port.interface)
+    owner = instance.name
+    match port:
+        case Looks():
+            return _lookup(hosted, port)
+        case ports.SendsOrders():
+            return bus.orders(owner, instance.topic(name), interface, port.qos, port.servers)
+        case ports.Out():
+            publisher = bus.publisher(owner, instance.topic(name), interface, port.qos)
+            return paced(publisher, port, hosted.clock, hosted.watch)
+        case In():
+            return subscribe(hosted, component, instance.topic(name), port)
+        case ports.Serves():
+            serve = _on_request(hosted, component, name, port)
+            bus.serve_later(owner, instance.topic(name), interface, serve, waits=True, limits=port.limits)
+            return None
+        case ports.Calls():
+            return bus.client(owner, instance.topic(name), interface)
+        case ServesAction():
+            topic = instance.topic(name)
+            accept = _on_goal(hosted, component, name, port)
+            server = bus.serve_action(owner, topic, interface, accept, waits=True, limits=port.limits)
+            if port.pausable:
+                bus.serve(owner, f"{topic}/{PAUSE}", SetBool, partial(_pause, hosted, server, port))
+            return server
+        case ports.CallsAction():
+            return bus.action_client(owner, instance.topic(name), interface)
+        case _:
+            raise TypeError(f"'{instance.type}' has a port of an unknown kind: {port!r}")
+
+
+def _lookup(hosted: Hosted, port: Looks) -> Lookup:
+    frames = hosted.host.frames
+    if frames is None:
+        raise RuntimeError("a process with components that look keeps frames")
+    if hosted.worker is not None:
+        frames.hurry()
+    return Lookup(frames, port.target, port.source)
+
+
+def _pause(
+    hosted: Hosted, server: ActionServer[Any, Any, Any], port: Port[Any], request: SetBool.Request
+) -> SetBool.Response:
+    """Pause or resume the current goal; while the robot is stopped, nothing resumes."""
+    goal = server.current
+    if goal is None:
+        return SetBool.Response(success=False, message="no goal is being carried out")
+    if not request.data and (reason := hosted.refusal(port)):
+        return SetBool.Response(success=False, message=reason)
+    goal.is_paused = request.data
+    return SetBool.Response(success=True)
+
+
+def _on_message(hosted: Hosted, component: Component[Any], name: str, port: In[Any]) -> Callable[[Any], None]:
+    own = getattr(component, f"on_{name}", None)
+    handler: Callable[[Any], None] = own if own is not None else partial(component.received, name)
+    label, depth = f"on_{name}", queue_depth(port.qos)
+
+    def take(message: Any) -> None:
+        reason = hosted.refusal(port)
+        if not reason:  # else it only stays the newest value, for whoever reads it
+            hosted.do(label, partial(handler, message), depth=depth)
+        elif isinstance(port, ServesTopic):
+            hosted.log(Level.WARN, f"an order to {name} is not carried out: {reason}")
+
+    return take
+
+
+def _on_request(
+    hosted: Hosted, component: Component[Any], name: str, port: Port[Any]
+) -> Callable[[ServedRequest[Any, Any]], None]:
+    answer = getattr(component, f"on_{name}")
+
+    def serve(request: ServedRequest[Any, Any]) -> None:
+        if reason := hosted.refusal(port):
+            raise Refused(reason)
+        worker = hosted.worker
+        send = worker.send if worker is not None else _at_once
+        hosted.do(f"on_{name}", partial(_answer, request, answer, send))
+
+    return serve
+
+
+def _answer(request: ServedRequest[Any, Any], answer: Callable[[Any], Any], send: Callable[[Call], None]) -> None:
+    try:
+        response = answer(request.message)
+    except Refused as refusal:
+        send(partial(request.fail, str(refusal)))
+    except (Exception, SystemExit) as error:
+        send(partial(request.fail, f"{type(error).__name__}: {error}"))
+        raise
+    else:
+        reply = response.then if isinstance(response, Later) else lambda then: then(response)
+        reply(lambda answer: send(partial(request.reply, answer)))
+
+
+def _at_once(call: Call) -> None:
+    call()
+
+
+def _on_goal(hosted: Hosted, component: Component[Any], name: str, port: Port[Any]) -> Callable[[Any], str]:
+    accept: Callable[[Any], str] = getattr(component, f"accept_{name}", lambda goal: "")
+    return lambda goal: hosted.refusal(port) or accept(goal)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from functools import partial
 from itertools import count
+from typing import Any, Protocol
 
 from rbxcompose.base.clock import Clock
 from rbxcompose.base.config import Config
@@ -14,13 +15,14 @@ from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import resolve
 from rbxcompose.bus.services import ServedRequest
 from rbxcompose.compiler.plan.dump import dump_configs
+from rbxcompose.compiler.plan.model import Instance
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.rbxcompose_parameters import ChangeParameters, NodeChange
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.runtime.channel import AskForChange
-from rbxcompose.runtime.process_group.hosted import Hosted
 from rbxcompose.runtime.settings_history import BY_A_TOOL, MARK, ChangeCause, ParameterHistory
 from rbxcompose.sdk import parameters as core
+from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.parameters import ChangeRefusal, Configs, RobotRules, WantedChange, from_message, to_message
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.sdk.registry import component_type
@@ -36,14 +38,33 @@ INTERFACES = (
     rcl.ParameterEvent,
 )
 """What each component serves and publishes."""
-OnChange = Callable[[Hosted, Config, ChangeCause], None]  # that a component had another configuration before
+
+
+class Settable(Protocol):
+    """An instance in its host, as far as its settings are concerned."""
+
+    instance: Instance
+    config: Config
+    component: Component[Any] | None
+
+    @property
+    def is_busy(self) -> bool:
+        """Return whether the component is in a call in its own thread."""
+        ...
+
+    def reconfigure(self, config: Config) -> None:
+        """Apply another configuration to the component; if it raises, the old one stays."""
+        ...
+
+
+OnChange = Callable[[Settable, Config, ChangeCause], None]  # that a component had another configuration before
 
 
 @dataclass(slots=True)
 class PreparedChange:
     """A change of one component that would be accepted, with what it had before."""
 
-    hosted: Hosted
+    hosted: Settable
     old: Config
     new: Config
     cause: ChangeCause
@@ -61,7 +82,7 @@ class PreparedChange:
 class LiveChanges:
     """Prepares changes, carries them out and takes them back; nothing is told of a change before its end."""
 
-    hosted: Mapping[str, Hosted]
+    hosted: Mapping[str, Settable]
     failed: Callable[[str, BaseException], None]
     on_change: OnChange
     history: Callable[[str], ParameterHistory]
@@ -112,7 +133,7 @@ class LiveChanges:
         new = core.changed(hosted.config, wanted.parameters, hosted.instance.bounds)
         return PreparedChange(hosted, hosted.config, new, cause)
 
-    def _require_known(self, hosted: Hosted, expected: Sequence[rcl.Parameter]) -> None:
+    def _require_known(self, hosted: Settable, expected: Sequence[rcl.Parameter]) -> None:
         now = core.settings(hosted.config)
         for parameter in expected:
             if (there := now.get(parameter.name)) is None or to_message(there.value) != parameter.value:
@@ -143,7 +164,7 @@ class LiveChanges:
         for change in self._done.pop(number, ()):
             self.on_change(change.hosted, change.old, change.cause)
 
-    def _follow(self, hosted: Hosted, config: Config) -> str:
+    def _follow(self, hosted: Settable, config: Config) -> str:
         name = hosted.instance.name
         if hosted.component is None:  # it comes back with this
             hosted.config = config
@@ -187,7 +208,7 @@ class Parameters:
         bus: Bus,
         clock: Clock,
         namespace: str,
-        hosted: Mapping[str, Hosted],
+        hosted: Mapping[str, Settable],
         failed: Callable[[str, BaseException], None],
         deciders: Deciders,
     ) -> None:
@@ -198,7 +219,7 @@ class Parameters:
         self._asked: dict[int, WhenDecided] = {}
         self._numbers = count(1)
 
-    def serve(self, hosted: Hosted) -> None:
+    def serve(self, hosted: Settable) -> None:
         """Answer the services of a component, until its ends on the bus are closed."""
         served = _Served(self, hosted)
         name, serve, later = hosted.instance.name, self._bus.serve, self._bus.serve_later
@@ -221,7 +242,7 @@ class Parameters:
 
     # Changes
 
-    def change(self, hosted: Hosted, config: Config) -> None:
+    def change(self, hosted: Settable, config: Config) -> None:
         """Apply the settings of a new plan to a component, and publish the change.
 
         Raises:
@@ -283,7 +304,7 @@ class Parameters:
             self.changes.end(OWN)
         return broken or (ChangeRefusal(reason) if reason else None)
 
-    def report_change(self, hosted: Hosted, old: Config, cause: ChangeCause) -> None:
+    def report_change(self, hosted: Settable, old: Config, cause: ChangeCause) -> None:
         """Log, keep and publish which parameters of a component have changed."""
         after = core.differences(old, hosted.config)
         if not after:
@@ -298,7 +319,7 @@ class Parameters:
 class _Served:
     """The implementation of the services of one component."""
 
-    def __init__(self, parameters: Parameters, hosted: Hosted) -> None:
+    def __init__(self, parameters: Parameters, hosted: Settable) -> None:
         self._parameters, self._hosted = parameters, hosted
         self._node = parameters.node(hosted.instance.name)
 
@@ -403,7 +424,7 @@ def _answer(then: Callable[[rcl.SetParametersResult], None], refusal: ChangeRefu
     then(rcl.SetParametersResult(successful=refusal is None, reason=refusal.text if refusal else ""))
 
 
-def _say(hosted: Hosted, parameters: Sequence[rcl.Parameter], cause: ChangeCause) -> None:
+def _say(hosted: Settable, parameters: Sequence[rcl.Parameter], cause: ChangeCause) -> None:
     known, words = core.settings(hosted.config), []
     for parameter in parameters:
         value, dimension = from_message(parameter.value), known[parameter.name].dimension

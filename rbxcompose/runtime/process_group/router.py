@@ -20,7 +20,6 @@ from rbxcompose.base.requests import UnreadableError, from_data, to_data
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.access_control import AllowedHost, access_control
 from rbxcompose.bus.endpoints import LOOPBACK, accepts, tcp_endpoint, unix_endpoint
-from rbxcompose.bus.liveness import probe_key
 from rbxcompose.bus.names import admin_key, denied_key, topic_pattern
 from rbxcompose.bus.transport import Arrival, Closable, Transport
 from rbxcompose.bus.zenoh_session import NO_LINK, RouterLink, open_router, tls_settings
@@ -28,7 +27,6 @@ from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.compiler.plan.dump import load
 from rbxcompose.compiler.plan.model import Exchange, Plan, Share
 from rbxcompose.runtime import channel as messages
-from rbxcompose.runtime.channel import HostReport
 from rbxcompose.runtime.folder import Echo, OffsetFilter
 from rbxcompose.runtime.log import Record, WriteRecord
 from rbxcompose.runtime.process_group.connection import (
@@ -38,6 +36,7 @@ from rbxcompose.runtime.process_group.connection import (
     Turns,
     Watchdog,
     answer,
+    probe_key,
 )
 from rbxcompose.sdk.ports import Qos
 
@@ -128,7 +127,7 @@ def host_key(robot: str, host: str) -> str:
 class _Sent:
     """A report on its way: when it was sent, and when the last ones of the other hosts were sent and arrived [ns]."""
 
-    report: HostReport
+    report: messages.HostReport
     sent: int
     heard: dict[str, Echo]
 
@@ -146,7 +145,7 @@ class HostLine:
         robot: str,
         share: Share,
         transport: Transport,
-        receive: Callable[[HostReport], None],
+        receive: Callable[[messages.HostReport], None],
         passed: Callable[[str], None],
         stamp: Callable[[], int],
         judge: Callable[[str, int, Mapping[str, Echo]], None],
@@ -162,7 +161,7 @@ class HostLine:
         for other in share.others:
             transport.subscribe(host_key(robot, other.name), Qos.STATE, self._arrived)
 
-    def send(self, report: HostReport) -> None:
+    def send(self, report: messages.HostReport) -> None:
         """Send a report; nobody waits for it."""
         if self._denied is not None:
             self._denied.put(b"", b"")
@@ -339,7 +338,7 @@ class Router:
             self._warn("robot", "another host is there, but none answers; the links are opened again")
             self._must_reopen = True
 
-    def _receive_report(self, report: HostReport) -> None:
+    def _receive_report(self, report: messages.HostReport) -> None:
         self._channel.send(messages.FromHost(report))
 
     def _endpoints(self) -> Iterator[str]:

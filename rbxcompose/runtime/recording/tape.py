@@ -12,7 +12,7 @@ from rbxcompose.base.clock import NANOSECONDS, Clock
 from rbxcompose.bus.local import WitnessedCall
 from rbxcompose.bus.names import ADMIN, decode_attachment
 from rbxcompose.bus.tokens import EndpointToken, gid, parse_token
-from rbxcompose.bus.transport import Arrival, Closable, OnReply, Question, RemotePublisher, Transport
+from rbxcompose.bus.transport import Closable, RemotePublisher, Transport
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.events import TOPIC, event_of
 from rbxcompose.msgs.service_msgs import ServiceEventInfo
@@ -89,38 +89,17 @@ class _Taped:
     def __init__(self, tape: Tape, inner: Transport) -> None:
         self._tape, self._inner = tape, inner
         self.session = inner.session
-
-    def wake(self, owner: str, callback: Callable[[], None]) -> None:
-        self._inner.wake(owner, callback)
-
-    def bring(self, owner: str, callback: Callable[[], None]) -> None:
-        self._inner.bring(owner, callback)
+        self.wake, self.bring, self.close = inner.wake, inner.bring, inner.close
+        self.subscribe, self.serve, self.ask, self.watch = inner.subscribe, inner.serve, inner.ask, inner.watch
 
     def publisher(self, key: str, qos: Qos) -> RemotePublisher:
         if key.startswith(ADMIN):  # what tools look at is not part of the robot's behaviour
             return self._inner.publisher(key, qos)
         return _TapedPublisher(self._tape, self._inner.publisher(key, qos))
 
-    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Closable:
-        return self._inner.subscribe(key, qos, arrived)
-
-    def serve(self, key: str, asked: Callable[[Question], None]) -> Closable:
-        return self._inner.serve(key, asked)
-
-    def ask(
-        self, key: str, payload: bytes, attachment: bytes, answered: OnReply, *, of_all: bool, within: float
-    ) -> Closable:
-        return self._inner.ask(key, payload, attachment, answered, of_all=of_all, within=within)
-
     def announce(self, token: str) -> Closable:
         self._tape.announced(token)
         return self._inner.announce(token)
-
-    def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Closable:
-        return self._inner.watch(pattern, changed)
-
-    def close(self) -> None:
-        self._inner.close()
 
 
 class _TapedPublisher:

@@ -1,4 +1,4 @@
-"""Topics in a recording: what it stores about them, their definitions, and their selection."""
+"""Topics in a recording: what it stores about them, their definitions, and their selection; what is found in one."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -7,6 +7,7 @@ from dataclasses import replace
 from fnmatch import fnmatchcase
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Severity, kind
 from rbxcompose.bus.names import name_problem
 from rbxcompose.bus.tokens import EndpointToken, EntityKind
 from rbxcompose.bus.wire import ros_qos
@@ -14,6 +15,17 @@ from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import FieldType, parse_type
 from rbxcompose.msgs.packages import joined, parts, short
 from rbxcompose.sdk.ports import Qos
+
+UNREADABLE = kind("RBX9201")
+DAMAGED = kind("RBX9202", Severity.WARNING)
+UNWRITABLE = kind("RBX9203")
+RECOVERED = kind("RBX9204", Severity.WARNING)
+NOTHING = kind("RBX9205")
+NOT_REPLAYED = kind("RBX9206", Severity.WARNING)
+SENT_ALREADY = kind("RBX9210")
+NOT_ENOUGH = kind("RBX9208")
+DIFFERENT = kind("RBX9209")
+LOST = kind("RBX9207", Severity.WARNING)
 
 CDR = "cdr"
 HASH, CLASS, ROS_QOS = "topic_type_hash", "rbxcompose.class", "offered_qos_profiles"  # keys of a channel's metadata

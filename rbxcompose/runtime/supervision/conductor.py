@@ -12,9 +12,7 @@ from rbxcompose.base.levels import Level
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.runtime import channel as messages
-from rbxcompose.runtime.channel import HostReport, RobotEnd
 from rbxcompose.runtime.folder import RunOptions
-from rbxcompose.runtime.supervision.changes import WORLD, Changes
 from rbxcompose.runtime.supervision.members import (
     LOOK,
     BlockedComponents,
@@ -26,7 +24,7 @@ from rbxcompose.runtime.supervision.members import (
     is_commanding,
 )
 from rbxcompose.runtime.supervision.other_hosts import OtherHosts
-from rbxcompose.runtime.supervision.plan_change import LONGEST, Changing, WhenDone, text_of
+from rbxcompose.runtime.supervision.plan_change import LONGEST, WORLD, Changes, Changing, WhenDone, text_of
 from rbxcompose.runtime.supervision.stop_latch import StopLatch
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.component import ComponentNoted, MissionOver, RobotHeld
@@ -367,7 +365,7 @@ class Conductor:
         self.hosts.look(now, is_excused=is_excused)
         self._notify_hosts()
 
-    def _receive_report(self, report: HostReport) -> None:
+    def _receive_report(self, report: messages.HostReport) -> None:
         if (end := self.hosts.receive(report, self._scheduler.now)) is not None:
             self.go_down(end.exit_code, f"{end.reason} (host '{report.host}')")
         self.latch.heard_host(report)
@@ -376,7 +374,7 @@ class Conductor:
 
     def _notify_hosts(self) -> None:
         is_of_all = self.is_going_down and self.exit_code != INTERRUPTED  # a signal is for this host alone
-        end = RobotEnd(self.exit_code, self.reason) if is_of_all else None
+        end = messages.RobotEnd(self.exit_code, self.reason) if is_of_all else None
         self.hosts.report(self.states, self.latch.shared, end, is_going_down=self.is_going_down)
 
     def _alive(self, member: Member) -> None:

@@ -174,7 +174,8 @@ def _supervise(
         warnings = [*_not_brought_down(folder), *end_leftovers(folder)]
         folder.sweep()
         log = start_new(folder.path)
-        folder.write_state(_beginning(plan))
+        file, supervisor = os.path.realpath(plan.file), Process.of(os.getpid())
+        folder.write_state(RobotState(plan.robot, file, supervisor, {}, (), boot=boot_id()))
     except OSError as error:  # it belongs to somebody else, or the disk is full
         _report(reports, Unsafe(str(error)))
         return FINDINGS
@@ -186,11 +187,6 @@ def _supervise(
     folder.clear()
     _report(reports, ended)
     return ended.exit_code
-
-
-def _beginning(plan: Plan) -> RobotState:
-    """Return the state of a robot that this process is about to start."""
-    return RobotState(plan.robot, os.path.realpath(plan.file), Process.of(os.getpid()), {}, (), boot=boot_id())
 
 
 def _not_brought_down(folder: RobotFolder) -> Iterator[str]:

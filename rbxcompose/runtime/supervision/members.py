@@ -9,7 +9,6 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.compiler.plan.model import Instance, Plan, Wire
 from rbxcompose.runtime import channel as messages
-from rbxcompose.runtime.channel import HostReport, Repeated
 from rbxcompose.runtime.faults import RestartPolicy
 from rbxcompose.runtime.processes import KILLED, longest_wait
 from rbxcompose.sdk.component import ComponentNoted
@@ -30,7 +29,7 @@ class ConductorEffects(Protocol):
         """Send a message to a process."""
         ...
 
-    def to_hosts(self, report: HostReport) -> None:
+    def to_hosts(self, report: messages.HostReport) -> None:
         """Tell the other hosts of the robot how this one is."""
         ...
 
@@ -173,9 +172,9 @@ class KeptValues:
         self.notes: dict[str, str] = {}
         self._requests: dict[str, list[dict[str, Any]]] = {}
 
-    def receive(self, message: Repeated | ComponentNoted) -> None:
+    def receive(self, message: messages.Repeated | ComponentNoted) -> None:
         """Keep this instead of what the component told before."""
-        if isinstance(message, Repeated):
+        if isinstance(message, messages.Repeated):
             self._requests[message.instance] = message.requests
         else:
             self.notes[message.component] = message.text

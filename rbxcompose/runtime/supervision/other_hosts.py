@@ -10,8 +10,7 @@ from dataclasses import replace
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.compiler.plan.model import Instance, OtherHost, Share
-from rbxcompose.runtime import channel as messages
-from rbxcompose.runtime.channel import HostReport, RobotEnd, SharedStop
+from rbxcompose.runtime.channel import HostReport, Lost, RobotEnd, SharedStop
 from rbxcompose.runtime.folder import ClockOffset
 from rbxcompose.runtime.supervision.members import ConductorEffects
 
@@ -31,7 +30,7 @@ class _Known:
 class OtherHosts:
     """Judges the other hosts; without a share there are none."""
 
-    def __init__(self, share: Share | None, effects: ConductorEffects, send: Callable[[messages.Lost], None]) -> None:
+    def __init__(self, share: Share | None, effects: ConductorEffects, send: Callable[[Lost], None]) -> None:
         """Take `send`, which tells all own processes."""
         self._share, self._effects, self._send = share, effects, send
         self._own = HostReport(share.host, share.version, effects.run_id) if share else None
@@ -113,7 +112,7 @@ class OtherHosts:
     def _lose(self, host: OtherHost, how: str) -> None:
         text = f"host '{host.name}' {how}"
         self._effects.log(Level.WARN, text)
-        self._send(messages.Lost([instance.name for instance in host.instances], text))
+        self._send(Lost([instance.name for instance in host.instances], text))
 
     # Starting together
 

@@ -28,10 +28,9 @@ from rbxcompose.runtime.requests import (
     RobotStatus,
     StopRobot,
 )
-from rbxcompose.runtime.supervision.changes import Changes, changes
 from rbxcompose.runtime.supervision.conductor import FINE, Conductor
 from rbxcompose.runtime.supervision.members import ConductorEffects
-from rbxcompose.runtime.supervision.plan_change import Consultations
+from rbxcompose.runtime.supervision.plan_change import Changes, Consultations, changes
 from rbxcompose.runtime.supervision.setting_changes import SettingChanges
 from rbxcompose.sdk.capabilities import Capability, Setting
 from rbxcompose.sdk.parameters import si_unit

@@ -7,8 +7,7 @@ its host knows of: one that was ordered meanwhile on the other side of a cut lin
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 
-from rbxcompose.runtime import channel as messages
-from rbxcompose.runtime.channel import HostReport, SharedStop, StopMark
+from rbxcompose.runtime.channel import HostReport, Release, SharedStop, Stop, StopMark
 from rbxcompose.runtime.folder import StopState
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member
 from rbxcompose.sdk.component import RobotHeld
@@ -70,7 +69,7 @@ class StopLatch:
     def notify(self, member: Member) -> None:
         """Tell a process how it stands."""
         member.is_stopped = self.is_stopped
-        self._effects.send(member.name, messages.Stop() if self.is_stopped else messages.Release())
+        self._effects.send(member.name, Stop() if self.is_stopped else Release())
 
     def receive(self, member: Member, held: RobotHeld) -> None:
         """Stop everything for a component; its process has stopped by itself, and has logged the reason."""
@@ -103,8 +102,9 @@ class StopLatch:
         if self.shared.own is not None and self.shared.own in now.released:
             self._released_by(report.host)
         alive = [stop.own for stop in self._others.values()]
-        self.shared = replace(self.shared, released=[mark for mark in self.shared.released if mark in alive])
-        holding = [(host, stop) for host, stop in self._others.items() if stop.own and not self._is_released(stop.own)]
+        released = [mark for mark in self.shared.released if mark in alive]
+        self.shared = replace(self.shared, released=released)
+        holding = [(host, stop) for host, stop in self._others.items() if stop.own and stop.own not in released]
         if holding and not self.is_stopped:
             host, stop = holding[0]
             self._latched = f"{stop.by} (host '{host}')", self._now()
@@ -112,9 +112,6 @@ class StopLatch:
         elif self.is_stopped and not holding and self.shared.own is None:
             self._latched = None
             self._notify_all(None)
-
-    def _is_released(self, mark: StopMark) -> bool:
-        return mark in self.shared.released
 
     def _released_by(self, host: str) -> None:
         """Take back the own stop, unless a component here needs the robot to stand still: then stop it again."""

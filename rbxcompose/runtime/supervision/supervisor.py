@@ -17,7 +17,6 @@ from rbxcompose.bus.endpoints import is_private, socket_of
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.runtime import channel as messages
-from rbxcompose.runtime.channel import HostReport
 from rbxcompose.runtime.control import ControlServer
 from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, Gauge, RobotFolder, RobotState
 from rbxcompose.runtime.log import Record
@@ -220,7 +219,7 @@ class Supervisor:
             channel.send(message)
             self._watch(channel)
 
-    def to_hosts(self, report: HostReport) -> None:
+    def to_hosts(self, report: messages.HostReport) -> None:
         """Tell the other hosts of the robot how this one is; a router that is behind has newer reports to come."""
         child = self._children.get(ROUTER)
         if child is not None and not child.channel.is_behind:
@@ -370,7 +369,7 @@ class Supervisor:
         """Restore files removed from the folder of this robot, so that `stop` and `down` find it."""
         try:
             self._folder.make()
-            lock = self._folder.lock() if self._folder.has_lost_lock(self._lock) else self._lock
+            lock = self._lock if self._folder.has_lock(self._lock) else self._folder.lock()
             if lock is None:
                 raise OSError("another supervisor holds the lock")
             if lock != self._lock:

@@ -32,9 +32,17 @@ from rbxcompose.commands.console import NotDoneError, ReportedError, emit, misus
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place, find_robot
 from rbxcompose.commands.options import add_json_option, out_option, seconds
-from rbxcompose.runtime.recording.codes import LOST, UNWRITABLE
 from rbxcompose.runtime.recording.files import ENDING, Recorder, Split
-from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, definition_of, matches, topic_of
+from rbxcompose.runtime.recording.topics import (
+    LOST,
+    UNWRITABLE,
+    Recorded,
+    RecordedTopic,
+    Selection,
+    definition_of,
+    matches,
+    topic_of,
+)
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.tools.recordings import count_table, recover_in, warn, warn_of_unmatched
 

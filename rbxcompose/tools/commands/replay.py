@@ -35,7 +35,7 @@ from rbxcompose.commands.options import seconds
 from rbxcompose.commands.targets import add_layer_options, compiled
 from rbxcompose.compiler.plan.dump import PlanTextError, dump, load
 from rbxcompose.compiler.plan.model import Instance, Plan
-from rbxcompose.runtime.recording import codes
+from rbxcompose.runtime.recording import topics as codes
 from rbxcompose.runtime.recording.files import PART, Recorder, write_problem
 from rbxcompose.runtime.recording.reader import RecordingReader, RecordingSummary, playlist, summary_of
 from rbxcompose.runtime.recording.tape import PLAN

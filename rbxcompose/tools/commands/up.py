@@ -14,7 +14,7 @@ from rbxcompose.commands.console import FINDINGS, misused, refuse
 from rbxcompose.commands.formats.json_ import render_json
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.runtime.folder import RunOptions
-from rbxcompose.runtime.recording.codes import UNWRITABLE
+from rbxcompose.runtime.recording.topics import UNWRITABLE
 from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import LiveReload
 from rbxcompose.tools.run_view import is_fit, real_time_only, run_plan

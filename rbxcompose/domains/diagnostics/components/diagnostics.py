@@ -19,10 +19,8 @@ if TYPE_CHECKING:
     from rbxcompose.domains.diagnostics.core import TreeRow
 
 PAUSE = 0.05  # [s] between two reports at least, so that flapping levels cost little
-MOST_ARRAYS, ARRAY = (
-    30.0,
-    MessageLimits(size=200_000),
-)  # [Hz] and limits of one publisher: more takes too much of a core
+MOST_ARRAYS = 30.0  # [Hz] of one publisher: more takes too much of a core, as do larger ones
+ARRAY = MessageLimits(size=200_000)
 MOST_LOGGED = 100_000  # characters of an answer to people
 ROUNDING = 1e-9  # [s]
 PAUSE_PER_ROW = 0.0001  # [s]; a row is about 20 us of work, so reports never take more than a fifth of a core

@@ -7,12 +7,14 @@ from typing import Annotated
 
 from pydantic import Field
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.diagnostics.limits import LimitCore, Limits
-from rbxcompose.domains.diagnostics.monitors import FOLDER, HostMonitor, Supply, batteries
+from rbxcompose.domains.diagnostics.monitors import HostMonitor, LimitCore, Limits
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.sdk import Capability, Config, Drains, Live, Out, Ratio, Setting, component
 
+FOLDER = Path("/sys/class/power_supply")
+MICRO = 1e-6
 PERCENT = 100.0
 HYSTERESIS = 0.02
 
@@ -77,3 +79,69 @@ def values_of(supply: Supply) -> dict[str, str]:
     known = {"voltage": (supply.voltage, "V"), "current": (supply.current, "A")}
     values = {name: f"{value:.2f} {unit}" for name, (value, unit) in known.items() if value is not None}
     return values if supply.health is None else {**values, "of its first capacity": f"{supply.health:.0%}"}
+
+
+@dataclass(frozen=True, slots=True)
+class Supply:
+    """A battery: `charge` and `health` from 0 to 1, None where Linux does not know; [V], [A]."""
+
+    name: str
+    status: str
+    charge: float | None
+    health: float | None
+    voltage: float | None
+    current: float | None
+
+
+def batteries(folder: Path = FOLDER) -> tuple[Supply, ...]:
+    """Return the batteries that are present, by name; none where there is no such folder.
+
+    Batteries of devices, such as a mouse, have the scope `Device` and do not count.
+    """
+    try:
+        found = sorted(folder.iterdir())
+    except OSError:
+        return ()
+    return tuple(_supply(path) for path in found if _is_own_battery(path))
+
+
+def _is_own_battery(folder: Path) -> bool:
+    is_battery = _text(folder, "type") == "Battery" and _text(folder, "scope") != "Device"
+    return is_battery and _text(folder, "present") != "0"
+
+
+def _supply(folder: Path) -> Supply:
+    full = _number(folder, "energy_full", "charge_full")
+    design = _number(folder, "energy_full_design", "charge_full_design")
+    now = _number(folder, "energy_now", "charge_now")
+    percent = _number(folder, "capacity")
+    charge = percent / 100 if percent is not None else _share(now, full)
+    voltage, current = _number(folder, "voltage_now"), _number(folder, "current_now")
+    return Supply(
+        folder.name,
+        _text(folder, "status") or "Unknown",
+        charge,
+        _share(full, design),
+        voltage * MICRO if voltage is not None else None,
+        current * MICRO if current is not None else None,
+    )
+
+
+def _share(part: float | None, whole: float | None) -> float | None:
+    return part / whole if part is not None and whole else None
+
+
+def _number(folder: Path, *names: str) -> float | None:
+    for name in names:
+        text = _text(folder, name)
+        if text.lstrip("-").isdecimal():
+            return float(text)
+    return None
+
+
+def _text(folder: Path, name: str) -> str:
+    try:
+        with (folder / name).open(encoding="utf-8", errors="replace") as file:
+            return file.read(64).strip()
+    except OSError:  # Linux shows only what the battery reports, and a battery may be taken out while it is read
+        return ""

@@ -67,14 +67,10 @@ class NetworkMonitor(HostMonitor[NetworkMonitorConfig]):
     def judge(self, now: Traffic, dt: float, speed: int) -> None:
         """Report what passed in `dt` [s]; `speed` is what the link can carry [Mbit/s], 0 if it is unknown."""
         before, self.before = self.before or now, now
-        received, sent = ((after - prior) / dt / MEBI for after, prior in _pairs(now, before))
+        received, sent = (now.received - before.received) / dt / MEBI, (now.sent - before.sent) / dt / MEBI
         faults = (now.faults - before.faults) / dt
         text = f"{received:.2f} MiB/s in, {sent:.2f} MiB/s out"
         is_bad = faults > self.config.most_faults
         values = {"faults": now.faults, "link": f"{speed} Mbit/s" if speed else "unknown"}
         text = f"{faults:.0f} faulty packets a second" if is_bad else text
         self.status(Level.WARN if is_bad else Level.OK, text, **values)
-
-
-def _pairs(now: Traffic, before: Traffic) -> tuple[tuple[int, int], tuple[int, int]]:
-    return (now.received, before.received), (now.sent, before.sent)

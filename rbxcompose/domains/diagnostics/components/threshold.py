@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import Field, ValidationInfo, field_validator
 
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.diagnostics.limits import LimitCore, Limits
+from rbxcompose.domains.diagnostics.monitors import LimitCore, Limits
 from rbxcompose.msgs import registry
 from rbxcompose.sdk import Capability, Component, Config, In, Live, MessageName, Port, Setting, Time, Warns, component
 from rbxcompose.sdk.ports import BULK, number_field

@@ -139,8 +139,7 @@ class Mux(Component[MuxConfig]):
 
     def configure(self) -> None:
         """Build the core; a mux restarted while the robot is stopped starts closed."""
-        from rbxcompose.domains.muxes.account import MuxAccount  # which only a running mux needs
-        from rbxcompose.domains.muxes.core import core_of
+        from rbxcompose.domains.muxes.core import MuxAccount, core_of  # which only a running mux needs
 
         self.core = core_of(self.config, is_stopped=self.context.is_stopped)
         self.account = MuxAccount(self.core)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated
 
 from pydantic import Field
@@ -242,10 +242,6 @@ def _outputs(entry: ComponentEntry, topic: str, port: str) -> list[str]:
     return on_topic or (list(outputs) if len(outputs) == 1 else [])
 
 
-def _details(read: Iterable[str]) -> Mapping[str, str]:
-    return dict.fromkeys(read, MUX)
-
-
 @section(
     "muxes",
     MuxModel,
@@ -263,7 +259,7 @@ def _details(read: Iterable[str]) -> Mapping[str, str]:
     topics=_topics,
     components=_components,
     connects=_connects,
-    details=_details,
+    details=lambda read: dict.fromkeys(read, MUX),
 )
 def muxes(reading: Reading[MuxModel]) -> dict[str, MuxModel]:
     """Which source may command, by topic: the live one with the highest priority, the selected one, or the latest.

@@ -26,11 +26,10 @@ from rbxcompose.base.files import replace_file
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import OutsideError
 from rbxcompose.bus.names import ActionNames, dds_type
-from rbxcompose.bus.session_link import SessionLink
 from rbxcompose.bus.tokens import SPACE, EndpointToken, EntityKind, NodeToken, parse_token
 from rbxcompose.bus.transport import Closable
 from rbxcompose.bus.wire import WireProfile, ros_qos
-from rbxcompose.bus.zenoh_session import as_file, guest_settings
+from rbxcompose.bus.zenoh_session import SessionLink, as_file, guest_settings
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
