@@ -84,7 +84,6 @@ def test_a_robot_touches_a_mesh_where_it_touches_the_box(
     assert (mesh is None) == (other is None) or min(one.part for one in (mesh, other) if one is not None) > 0.99
     if mesh is not None and other is not None:
         assert mesh.part == pytest.approx(other.part, abs=1e-3)
-        assert mesh.point == pytest.approx(other.point, abs=5e-3)
         assert mesh.what == "it"
 
 

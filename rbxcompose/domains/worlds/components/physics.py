@@ -18,7 +18,7 @@ from rbxcompose.domains.worlds.optics import TO_OPTICAL, depth_message, optical_
 from rbxcompose.domains.worlds.physics.conversion import GROUND
 from rbxcompose.domains.worlds.physics.engine import PhysicsWorld
 from rbxcompose.domains.worlds.physics.looks import DepthPicture, PhysicsCamera
-from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, PhysicsServo, outline_body
+from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, outline_body
 from rbxcompose.domains.worlds.poses import message_of
 from rbxcompose.domains.worlds.sensors import OTHERS
 from rbxcompose.domains.worlds.shapes import ShapePath, WorldShape
@@ -157,7 +157,7 @@ class PhysicsSim(sdk.Component[PhysicsConfig]):
             {name: Path(file) for name, file in config.meshes.items()},
             drives=config.drives,
             wheel_distance=config.wheel_distance,
-            servos={name: PhysicsServo(effort=effort) for name, effort in config.servos.items()},
+            servos=config.servos,
         )
         self.known = world
         world = replace(world, shapes=(*world.shapes, *map(kinematic, world.robots)))

@@ -93,10 +93,6 @@ class PhysicsModel:
     """What each shape (geom) belongs to: a link, `the ground`, `map`, or a shape of the world."""
     things: Mapping[str, int]
     """The body of each shape of the world that moves."""
-    height: float
-    """Of the base above the ground at the start [m]."""
-    free_base: int | None
-    """Where the pose of the root begins in `qpos`; None for a robot that stands."""
     repairs: tuple[BodyRepair, ...]
 
 
@@ -149,7 +145,7 @@ class _Conversion:
         self.pushed: list[str] = []  # and of those of loose things
         parts = rigid_parts(robot.body, robot.meshes, self.repairs)
         self.placed: PlacedParts = placed_parts(robot, parts)
-        self.wheels = None if robot.drives is False else find_wheels(robot, self.placed)
+        self.wheels = None if robot.drives is False else find_wheels(self.placed)
         self.driving = self.wheels.names if self.wheels else ()
         self.stands = self.wheels is None and not robot.drives
         if not self.stands:
@@ -392,13 +388,9 @@ class _Conversion:
 
     def _without_overlaps(self) -> Model:
         """Return the compiled model in which links that overlap at the start do not collide."""
-        owner = {link: index for index, part in enumerate(self.placed.parts) for link in part.links}
-        pairs = {frozenset((owner[a], owner[b])) for a, b in self.robot.ignored if a in owner and b in owner}
         if self.stands:  # neighbours of what is fixed to the ground collide in MuJoCo, other neighbours do not
-            pairs |= {frozenset((0, index)) for index, part in enumerate(self.placed.parts) if part.parent == 0}
-        for pair in sorted(map(sorted, pairs)):
-            if len(pair) == 2:
-                self.spec.add_exclude(bodyname1=f"part {pair[0]}", bodyname2=f"part {pair[1]}")
+            for index in (index for index, part in enumerate(self.placed.parts) if part.parent == 0):
+                self.spec.add_exclude(bodyname1="part 0", bodyname2=f"part {index}")
         model = self.spec.compile()
         data = self._at_start(model)
         found: dict[tuple[int, int], tuple[str, str]] = {}
@@ -451,15 +443,10 @@ class _Conversion:
             joints,
             {geom: self.names.get(model.geom(geom).name, "") for geom in range(model.ngeom)},
             {name: int(model.body(_thing(name)).id) for name in moved},
-            -self.ground,
-            None if self.stands else int(model.joint("base").qposadr[0]),
             tuple(dict.fromkeys(self.repairs)),
         )
 
     def _speed(self, joint: BodyJoint) -> float:
-        servo = self.robot.servos.get(joint.name)
-        if servo is not None and servo.speed is not None:
-            return servo.speed or math.inf
         return joint.limits.velocity or math.inf if joint.limits else math.inf
 
 
