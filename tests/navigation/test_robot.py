@@ -548,7 +548,8 @@ def test_somebody_who_walks_in_the_way_is_not_run_into(tmp_path: Path) -> None:
 
     def touched(message: String) -> None:
         assert room.base.world is not None
-        at, (person,) = room.base.core.pose, room.base.world.shapes_at(room.bench.clock.now())
+        (walker,) = room.base.world.shapes
+        at, person = room.base.core.pose, walker.at(room.bench.clock.now())
         bearing = math.atan2(person.pose.y - at.y, person.pose.x - at.x) - at.heading
         approaches.append(driven[-1].twist.twist.linear.x * math.cos(bearing))
 

@@ -22,7 +22,7 @@ from rbxcompose.domains.worlds.shapes import (
     WorldShape,
 )
 from rbxcompose.domains.worlds.world import NO_WALLS, SimulatedWorld, world_message, world_of
-from rbxcompose.domains.worlds.world_mesh import world_mesh
+from rbxcompose.domains.worlds.world_file import world_mesh
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.testing import check_text
 from tests.worlds.physical import empty, from_urdf

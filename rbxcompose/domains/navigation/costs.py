@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2
-from rbxcompose.domains.worlds.contact import outside_polygon
+from rbxcompose.domains.worlds.contact import in_polygon, outside_polygon
 from rbxcompose.domains.worlds.grid_map import SOLID, UNKNOWN, GridMap
-from rbxcompose.domains.worlds.ground import in_polygon
 from rbxcompose.domains.worlds.shapes import Point2, PolygonFootprint
 
 LETHAL, INSCRIBED, DEAREST, NO_INFORMATION = 254, 253, 252, 255  # as in Nav2's costmaps

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, wrap_angle
@@ -15,6 +15,7 @@ from rbxcompose.domains.worlds.grid_map import SOLID, GridMap
 from rbxcompose.domains.worlds.shapes import (
     CircleFootprint,
     Footprint,
+    Point2,
     PolygonFootprint,
     WorldBox,
     WorldCylinder,
@@ -314,3 +315,14 @@ def _turn(pose: Pose2) -> Numbers:
     """Return the matrix that turns rows of `map` into the frame of a pose."""
     cos, sin = math.cos(pose.heading), math.sin(pose.heading)
     return np.array([[cos, -sin], [sin, cos]])
+
+
+def in_polygon(corners: Sequence[Point2], x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
+    """Return which points (...) are in a polygon: those from which a line to the right crosses its sides oddly."""
+    px, py = np.asarray(x, float), np.asarray(y, float)
+    inside = np.zeros(px.shape, bool)
+    for (x0, y0), (x1, y1) in zip(corners, (*corners[1:], *corners[:1]), strict=True):
+        if y0 != y1:
+            crosses = (y0 > py) != (y1 > py)
+            inside ^= crosses & (px < x0 + (py - y0) * (x1 - x0) / (y1 - y0))
+    return inside

@@ -1,4 +1,4 @@
-"""What stands or moves in a world beside its map: boxes, cylinders and meshes, and outlines seen from above."""
+"""What is in a world beside its map: boxes, cylinders, meshes, holes and lamps, and outlines seen from above."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from rbxcompose.base.geometry import Pose2, Transform3, Vector3
 Point2 = tuple[float, float]
 FLAT = 1e-12  # an area that is none [m^2]
 STRAIGHT = 1e-9  # a turn that is none [rad]
+LEAST_AREA = 1e-6  # of a hole [m^2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,3 +310,22 @@ class WorldLight:
     colour: str = ""
     strength: float = 0.6
     """From 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class WorldHole:
+    """A part of the ground that is not there, by the corners of a polygon in `map` [m].
+
+    Raises:
+        ValueError: if it encloses no area.
+    """
+
+    name: str
+    corners: tuple[Point2, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.corners) < 3:
+            raise ValueError("an area has at least three corners")
+        sides = zip(self.corners, (*self.corners[1:], self.corners[0]), strict=True)
+        if abs(sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in sides)) < 2 * LEAST_AREA:
+            raise ValueError("the corners of an area are on one line, or its sides cross")

@@ -312,7 +312,7 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
 
     def stay_on_ground(self, world: SimulatedWorld, before: Pose2, wheel_distance: float) -> None:
         """Do not move while a wheel has no ground, and tell which one."""
-        from rbxcompose.domains.worlds.switches import switches
+        from rbxcompose.domains.worlds.sensors import switches  # imports numpy
 
         wheels = {"left": (0.0, wheel_distance / 2), "right": (0.0, -wheel_distance / 2)}
         if self.hangs:

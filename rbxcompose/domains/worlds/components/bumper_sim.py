@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from rbxcompose import sdk
-from rbxcompose.domains.worlds.switches import SwitchesConfig, SwitchesSim
+from rbxcompose.domains.worlds.sensors import SwitchesConfig, SwitchesSim
 from rbxcompose.domains.worlds.world import SimulatedWorld
 from rbxcompose.manifest.fields import TopicName
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from pydantic import Field
 
 from rbxcompose import sdk
-from rbxcompose.domains.worlds.switches import SwitchesConfig, SwitchesSim
+from rbxcompose.domains.worlds.sensors import SwitchesConfig, SwitchesSim
 from rbxcompose.domains.worlds.world import SimulatedWorld
 from rbxcompose.manifest.fields import TopicName
 
