@@ -42,7 +42,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from rbxcompose.testing.bench import run_robot
 from tests.loops import for_all
-from tests.navigation.houses import ONE_WALL
+from tests.navigation.houses import ONE_WALL, is_blocked
 from tests.parts.project import Project
 from tests.soak import rare
 
@@ -228,9 +228,9 @@ def test_a_scan_that_comes_before_the_transform_of_its_time_is_taken_with_it(tmp
     soon = to_time(room.bench.clock.stamp() + 30_000_000)
     room.bench.publish("/scan", replace(SCAN, header=Header(soon, "base_link"), ranges=np.ones(9, np.float32)))
     navigator: Any = room.bench.component("go_to")
-    assert not navigator.costs.is_blocked(-1.0, 0.0)
+    assert not is_blocked(navigator.costs, -1.0, 0.0)
     room.bench.advance(0.1)
-    assert navigator.costs.is_blocked(-1.0, 0.0)
+    assert is_blocked(navigator.costs, -1.0, 0.0)
 
 
 def test_recoveries_are_a_mission_that_users_may_replace(tmp_path: Path) -> None:

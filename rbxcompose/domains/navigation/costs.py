@@ -200,29 +200,11 @@ class LayeredCosts:
 
     def value_at(self, x: float, y: float) -> int:
         """Return the cost at a point of `map` [m]; beside the map nothing is known."""
-        row, column = self.cell_of(x, y)
-        rows, columns = self.values.shape
-        return int(self.values[row, column]) if 0 <= row < rows and 0 <= column < columns else NO_INFORMATION
+        return int(self.grid.look_up(self.values, (x, y), NO_INFORMATION))
 
     def is_wall(self, x: float, y: float) -> bool:
         """Return whether the map or a zone always keeps the robot from a point of `map` [m]."""
-        row, column = self.cell_of(x, y)
-        rows, columns = self._walls.shape
-        return 0 <= row < rows and 0 <= column < columns and bool(self._lasting[row, column])
-
-    def is_blocked(self, x: float, y: float) -> bool:
-        """Return whether the robot must not be at a point of `map` [m]."""
-        return self.any_blocked(np.array([(x, y)]))
-
-    def any_blocked(self, points: Numbers) -> bool:
-        """Return whether the robot must not be at one of some points (n, 2) of `map` [m]."""
-        cells = np.floor(self.grid.to_cells(points)).astype(int)
-        rows, columns = self.values.shape
-        inside = ((cells >= 0) & (cells < (columns, rows))).all(-1)
-        found = self.values[cells[inside, 1], cells[inside, 0]]
-        if not self.settings.unknown_is_free and (not inside.all() or (found == NO_INFORMATION).any()):
-            return True
-        return bool(((found == LETHAL) | (found == INSCRIBED)).any())
+        return bool(self.grid.look_up(self._lasting, (x, y), False))
 
     def clearance(self, poses: Numbers) -> float:
         """Return how near to something the robot comes [m] at poses (n, 3) in `map` [m], [rad]; below 0 it touches it.
@@ -258,7 +240,7 @@ class LayeredCosts:
         near = slice(low[1], high[1] + 1), slice(low[0], high[0] + 1)
         solid = {"": self._walls[near] | self._marks[near]} | {name: zone[near] for name, zone in self._zones.items()}
         return {
-            name: [self._clearance(poses, _distances(found) * self.grid.resolution, low) for poses in parts]
+            name: [self._clearance(poses, distances(found) * self.grid.resolution, low) for poses in parts]
             for name, found in solid.items()
         }
 
@@ -309,7 +291,7 @@ class LayeredCosts:
     @property
     def has_room(self) -> bool:
         """Return whether the map and its zones leave room for the robot anywhere."""
-        return float(_distances(self._lasting).max() - 1) * self.grid.resolution > self.settings.radius
+        return float(distances(self._lasting).max() - 1) * self.grid.resolution > self.settings.radius
 
     def cell_of(self, x: float, y: float) -> tuple[int, int]:
         """Return the row and the column of a point of `map` [m], which may be beside it."""
@@ -318,9 +300,7 @@ class LayeredCosts:
 
     def share_at(self, x: float, y: float) -> float:
         """Return the share of the speed at a point of `map` [m]."""
-        row, column = self.cell_of(x, y)
-        rows, columns = self.values.shape
-        return float(self.shares[row, column]) if 0 <= row < rows and 0 <= column < columns else 1.0
+        return float(self.grid.look_up(self.shares, (x, y), 1.0))
 
     def _inflate(self, rows: slice, columns: slice) -> None:
         """Compute the costs of a part of the map again; what is around it counts, too."""
@@ -332,7 +312,7 @@ class LayeredCosts:
             slice(part.indices(size)[0] - wide.start, part.indices(size)[1] - wide.start)
             for part, wide, size in zip((rows, columns), around, self.values.shape, strict=True)
         )
-        middles = _distances(solid)[inner]
+        middles = distances(solid)[inner]
         self._away[rows, columns] = middles * side
         away = (middles - 1) * side  # from any place of a cell to the edge of an obstacle
         found = DEAREST * np.exp(-settings.decay * np.maximum(away - settings.radius, 0.0))
@@ -348,7 +328,7 @@ def rows_of(*poses: Pose2) -> Numbers:
     return np.array([(at.x, at.y, at.heading) for at in poses]).reshape(-1, 3)
 
 
-def _distances(solid: NDArray[np.bool_]) -> Numbers:
+def distances(solid: NDArray[np.bool_]) -> Numbers:
     """Return how far the middle of each cell is from that of the nearest solid one [cells]."""
     from scipy.ndimage import distance_transform_edt
 

@@ -13,7 +13,7 @@ from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
 from rbxcompose.base.units import LENGTH, TIME
 from rbxcompose.domains.bases.driving import commands_motion
-from rbxcompose.domains.navigation.companion import CompanionSettings, CompanionState, PersonCompanion, whom_to_follow
+from rbxcompose.domains.navigation.companion import CompanionState, PersonCompanion, whom_to_follow
 from rbxcompose.domains.navigation.costs import CostSettings, CostZone, LayeredCosts
 from rbxcompose.domains.navigation.follower import FollowerSettings
 from rbxcompose.domains.navigation.people import TrackedPerson
@@ -226,8 +226,8 @@ class PersonFollower(sdk.Component[PersonFollowerConfig]):
                     self.fail(goal, NOBODY, f"nobody was ahead for {patience:g} s")
                 return
             driving = FollowerSettings(config.speed, config.turn_rate, config.acceleration)
-            settings = CompanionSettings(driving, request.distance or config.distance, patience)
-            self.companion = PersonCompanion(settings, target, people)
+            distance = request.distance or config.distance
+            self.companion = PersonCompanion(driving, distance, patience, target, people)
             self.info(f"follows {target.name}")
         companion = self.companion
         self.drive(companion.update(self.now, dt, pose, people, costs))
