@@ -162,16 +162,13 @@ class PersonCompanion:
             if velocity is not None and not is_there and now - self._searches < SEARCHED:
                 self.state = CompanionState.SEARCHES
                 return velocity
-            if is_there or now - self._searches >= SEARCHED or self._is_at_end(pose):
+            has_ended = self.distance(pose) <= NEAR  # the way, near to where the person was
+            if is_there or now - self._searches >= SEARCHED or has_ended:
                 self._waits = now
         velocity = self._stand(dt, pose, CompanionState.WAITS)
         if self._waits is not None and now - self._waits >= self._patience:
             self.state = CompanionState.LOST
         return velocity
-
-    def _is_at_end(self, pose: Pose2) -> bool:
-        """Return whether the way to where the person was last seen has ended near to it."""
-        return self.distance(pose) <= NEAR
 
     def _way_to_person(self, pose: Pose2, costs: LayeredCosts) -> PlannedPath | None:
         """Return a way to a place before the person, None if there is none."""

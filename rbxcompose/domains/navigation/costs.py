@@ -58,8 +58,10 @@ class CostZone:
     share: float = 0.0
 
     def cells(self, grid: GridMap) -> NDArray[np.bool_]:
-        """Return which cells of a map belong to it."""
-        return _inside(grid, self.corners)
+        """Return which cells of a map have their middles in it."""
+        rows, columns = grid.cells.shape
+        middles = grid.to_points(np.stack(np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5), -1))
+        return in_polygon(self.corners, middles[..., 0], middles[..., 1])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,7 +138,8 @@ class LayeredCosts:
         self._kept = -math.inf  # [s] at which the latter was kept
         self.moving: Numbers = np.empty((0, 2))
         """Points (n, 2) of `map` [m] near to the sensor, at which it sees something where nothing was a second ago."""
-        self._away = np.zeros(grid.cells.shape)  # [m] between the middles of a cell and of the nearest obstacle
+        self.away: Numbers = np.zeros(grid.cells.shape)
+        """How far the middle of each cell is from that of the nearest obstacle [m], exactly up to the inflation."""
         self.values: Costs8 = np.zeros(grid.cells.shape, np.uint8)
         self._samples = _samples(settings.outline, grid.resolution)
         self._inflate(slice(None), slice(None))
@@ -211,7 +214,7 @@ class LayeredCosts:
 
         Ways keep off further, by up to the side of a cell: who follows one may be a little off.
         """
-        return self._clearance(poses, self._away)
+        return self._clearance(poses, self.away)
 
     def comes_nearer(self, pose: Pose2, poses: Sequence[Pose2] | Numbers, least: float) -> bool:
         """Return whether less than `least` [m] is left to something at some poses, and less than at a pose before.
@@ -274,14 +277,8 @@ class LayeredCosts:
         from scipy.ndimage import map_coordinates
 
         column, row = self.grid.to_cells(points).T - 0.5
-        away = map_coordinates(self._away, (row, column), order=1, mode="nearest")
+        away = map_coordinates(self.away, (row, column), order=1, mode="nearest")
         return float(away.min()) - math.sqrt(0.5) * self.grid.resolution
-
-    @property
-    def away(self) -> Numbers:
-        """Return how far the middle of each cell is from that of the nearest obstacle [m], exactly up to the
-        inflation."""
-        return self._away
 
     @property
     def solid(self) -> NDArray[np.bool_]:
@@ -313,7 +310,7 @@ class LayeredCosts:
             for part, wide, size in zip((rows, columns), around, self.values.shape, strict=True)
         )
         middles = distances(solid)[inner]
-        self._away[rows, columns] = middles * side
+        self.away[rows, columns] = middles * side
         away = (middles - 1) * side  # from any place of a cell to the edge of an obstacle
         found = DEAREST * np.exp(-settings.decay * np.maximum(away - settings.radius, 0.0))
         found[away > settings.inflation] = 0.0
@@ -378,10 +375,3 @@ def _window(middle: float, reach: float) -> slice:
 def _wider(part: slice, margin: int, size: int) -> slice:
     start, stop, _ = part.indices(size)
     return slice(max(0, start - margin), min(size, stop + margin))
-
-
-def _inside(grid: GridMap, corners: Sequence[Point2]) -> NDArray[np.bool_]:
-    """Return which cells have their middles in a polygon."""
-    rows, columns = grid.cells.shape
-    middles = grid.to_points(np.stack(np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5), -1))
-    return in_polygon(corners, middles[..., 0], middles[..., 1])

@@ -231,8 +231,7 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
     def hold(self) -> None:
         """Rest: robot time stands still."""
         self.drive.rest()
-        if self.line.is_open:
-            self.say(WheelSpeeds())
+        self.stand()
 
     def go_on(self) -> None:
         """Brake until the next command: robot time stood still, or has jumped."""

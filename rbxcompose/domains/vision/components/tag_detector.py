@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rbxcompose import sdk
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.vision.known_tags import KnownTags
-from rbxcompose.domains.vision.tags import SeenTag, TagFinder, board_pose
+from rbxcompose.domains.vision.tags import Numbers, SeenTag, TagFinder, board_pose
 from rbxcompose.domains.worlds.optics import Intrinsics
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import geometry_msgs as geometry
@@ -30,10 +30,6 @@ from rbxcompose.msgs.vision_msgs import (
     ObjectHypothesisWithPose,
 )
 from rbxcompose.sdk.ports import BULK
-
-if TYPE_CHECKING:
-    from rbxcompose.domains.vision.known_tags import KnownTags
-from rbxcompose.domains.vision.tags import Numbers
 
 THICK = 0.001  # of the box that stands for a tag [m]
 SILENCE = 2.0  # [s] without a picture after which diagnostics say so

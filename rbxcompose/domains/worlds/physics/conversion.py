@@ -81,7 +81,6 @@ class PhysicsModel:
 
     model: Model
     robot: PhysicsRobot
-    world: SimulatedWorld
     wheels: PhysicsWheels | None
     """None for a robot that stands."""
     signs: Mapping[str, float]
@@ -436,7 +435,6 @@ class _Conversion:
         return PhysicsModel(
             model,
             self.robot,
-            self.world,
             self.wheels,
             signs,
             poses,
