@@ -16,12 +16,11 @@ from rbxcompose.base.geometry import NO_TRANSLATION, Pose2, Vector3
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.body.urdf import read_text
-from rbxcompose.domains.worlds.outline import outline_of
 from rbxcompose.domains.worlds.physics.conversion import OF_WORLD
 from rbxcompose.domains.worlds.physics.engine import PhysicsWorld
 from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, outline_body
 from rbxcompose.domains.worlds.physics.solids import rotation_matrix
-from rbxcompose.domains.worlds.shapes import WorldShape
+from rbxcompose.domains.worlds.shapes import WorldShape, outline_of
 from rbxcompose.domains.worlds.world import NO_WALLS, SimulatedWorld
 from rbxcompose.domains.worlds.world_file import read_world
 from rbxcompose.manifest.documents import Documents

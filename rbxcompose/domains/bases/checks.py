@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, FindingKind, Related, Severity
@@ -14,7 +14,6 @@ from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import OTHER_TYPE, MessageFlow, is_written, period_of, setting_span
 from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent
-from rbxcompose.domains.bases.safety import lead_of, speed_within
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.missions.analysis.effects import published
@@ -94,6 +93,8 @@ def _wheel(body: Body, setting: Setting[str], link: str) -> BodyWheel:
 LONGEST = 10.0  # [s]: commands come many times a second
 FARTHEST = 2.0  # [m] driven blind; the usual 0.5 s are that far at 4 m/s only
 ROUNDING = 1e-3  # of a speed
+REACTION = 0.06  # [s] from an edge below a sensor to wheels that brake: two cycles of sensors and one of the base
+STEEPEST = 60  # [deg] between the way of a base and straight over an edge; beyond that it drives along the edge
 _FIELDS = {("linear", "x"): ("max_speed", SPEED, "m/s"), ("angular", "z"): ("max_turn_rate", ANGULAR_SPEED, "rad/s")}
 
 
@@ -195,6 +196,24 @@ def past_the_edge(robot: Robot) -> Iterator[Finding]:
                     help=", or ".join(cures),
                     related=[Related(setting_span(robot, (sensors, sees.points.field)), "the sensors")],
                 )
+
+
+def lead_of(points: Collection[tuple[float, float]], wheel_distance: float) -> float:
+    """Return how far a base drives at least from where a sensor passes a straight edge to where a wheel does [m].
+
+    `points` are those of the sensors, x (ahead) and y; the wheels are beside the origin.
+    """
+
+    def lead(angle: float) -> float:
+        cos, sin = math.cos(angle), math.sin(angle)
+        return (max(x * cos + y * sin for x, y in points) - abs(sin) * wheel_distance / 2) / cos
+
+    return min(lead(math.radians(degrees)) for degrees in range(-STEEPEST, STEEPEST + 1))
+
+
+def speed_within(way: float, acceleration: float) -> float:
+    """Return from which speed a base comes to rest within a way [m], its reaction included [m/s]."""
+    return acceleration * (math.sqrt(REACTION**2 + 2.0 * max(way, 0.0) / acceleration) - REACTION)
 
 
 @check("RBX2282", Severity.WARNING, closed=(WIRING,))

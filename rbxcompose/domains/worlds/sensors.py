@@ -128,15 +128,9 @@ class SwitchesSim(WorldSensor[S]):
     """Switches of one kind around a robot in a simulated world."""
 
     @classmethod
-    def ports(cls, config: S) -> dict[str, sdk.Port[Any]]:
+    def ports(cls, config: Any) -> dict[str, sdk.Port[Any]]:
         """Return the ports, with the topic of the switches."""
-        topic = cls.topic_of(config)
-        return super().ports(config) | {"switches": sdk.Out(Switches, topic, rate=config.rate).named("switches")}
-
-    @classmethod
-    @abstractmethod
-    def topic_of(cls, config: S) -> str:
-        """Return where it publishes."""
+        return super().ports(config) | {"switches": sdk.Out(Switches, config.topic, rate=config.rate).named("switches")}
 
     @abstractmethod
     def angles(self) -> Mapping[str, float]:

@@ -15,9 +15,16 @@ from rbxcompose.base.geometry import Pose2
 from rbxcompose.compiler.sections.missions import MissionEntry, missions
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.worlds.grid_map import GridMap, MapError, read_map
-from rbxcompose.domains.worlds.outline import hull_of, outline_of
 from rbxcompose.domains.worlds.sections.world import WorldOfRobot, world
-from rbxcompose.domains.worlds.shapes import CircleFootprint, Footprint, Point2, PolygonFootprint, WorldHole
+from rbxcompose.domains.worlds.shapes import (
+    CircleFootprint,
+    Footprint,
+    Point2,
+    PolygonFootprint,
+    WorldHole,
+    hull_of,
+    outline_of,
+)
 from rbxcompose.domains.worlds.world_file import PlanarPose
 from rbxcompose.manifest.fields import FileName, TopicName
 from rbxcompose.manifest.files import resolve

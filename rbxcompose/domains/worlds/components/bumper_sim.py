@@ -46,11 +46,6 @@ class BumperSim(SwitchesSim[BumperSimConfig]):
         bumpers: {type: bumper_sim, bumpers: {left: [0 deg, 90 deg], right: [-90 deg, 0 deg]}}
     """
 
-    @classmethod
-    def topic_of(cls, config: BumperSimConfig) -> str:
-        """Return where it publishes."""
-        return config.topic
-
     def angles(self) -> Mapping[str, float]:
         """Return the middle of each bumper [rad]."""
         return {name: (begin + end) / 2 for name, (begin, end) in self.config.bumpers.items()}

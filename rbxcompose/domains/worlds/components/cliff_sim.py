@@ -33,11 +33,6 @@ class CliffSim(SwitchesSim[CliffSimConfig]):
     """
 
     @classmethod
-    def topic_of(cls, config: CliffSimConfig) -> str:
-        """Return where it publishes."""
-        return config.topic
-
-    @classmethod
     def capabilities(cls, config: CliffSimConfig) -> tuple[sdk.Capability, ...]:
         """Declare where it looks."""
         return (sdk.SeesEdges(sdk.Setting(config.sensors, "sensors")),)
