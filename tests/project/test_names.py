@@ -16,7 +16,6 @@ TWO_SIDES = {  # what a component sees, as a protocol of the SDK, and the bus's 
     "Window",
 }
 NOUNS = {
-    "docking",
     "driving",
     "head_tracking",
     "ray_casting",
