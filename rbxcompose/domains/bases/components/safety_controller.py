@@ -12,7 +12,6 @@ from pydantic import Field, model_validator
 from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Velocity2
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.bases.driving import commands_motion
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.poses import twist_message
@@ -211,7 +210,8 @@ class SafetyController(sdk.Component[SafetyControllerConfig]):
     @classmethod
     def capabilities(cls, config: SafetyControllerConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it moves the base."""
-        return (commands_motion(config, "back_speed", protects=True),)
+        speed, rate = sdk.Setting(config.back_speed, "back_speed"), sdk.Setting(config.turn_rate, "turn_rate")
+        return (sdk.CommandsMotion("cmd_vel", speed, rate, protects=True),)
 
     def configure(self) -> None:
         """Have heard nothing yet."""
