@@ -21,16 +21,8 @@ from rbxcompose.base.geometry import Quaternion, Transform3, quaternion_between,
 from rbxcompose.domains.body.model import BodyJoint
 from rbxcompose.domains.worlds.contact import MAP
 from rbxcompose.domains.worlds.grid_map import wall_rectangles
+from rbxcompose.domains.worlds.physics import looks
 from rbxcompose.domains.worlds.physics.actuators import Gains, add_actuators, add_followers
-from rbxcompose.domains.worlds.physics.looks import (
-    WALLS,
-    PhysicsCamera,
-    add_lights,
-    add_looks,
-    add_tag,
-    colour_ground,
-    colour_of,
-)
 from rbxcompose.domains.worlds.physics.rigid import GRAVITY, RigidPart, ensure_mass, rigid_parts
 from rbxcompose.domains.worlds.physics.robot import (
     LEVEL,
@@ -99,7 +91,7 @@ def convert(
     robot: PhysicsRobot,
     world: SimulatedWorld,
     loose: Mapping[str, float] = {},
-    cameras: Mapping[str, PhysicsCamera] = {},
+    cameras: Mapping[str, looks.PhysicsCamera] = {},
     *,
     timestep: float = TIMESTEP,
 ) -> PhysicsModel:
@@ -122,7 +114,7 @@ class _Conversion:
         robot: PhysicsRobot,
         world: SimulatedWorld,
         loose: Mapping[str, float],
-        cameras: Mapping[str, PhysicsCamera],
+        cameras: Mapping[str, looks.PhysicsCamera],
         timestep: float,
     ) -> None:
         import mujoco
@@ -237,7 +229,7 @@ class _Conversion:
                 raise TypeError(f"'{shape.name}' is a part of a shape")
         at.pop("mass", None)
         for tag in shape.tags if self.cameras else ():
-            add_tag(self.spec, holder, tag, shape.solid.height / 2, at)
+            looks.add_tag(self.spec, holder, tag, shape.solid.height / 2, at)
 
     def _add_hulls(
         self, holder: Model, shape: WorldShape, parts: Sequence[tuple[float, WorldHull]], at: Mapping[str, Any]
@@ -378,12 +370,12 @@ class _Conversion:
             if belongs is None:  # a tag
                 continue
             if belongs == GROUND:
-                colour_ground(self.spec, geom)
+                looks.colour_ground(self.spec, geom)
             elif geom.group == OF_WORLD:
-                geom.rgba = (*WALLS, 1.0) if belongs == MAP else colour_of(colours.get(belongs, ""))
+                geom.rgba = (*looks.WALLS, 1.0) if belongs == MAP else looks.colour_of(colours.get(belongs, ""))
         parts = list(zip(self.bodies, self.placed.parts, strict=True))
-        add_looks(self.spec, self.robot, parts, self.cameras, self.repairs)
-        add_lights(self.spec, self.world.lights)
+        looks.add_looks(self.spec, self.robot, parts, self.cameras, self.repairs)
+        looks.add_lights(self.spec, self.world.lights)
 
     def _without_overlaps(self) -> Model:
         """Return the compiled model in which links that overlap at the start do not collide."""
