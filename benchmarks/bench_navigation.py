@@ -24,7 +24,7 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.domains.bases.components.diff_drive_sim import DiffDriveSim
 from rbxcompose.domains.navigation.components.mapper import Mapper
-from rbxcompose.domains.navigation.costs import CostSettings, LayeredCosts
+from rbxcompose.domains.navigation.costs import INSCRIBED, LETHAL, CostSettings, LayeredCosts
 from rbxcompose.domains.navigation.follower import FollowerSettings, FollowState, PathFollower
 from rbxcompose.domains.navigation.localisation import LocalisationSettings, ParticleFilter
 from rbxcompose.domains.navigation.planner import plan
@@ -130,7 +130,7 @@ def _drives() -> Iterator[Row]:
     longest = 0.0
     while count < PAIRS:
         start, goal = (Pose2(draw.uniform(0, 8), draw.uniform(0, 6), draw.uniform(-3, 3)) for _ in range(2))
-        if costs.is_blocked(start.x, start.y) or costs.is_blocked(goal.x, goal.y):
+        if any(costs.value_at(at.x, at.y) in (INSCRIBED, LETHAL) for at in (start, goal)):
             continue
         count += 1
         way = plan(costs, start, goal, 0.1)

@@ -101,7 +101,6 @@ def test_readings_that_cannot_be_do_not_count_and_it_is_said_why() -> None:
     assert odometry.pose == Pose2()
     assert odometry.update(501.0, 1.0, 0.2) is None
     assert odometry.pose.x == pytest.approx(0.04)
-    assert odometry.jumps == 1
 
 
 def test_velocities_are_averaged_over_the_window_and_a_late_reading_is_no_jump() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rbxcompose.base.geometry import Pose2
+from rbxcompose.domains.navigation.costs import INSCRIBED, LETHAL, NO_INFORMATION, LayeredCosts
 from rbxcompose.domains.worlds.grid_map import GridMap
 
 SIDE = 0.05  # [m]
@@ -26,3 +27,9 @@ def room(*walls: tuple[float, float, float, float], size: float = 6.0) -> GridMa
 
 ONE_WALL = room((-0.1, -1.6, 0.1, 1.6))
 HOUSE = room((-0.1, -3, 0.1, -0.6), (-0.1, 0.6, 0.1, 3), (-3, 0.0, -1.6, 0.2), (1.2, -1.0, 3, -0.8), size=7.0)
+
+
+def is_blocked(costs: LayeredCosts, x: float, y: float) -> bool:
+    """Return whether a robot must not be at a point of `map` [m]."""
+    value = costs.value_at(x, y)
+    return value in (INSCRIBED, LETHAL) or (value == NO_INFORMATION and not costs.settings.unknown_is_free)

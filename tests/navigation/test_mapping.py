@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Pose2
+from rbxcompose.domains.navigation.components.mapper import OccupancyMapper
 from rbxcompose.domains.navigation.costs import CostSettings, LayeredCosts
-from rbxcompose.domains.navigation.occupancy import MappingSettings, OccupancyMapper
 from rbxcompose.domains.navigation.planner import plan
 from rbxcompose.domains.worlds.grid_map import SOLID, GridMap, map_files, read_map
 from rbxcompose.domains.worlds.ray_casting import Rays
@@ -49,7 +49,7 @@ def agreement(made: GridMap, true: GridMap) -> tuple[float, int]:
 @given(st.floats(-math.pi, math.pi), st.floats(0.0, 0.01), st.floats(-SIDE / 2, SIDE / 2))
 @settings(max_examples=2, deadline=None)
 def test_a_map_from_known_poses_agrees_with_the_world(heading: float, noise: float, shift: float) -> None:
-    mapper, rays, random = OccupancyMapper(MappingSettings()), Rays(HOUSE), np.random.default_rng(1)
+    mapper, rays, random = OccupancyMapper(), Rays(HOUSE), np.random.default_rng(1)
     for step in range(40):
         at = Pose2(2.0 * math.cos(step / 6), 2.0 * math.sin(step / 6) + shift, heading + step / 7)
         if not HOUSE.occupied_at((at.x, at.y)):
@@ -62,7 +62,7 @@ def test_a_map_from_known_poses_agrees_with_the_world(heading: float, noise: flo
 
 
 def test_a_scan_from_the_same_place_does_not_count_again_and_one_that_says_nothing_never_does() -> None:
-    mapper = OccupancyMapper(MappingSettings())
+    mapper = OccupancyMapper()
     assert not mapper.see(Pose2(), ANGLES, np.full(360, math.nan))
     assert mapper.see(Pose2(), ANGLES, np.full(360, 1.0))
     assert not mapper.see(Pose2(0.05), ANGLES, np.full(360, 1.0))
@@ -72,7 +72,7 @@ def test_a_scan_from_the_same_place_does_not_count_again_and_one_that_says_nothi
 
 
 def test_a_ray_without_an_echo_clears_only_as_far_as_the_sensor_sees() -> None:
-    mapper = OccupancyMapper(MappingSettings())
+    mapper = OccupancyMapper()
     for step in range(4):
         mapper.see(Pose2(0.0, 0.0, step * 0.3), ANGLES, np.full(360, math.inf), 2.0)
     assert mapper.grid is not None
@@ -81,7 +81,7 @@ def test_a_ray_without_an_echo_clears_only_as_far_as_the_sensor_sees() -> None:
 
 
 def test_a_map_that_would_be_too_large_is_refused_and_stays() -> None:
-    mapper = OccupancyMapper(MappingSettings())
+    mapper = OccupancyMapper()
     mapper.see(Pose2(), ANGLES, np.full(360, 1.0))
     with pytest.raises(ValueError, match="the map would have"):
         mapper.see(Pose2(1e6, 1e6), ANGLES, np.full(360, 1.0))

@@ -42,7 +42,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from rbxcompose.testing.bench import run_robot
 from tests.loops import for_all
-from tests.navigation.houses import ONE_WALL
+from tests.navigation.houses import ONE_WALL, is_blocked
 from tests.parts.project import Project
 from tests.soak import rare
 
@@ -228,9 +228,9 @@ def test_a_scan_that_comes_before_the_transform_of_its_time_is_taken_with_it(tmp
     soon = to_time(room.bench.clock.stamp() + 30_000_000)
     room.bench.publish("/scan", replace(SCAN, header=Header(soon, "base_link"), ranges=np.ones(9, np.float32)))
     navigator: Any = room.bench.component("go_to")
-    assert not navigator.costs.is_blocked(-1.0, 0.0)
+    assert not is_blocked(navigator.costs, -1.0, 0.0)
     room.bench.advance(0.1)
-    assert navigator.costs.is_blocked(-1.0, 0.0)
+    assert is_blocked(navigator.costs, -1.0, 0.0)
 
 
 def test_recoveries_are_a_mission_that_users_may_replace(tmp_path: Path) -> None:
@@ -548,7 +548,8 @@ def test_somebody_who_walks_in_the_way_is_not_run_into(tmp_path: Path) -> None:
 
     def touched(message: String) -> None:
         assert room.base.world is not None
-        at, (person,) = room.base.core.pose, room.base.world.shapes_at(room.bench.clock.now())
+        (walker,) = room.base.world.shapes
+        at, person = room.base.core.pose, walker.at(room.bench.clock.now())
         bearing = math.atan2(person.pose.y - at.y, person.pose.x - at.x) - at.heading
         approaches.append(driven[-1].twist.twist.linear.x * math.cos(bearing))
 

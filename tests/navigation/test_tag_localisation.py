@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rbxcompose.base.geometry import Pose2, wrap_angle
 from rbxcompose.base.levels import Level
 from rbxcompose.compiler.compile import compile_robot
-from rbxcompose.domains.navigation.tag_filter import SURE, PlacedTag, TagFilter
+from rbxcompose.domains.navigation.components.tag_localisation import SURE, PlacedTag, TagFilter
 from rbxcompose.domains.worlds.poses import message_of, pose_in
 from rbxcompose.msgs.geometry_msgs import PoseWithCovariance, PoseWithCovarianceStamped
 from rbxcompose.msgs.nav_msgs import Odometry

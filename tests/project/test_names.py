@@ -15,7 +15,7 @@ TWO_SIDES = {  # what a component sees, as a protocol of the SDK, and the bus's 
     "ServedGoal",
     "Window",
 }
-NOUNS = {"docking", "driving", "ray_casting", "tag_docking", "wiring"}  # modules with a noun in `ing` as their name
+NOUNS = {"driving", "ray_casting", "tag_docking", "wiring"}  # modules with a noun in `ing` as their name
 
 
 DEFINITION = re.compile(r"^(?:class (\w+)|([A-Z]\w*)(?:: [^=\n]*)? = )", re.MULTILINE)

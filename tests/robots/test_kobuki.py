@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2, wrap_angle
 from rbxcompose.base.levels import Level
 from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.domains.bases.checks import lead_of, speed_within
 from rbxcompose.domains.bases.components.diff_drive_sim import DiffDriveCore, DiffDriveSim, DiffDriveSimConfig
-from rbxcompose.domains.bases.components.safety_controller import SafetyControllerConfig
-from rbxcompose.domains.bases.safety import SafetyCore, SafetyPhase, lead_of, speed_within
-from rbxcompose.domains.worlds.ground import WorldHole
+from rbxcompose.domains.bases.components.safety_controller import SafetyControllerConfig, SafetyCore, SafetyPhase
+from rbxcompose.domains.worlds.shapes import WorldHole
 from rbxcompose.domains.worlds.world import SimulatedWorld
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.rbxcompose_msgs import Switches

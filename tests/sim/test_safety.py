@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import AT_REST, Velocity2
-from rbxcompose.domains.bases.components.safety_controller import SafetyControllerConfig
-from rbxcompose.domains.bases.safety import REACTION, SafetyCore, SafetyPhase, lead_of, speed_within
+from rbxcompose.domains.bases.checks import REACTION, lead_of, speed_within
+from rbxcompose.domains.bases.components.safety_controller import SafetyControllerConfig, SafetyCore, SafetyPhase
 
 DT = 0.05  # [s]
 SETTINGS = st.builds(

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import ArrayLike, NDArray
 
 from rbxcompose.base.findings import Report, Span
-from rbxcompose.base.geometry import Pose2
+from rbxcompose.base.geometry import NO_TRANSLATION, Pose2, Vector3
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.body.urdf import read_text
-from rbxcompose.domains.worlds.outline import outline_of
+from rbxcompose.domains.worlds.physics.conversion import OF_WORLD
+from rbxcompose.domains.worlds.physics.engine import PhysicsWorld
 from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, outline_body
-from rbxcompose.domains.worlds.shapes import WorldShape
+from rbxcompose.domains.worlds.physics.solids import rotation_matrix
+from rbxcompose.domains.worlds.shapes import WorldShape, outline_of
 from rbxcompose.domains.worlds.world import NO_WALLS, SimulatedWorld
 from rbxcompose.domains.worlds.world_file import read_world
 from rbxcompose.manifest.documents import Documents
@@ -26,6 +31,7 @@ pytest.importorskip("mujoco")
 ROOT = Path(__file__).parents[2]
 STEP = 0.02
 ORIGIN = Pose2()
+SEEN = np.array([group == OF_WORLD for group in range(6)], np.uint8)  # groups that rays see
 
 
 @cache
@@ -66,3 +72,21 @@ def shipped_world(name: str, start: Pose2) -> SimulatedWorld:
 
 def shipped_robots() -> Iterable[str]:
     return sorted(file.parent.name for file in ROOT.glob("robots/*/robot.yaml"))
+
+
+def ray(
+    physics: PhysicsWorld, link: str, directions: ArrayLike, most: float, origin: Vector3 = NO_TRANSLATION
+) -> NDArray[np.float64]:
+    """Return how far rays go [m] until they hit anything but the robot itself; inf for `most` [m] and beyond.
+
+    `origin` [m] and `directions` (n, 3), unit vectors, are in the frame of a link.
+    """
+    pose = physics.pose_of(link)
+    vectors = np.ascontiguousarray(np.asarray(directions, float).reshape(-1, 3) @ rotation_matrix(pose.rotation).T)
+    count = len(vectors)
+    hit, found = np.empty(count, np.int32), np.empty(count)
+    begin = np.array(pose.apply(origin))
+    physics._mj.mj_multiRay(
+        physics._model, physics._data, begin, vectors.ravel(), SEEN, 1, -1, hit, found, None, count, most
+    )
+    return np.where((hit >= 0) & (found < most), found, math.inf)

@@ -95,7 +95,7 @@ def drives(draw: st.DrawFn) -> Drive:
 
 
 @given(drives())
-def test_it_stops_before_it_overlaps_and_touches_where_it_stops(drive: Drive) -> None:
+def test_it_stops_before_it_overlaps_where_something_is(drive: Drive) -> None:
     grid, found, footprint, start, goal = drive
     contact = drive.contact(start, goal)
     part, pose = (contact.part, contact.pose) if contact else (1.0, pose_between(start, goal, 1.0))
@@ -105,7 +105,6 @@ def test_it_stops_before_it_overlaps_and_touches_where_it_stops(drive: Drive) ->
         what = (MAP, *(shape.name for shape in found)).index(contact.what)
         only = () if what == 0 else (found[what - 1],)
         assert overlaps(grid if what == 0 else EMPTY, only, footprint, pose, 5e-3)
-        assert inside(grid if what == 0 else EMPTY, only, moved_into(pose.inverse(), np.array(contact.point)), 5e-3)
 
 
 @given(drives(), st.floats(0.0, 1.0))
@@ -152,7 +151,7 @@ def test_a_bumper_is_pressed_just_where_there_is_no_room_for_its_travel(
 @pytest.mark.parametrize("solid", [WorldBox((0.4, 0.4, HEIGHT)), WorldCylinder(0.2, HEIGHT)])
 @pytest.mark.parametrize("footprint", [CircleFootprint(0.3), BOX])
 @given(ANGLES, st.floats(0.0, 0.1))
-def test_the_point_of_contact_is_on_the_side_that_touches(
+def test_it_ends_where_the_side_that_is_ahead_touches(
     footprint: Footprint, solid: WorldBox | WorldCylinder, heading: float, deeper: float
 ) -> None:
     robot = Pose2(0.0, 0.0, heading)
@@ -163,7 +162,6 @@ def test_the_point_of_contact_is_on_the_side_that_touches(
     assert contact is not None
     assert contact.what == "post"
     assert robot.distance(contact.pose) == pytest.approx(0.1, abs=1e-5)
-    assert contact.point == pytest.approx((0.3, 0.0), abs=1e-3)
 
 
 @given(st.floats(-0.2, 0.2), st.floats(0.0, 0.1))

@@ -10,9 +10,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Pose2
+from rbxcompose.domains.worlds.contact import in_polygon
 from rbxcompose.domains.worlds.grid_map import GridMap
-from rbxcompose.domains.worlds.ground import WorldHole, in_polygon
-from rbxcompose.domains.worlds.shapes import Point2
+from rbxcompose.domains.worlds.shapes import Point2, WorldHole
 from rbxcompose.domains.worlds.world import SimulatedWorld, world_message, world_of
 from rbxcompose.msgs.std_msgs import Header
 from tests.worlds.scenes import ANGLES

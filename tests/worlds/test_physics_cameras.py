@@ -14,7 +14,7 @@ from rbxcompose.domains.worlds.physics.engine import PhysicsWorld
 from rbxcompose.domains.worlds.physics.looks import PhysicsCamera, colour_of
 from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, outline_body
 from rbxcompose.domains.worlds.shapes import WorldBox, WorldLight, WorldShape
-from tests.worlds.physical import empty, from_urdf
+from tests.worlds.physical import empty, from_urdf, ray
 
 EYE = (
     '<link name="base"><visual><origin xyz="1 -0.4 0.5"/><geometry><box size="0.1 0.1 0.1"/></geometry>'
@@ -55,7 +55,7 @@ def test_depths_are_those_of_rays(physics: PhysicsWorld) -> None:
     x, y = (columns + 0.5 - 80) / CAMERA.focal_length, (rows + 0.5 - 60) / CAMERA.focal_length
     vectors = np.stack((x, y, np.ones_like(x)), -1)
     lengths = np.linalg.norm(vectors, axis=1)
-    expected = physics.ray("eye", vectors / lengths[:, None], 60.0) / lengths
+    expected = ray(physics, "eye", vectors / lengths[:, None], 60.0) / lengths
     found = depths[rows, columns]
     near = np.isfinite(expected) & (expected < 5.0)
     assert near.sum() > 30

@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Pose2, Transform3, quaternion_from_yaw
 from rbxcompose.domains.worlds.grid_map import GridMap
-from rbxcompose.domains.worlds.ground import WorldHole
 from rbxcompose.domains.worlds.optics import TO_OPTICAL, Intrinsics
-from rbxcompose.domains.worlds.shapes import ShapePath, WorldBox, WorldCylinder, WorldLight, WorldShape
+from rbxcompose.domains.worlds.shapes import ShapePath, WorldBox, WorldCylinder, WorldHole, WorldLight, WorldShape
 from rbxcompose.domains.worlds.view import CameraView, Lens, WorldView
 from rbxcompose.domains.worlds.world import SimulatedWorld
 from rbxcompose.msgs.sensor_msgs import CameraInfo, Image, PointCloud2

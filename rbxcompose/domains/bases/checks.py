@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import NAMES, WIRING, Finding, FindingKind, Related, Severity
 from rbxcompose.base.geometry import Vector3, rotate
 from rbxcompose.base.units import ANGULAR_SPEED, LENGTH, SPEED, TIME, Dimension, format_quantity
 from rbxcompose.compiler.check_runner import check
-from rbxcompose.compiler.model.flow import OTHER_TYPE, Drive, MessageFlow, is_written, period_of, setting_span
+from rbxcompose.compiler.model.flow import OTHER_TYPE, MessageFlow, is_written, period_of, setting_span
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent
 from rbxcompose.compiler.model.skills import constants
-from rbxcompose.domains.bases.safety import lead_of, speed_within
+from rbxcompose.domains.bases.checks import lead_of, speed_within
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.missions.analysis.facts import number_of, published
@@ -92,72 +92,43 @@ def _wheel(body: Body, setting: Setting[str], link: str) -> BodyWheel:
 LONGEST = 10.0  # [s]: commands come many times a second
 FARTHEST = 2.0  # [m] driven blind; the usual 0.5 s are that far at 4 m/s only
 ROUNDING = 1e-3  # of a speed
+REACTION = 0.06  # [s] from an edge below a sensor to wheels that brake: two cycles of sensors and one of the base
+STEEPEST = 60  # [deg] between the way of a base and straight over an edge; beyond that it drives along the edge
 _FIELDS = {("linear", "x"): ("max_speed", SPEED, "m/s"), ("angular", "z"): ("max_turn_rate", ANGULAR_SPEED, "rad/s")}
 
 
 @check("RBX3503", Severity.WARNING, closed=(WIRING, NAMES))
 def clamped_speed(robot: Robot) -> Iterator[Finding]:
     """A component drives faster than its base can."""
-    for excess in excesses(robot):
-        if not excess.is_absurd:
-            yield excess.finding(robot, clamped_speed, f"can do {excess.shown(excess.limit)} at most")
+    yield from _excesses(robot, clamped_speed, is_absurd=False)
 
 
-@dataclass(frozen=True, slots=True)
-class Excess:
-    """A setting of a component that exceeds the limit of the base it drives."""
-
-    drive: Drive
-    wanted: Setting[float]
-    limit: Setting[float]
-    dimension: Dimension
-
-    @property
-    def is_absurd(self) -> bool:
-        """Return whether the base ignores such commands instead of clamping them."""
-        factor = self.drive.drives.drops_above
-        return factor is not None and self.wanted.value > factor.value * self.limit.value
-
-    def shown(self, setting: Setting[float]) -> str:
-        """Return the value of one of the settings, formatted for people."""
-        return format_quantity(setting.value, self.dimension)
-
-    @property
-    def times(self) -> str:
-        """Return, in words, the multiple of its limit up to which the base accepts commands."""
-        factor = self.drive.drives.drops_above
-        return "twice" if factor is None or factor.value == 2.0 else f"{factor.value:g} times"
-
-    @property
-    def remedy(self) -> str:
-        """Return how to correct it."""
-        if self.wanted.field:
-            return f"make '{self.wanted.field}' of '{self.drive.driver.name}' at most {self.shown(self.limit)}"
-        if self.limit.field:
-            return f"make '{self.limit.field}' of '{self.drive.base.name}' at least {self.shown(self.wanted)}"
-        return OTHER_TYPE
-
-    def finding(self, robot: Robot, kind: FindingKind, what: str) -> Finding:
-        """Return the finding; `what` says how the base reacts."""
-        driver, base, name = self.drive.driver, self.drive.base, self.limit.field
-        there = (base, name)
-        span, limit = setting_span(robot, (driver, self.wanted.field), there), setting_span(robot, there)
-        return kind.at(
-            span,
-            f"'{driver.name}' drives at {self.shown(self.wanted)}, but its base '{base.name}' {what}",
-            help=self.remedy,
-            related=[Related(limit, f"'{name}' of the base" if name else "the base")] if limit != span else [],
-        )
-
-
-def excesses(robot: Robot) -> Iterator[Excess]:
-    """Yield the speeds and turn rates that exceed the limits of the base they drive."""
+def _excesses(robot: Robot, kind: FindingKind, *, is_absurd: bool) -> Iterator[Finding]:
+    """Yield what exceeds the limits of the base that it drives: what that drops as absurd, or what it cuts."""
     for drive in MessageFlow(robot).drives():
-        wants, has = drive.commands, drive.drives
+        driver, base, wants, has = drive.driver, drive.base, drive.commands, drive.drives
+        factor = has.drops_above.value if has.drops_above else math.inf
         speeds = (wants.max_speed, has.max_speed, SPEED), (wants.max_turn_rate, has.max_turn_rate, ANGULAR_SPEED)
         for wanted, limit, dimension in speeds:
-            if wanted and limit and wanted.value > limit.value:
-                yield Excess(drive, wanted, limit, dimension)
+            if not (wanted and limit and wanted.value > limit.value):
+                continue
+            if (wanted.value > factor * limit.value) is not is_absurd:
+                continue
+            fast, most = format_quantity(wanted.value, dimension), format_quantity(limit.value, dimension)
+            times = "twice" if factor == 2.0 else f"{factor:g} times"
+            reacts = f"drops commands above {times} its limit of {most}" if is_absurd else f"can do {most} at most"
+            remedy = f"make '{limit.field}' of '{base.name}' at least {fast}" if limit.field else OTHER_TYPE
+            if wanted.field:
+                remedy = f"make '{wanted.field}' of '{driver.name}' at most {most}"
+            there = (base, limit.field)
+            span, at_base = setting_span(robot, (driver, wanted.field), there), setting_span(robot, there)
+            related = Related(at_base, f"'{limit.field}' of the base" if limit.field else "the base")
+            yield kind.at(
+                span,
+                f"'{driver.name}' drives at {fast}, but its base '{base.name}' {reacts}",
+                help=remedy,
+                related=[related] if at_base != span else [],
+            )
 
 
 @check("RBX3501")
@@ -224,6 +195,24 @@ def past_the_edge(robot: Robot) -> Iterator[Finding]:
                     help=", or ".join(cures),
                     related=[Related(setting_span(robot, (sensors, sees.points.field)), "the sensors")],
                 )
+
+
+def lead_of(points: Collection[tuple[float, float]], wheel_distance: float) -> float:
+    """Return how far a base drives at least from where a sensor passes a straight edge to where a wheel does [m].
+
+    `points` are those of the sensors, x (ahead) and y; the wheels are beside the origin.
+    """
+
+    def lead(angle: float) -> float:
+        cos, sin = math.cos(angle), math.sin(angle)
+        return (max(x * cos + y * sin for x, y in points) - abs(sin) * wheel_distance / 2) / cos
+
+    return min(lead(math.radians(degrees)) for degrees in range(-STEEPEST, STEEPEST + 1))
+
+
+def speed_within(way: float, acceleration: float) -> float:
+    """Return from which speed a base comes to rest within a way [m], its reaction included [m/s]."""
+    return acceleration * (math.sqrt(REACTION**2 + 2.0 * max(way, 0.0) / acceleration) - REACTION)
 
 
 @check("RBX2282", Severity.WARNING, closed=(WIRING,))
@@ -407,7 +396,4 @@ def _at(shape: TemplateShape | None, key: str) -> TemplateShape | None:
 @check("RBX3504")
 def absurd_speed(robot: Robot) -> Iterator[Finding]:
     """A component drives so fast that its base drops the commands."""
-    for excess in excesses(robot):
-        if excess.is_absurd:
-            drops = f"drops commands above {excess.times} its limit of {excess.shown(excess.limit)}"
-            yield excess.finding(robot, absurd_speed, drops)
+    yield from _excesses(robot, absurd_speed, is_absurd=True)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeVar
 
 from rbxcompose import sdk
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2, wrap_angle
+from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.msgs.poses import twist_message
 
 ABSURD = 2.0  # a command above this many times a limit is a fault of its sender, not a wish to go fast
 LIMITS = ("max_speed", "max_turn_rate", "acceleration", "turn_acceleration")
@@ -18,6 +20,7 @@ AIM = 0.5  # part of a tolerance at which the base is commanded to rest; the rem
 RESTING = Velocity2(0.05, math.radians(5))  # below this the base counts as at rest [m/s, rad/s]
 PROGRESS = 0.02  # moving this far counts as progress [m]
 PROGRESS_TURN = math.radians(2)  # and so does turning this far [rad]
+C = TypeVar("C", bound=sdk.Config)
 
 
 def drives(config: Any, commands: str, odometry: str, **more: sdk.Setting[float] | None) -> sdk.Drives:
@@ -26,10 +29,20 @@ def drives(config: Any, commands: str, odometry: str, **more: sdk.Setting[float]
     return sdk.Drives(commands, odometry, drops_above=sdk.Setting(ABSURD), **limits, **more)
 
 
-def commands_motion(config: Any, speed: str = "speed", *, protects: bool = False) -> sdk.CommandsMotion:
-    """Return that a component sends velocities at `cmd_vel`, up to a setting and its `turn_rate`."""
-    limits = sdk.Setting(getattr(config, speed), speed), sdk.Setting(config.turn_rate, "turn_rate")
-    return sdk.CommandsMotion("cmd_vel", *limits, protects)
+class BaseDriver(sdk.Component[C]):
+    """Commands a base at `cmd_vel`, up to a speed and a turn rate of its configuration."""
+
+    cmd_vel = sdk.Out(Twist, "cmd_vel", qos="command")
+
+    @classmethod
+    def capabilities(cls, config: Any) -> tuple[sdk.Capability, ...]:
+        """Declare how fast it drives."""
+        speed, turn_rate = sdk.Setting(config.speed, "speed"), sdk.Setting(config.turn_rate, "turn_rate")
+        return (*super().capabilities(config), sdk.CommandsMotion("cmd_vel", speed, turn_rate))
+
+    def drive(self, velocity: Velocity2) -> None:
+        """Publish a velocity."""
+        self.cmd_vel(twist_message(velocity))
 
 
 @dataclass(frozen=True, slots=True)

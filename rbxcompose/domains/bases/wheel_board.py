@@ -106,7 +106,6 @@ class BoardLink:
     def __init__(self, faults: Counter[str]) -> None:
         self._faults, self._frames = faults, FrameReader(faults)
         self.version: int | None = None  # of the board
-        self.patience: float | None = None  # [s] for which the board drives on without a command
         self.is_greeted = False
         self._heard_at = self._greeted_at = -math.inf
         self._number = 0
@@ -135,8 +134,7 @@ class BoardLink:
             self._next = (found.number + 1) & 0xFF
             match found.type, len(found.payload):
                 case 0x81, _HELLO.size:
-                    self.version, silence = _HELLO.unpack(found.payload)
-                    self.patience = silence / 1000.0
+                    self.version, _ = _HELLO.unpack(found.payload)
                 case 0x82, _STATE.size:
                     left, right, millivolts, flags = _STATE.unpack(found.payload)
                     self._heard_at = now

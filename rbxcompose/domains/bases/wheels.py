@@ -184,7 +184,6 @@ class WheelDrive:
         self.wheel_speed = wheel_speed
         self.limiter = TwistLimiter(limits)
         self.command_timeout = command_timeout
-        self.refused = 0  # commands that were not finite, or absurd
         self.clamped = 0  # commands that were scaled down to a limit
         self._target = AT_REST
         self._until = -math.inf
@@ -209,7 +208,6 @@ class WheelDrive:
         """Accept the velocity to reach; return why it is refused, else None. While braking it is ignored."""
         excess = self.limiter.excess(velocity) if velocity.is_finite else math.inf
         if excess > ABSURD:
-            self.refused += 1
             return _refusal(velocity, excess)
         target = self._within_wheels(self.limiter.within(velocity))
         self.clamped += target != velocity
@@ -296,7 +294,6 @@ class WheelOdometry:
         self.velocity = AT_REST
         self.covariance: Covariance = np.zeros((3, 3))  # of x [m], y [m], heading [rad]
         self.velocity_covariance: Covariance = np.zeros((2, 2))  # of linear [m/s], angular [rad/s]
-        self.jumps = 0  # readings whose way did not count
         self._last: tuple[float, float, float] | None = None  # left, right, time
         self._ways = (0.0, 0.0)  # of the wheels so far [m]
         self._past: deque[tuple[float, float, float]] = deque()  # time and ways, over the window
@@ -320,7 +317,6 @@ class WheelOdometry:
         way = max(abs(wheels.left), abs(wheels.right)) * self.geometry.metres_per_unit * dt
         speed = way / max(dt, self.policy.window)  # readings come late at times, and the next one soon after
         if speed > self.policy.greatest_speed:
-            self.jumps += 1
             return f"a wheel has jumped: it would have moved at {speed:.3g} m/s"
         self._move(wheels, dt)
         self._average(now)

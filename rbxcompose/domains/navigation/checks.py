@@ -13,9 +13,8 @@ from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.navigation.sections.navigation import GO_TO, NavigationOfRobot, navigation
-from rbxcompose.domains.worlds.outline import hull_of, outline_of, sections_of
 from rbxcompose.domains.worlds.sections.world import WorldOfRobot, world
-from rbxcompose.domains.worlds.shapes import Point2, PolygonFootprint
+from rbxcompose.domains.worlds.shapes import Point2, PolygonFootprint, hull_of, outline_of, sections_of
 from rbxcompose.manifest.tree import at
 from rbxcompose.sdk.ports import Out
 

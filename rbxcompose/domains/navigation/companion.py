@@ -13,7 +13,6 @@ from enum import StrEnum
 
 import numpy as np
 
-from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
 from rbxcompose.domains.bases.driving import GoToCore, GoToSettings
 from rbxcompose.domains.navigation.costs import LayeredCosts
@@ -48,33 +47,30 @@ class CompanionState(StrEnum):
     BLOCKED = "blocked"
 
 
-@dataclass(frozen=True, slots=True)
-class CompanionSettings:
-    """How to follow somebody."""
-
-    driving: FollowerSettings = FollowerSettings()
-    """How to drive."""
-    distance: float = 1.0
-    """Between the middles of the robot and of the person [m]."""
-    patience: float = 5.0
-    """At the place where the person was last seen [s]."""
-
-
 class PersonCompanion:
     """Follows one person."""
 
     def __init__(
-        self, settings: CompanionSettings, target: TrackedPerson, others: Sequence[TrackedPerson] = ()
+        self,
+        driving: FollowerSettings,
+        distance: float,
+        patience: float,
+        target: TrackedPerson,
+        others: Sequence[TrackedPerson] = (),
     ) -> None:
-        """Follow a person, and none of the others who are seen now."""
-        self.settings = settings
+        """Follow a person, and none of the others who are seen now.
+
+        Keep a `distance` [m] between the middles of robot and person; be patient at the place where it was seen last
+        for a time [s].
+        """
+        self._driving, self._keeps, self._patience = driving, distance, patience
         self.target = target
         """As it was last seen."""
         self.state = CompanionState.STANDS
         self._known = {one.name for one in others} - {target.name}
         self._trail = [(target.x, target.y)]
         self._path: PathFollower | None = None
-        self._follower = PathFollower(settings.driving)
+        self._follower = PathFollower(driving)
         self._turner: GoToCore | None = None
         self._seen = -math.inf  # [s], as those below
         self._planned = -math.inf
@@ -132,7 +128,7 @@ class PersonCompanion:
         return math.hypot(x - part * target.vx, y - part * target.vy)
 
     def _keep_distance(self, now: float, dt: float, pose: Pose2, costs: LayeredCosts) -> Velocity2:
-        keeps, away = self.settings.distance, self.distance(pose)
+        keeps, away = self._keeps, self.distance(pose)
         if away <= keeps + (0.0 if self._path is not None else STARTS):
             self._free = now
             return self._stand(dt, pose, CompanionState.STANDS)
@@ -162,24 +158,21 @@ class PersonCompanion:
                 except NoPathError:
                     self._waits = now
             velocity = self._drive(dt, pose, costs)
-            is_there = self.distance(pose) <= self.settings.driving.tolerance
+            is_there = self.distance(pose) <= self._driving.tolerance
             if velocity is not None and not is_there and now - self._searches < SEARCHED:
                 self.state = CompanionState.SEARCHES
                 return velocity
-            if is_there or now - self._searches >= SEARCHED or self._is_at_end(pose):
+            has_ended = self.distance(pose) <= NEAR  # the way, near to where the person was
+            if is_there or now - self._searches >= SEARCHED or has_ended:
                 self._waits = now
         velocity = self._stand(dt, pose, CompanionState.WAITS)
-        if self._waits is not None and now - self._waits >= self.settings.patience:
+        if self._waits is not None and now - self._waits >= self._patience:
             self.state = CompanionState.LOST
         return velocity
 
-    def _is_at_end(self, pose: Pose2) -> bool:
-        """Return whether the way to where the person was last seen has ended near to it."""
-        return self.distance(pose) <= NEAR
-
     def _way_to_person(self, pose: Pose2, costs: LayeredCosts) -> PlannedPath | None:
         """Return a way to a place before the person, None if there is none."""
-        keeps, away = self.settings.distance, self.distance(pose)
+        keeps, away = self._keeps, self.distance(pose)
         share = (away - keeps) / away
         x, y = pose.x + (self.target.x - pose.x) * share, pose.y + (self.target.y - pose.y) * share
         facing = math.atan2(self.target.y - pose.y, self.target.x - pose.x)
@@ -225,19 +218,15 @@ class PersonCompanion:
         if self._turner is None:
             if error < ASIDE:
                 return AT_REST
-            self._turner = GoToCore(self._turning())
+            limits = self._driving
+            turning = GoToSettings(limits.speed, limits.turn_rate, turn_deceleration=limits.turn_acceleration)
+            self._turner = GoToCore(turning)
         elif error < FACED:
             self._turner = None
             return AT_REST
         self._turner.start(at)
         velocity, _ = self._turner.update(pose, dt)
         return Velocity2(0.0, velocity.angular)
-
-    def _turning(self) -> GoToSettings:
-        driving = self.settings.driving
-        return GoToSettings(
-            speed=driving.speed, turn_rate=driving.turn_rate, turn_deceleration=driving.turn_acceleration
-        )
 
 
 def whom_to_follow(pose: Pose2, people: Sequence[TrackedPerson]) -> TrackedPerson | None:

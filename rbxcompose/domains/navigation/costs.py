@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2
-from rbxcompose.domains.worlds.contact import outside_polygon
+from rbxcompose.domains.worlds.contact import in_polygon, outside_polygon
 from rbxcompose.domains.worlds.grid_map import SOLID, UNKNOWN, GridMap
-from rbxcompose.domains.worlds.ground import in_polygon
 from rbxcompose.domains.worlds.shapes import Point2, PolygonFootprint
 
 LETHAL, INSCRIBED, DEAREST, NO_INFORMATION = 254, 253, 252, 255  # as in Nav2's costmaps
@@ -59,8 +58,10 @@ class CostZone:
     share: float = 0.0
 
     def cells(self, grid: GridMap) -> NDArray[np.bool_]:
-        """Return which cells of a map belong to it."""
-        return _inside(grid, self.corners)
+        """Return which cells of a map have their middles in it."""
+        rows, columns = grid.cells.shape
+        middles = grid.to_points(np.stack(np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5), -1))
+        return in_polygon(self.corners, middles[..., 0], middles[..., 1])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,7 +138,8 @@ class LayeredCosts:
         self._kept = -math.inf  # [s] at which the latter was kept
         self.moving: Numbers = np.empty((0, 2))
         """Points (n, 2) of `map` [m] near to the sensor, at which it sees something where nothing was a second ago."""
-        self._away = np.zeros(grid.cells.shape)  # [m] between the middles of a cell and of the nearest obstacle
+        self.away: Numbers = np.zeros(grid.cells.shape)
+        """How far the middle of each cell is from that of the nearest obstacle [m], exactly up to the inflation."""
         self.values: Costs8 = np.zeros(grid.cells.shape, np.uint8)
         self._samples = _samples(settings.outline, grid.resolution)
         self._inflate(slice(None), slice(None))
@@ -201,36 +203,18 @@ class LayeredCosts:
 
     def value_at(self, x: float, y: float) -> int:
         """Return the cost at a point of `map` [m]; beside the map nothing is known."""
-        row, column = self.cell_of(x, y)
-        rows, columns = self.values.shape
-        return int(self.values[row, column]) if 0 <= row < rows and 0 <= column < columns else NO_INFORMATION
+        return int(self.grid.look_up(self.values, (x, y), NO_INFORMATION))
 
     def is_wall(self, x: float, y: float) -> bool:
         """Return whether the map or a zone always keeps the robot from a point of `map` [m]."""
-        row, column = self.cell_of(x, y)
-        rows, columns = self._walls.shape
-        return 0 <= row < rows and 0 <= column < columns and bool(self._lasting[row, column])
-
-    def is_blocked(self, x: float, y: float) -> bool:
-        """Return whether the robot must not be at a point of `map` [m]."""
-        return self.any_blocked(np.array([(x, y)]))
-
-    def any_blocked(self, points: Numbers) -> bool:
-        """Return whether the robot must not be at one of some points (n, 2) of `map` [m]."""
-        cells = np.floor(self.grid.to_cells(points)).astype(int)
-        rows, columns = self.values.shape
-        inside = ((cells >= 0) & (cells < (columns, rows))).all(-1)
-        found = self.values[cells[inside, 1], cells[inside, 0]]
-        if not self.settings.unknown_is_free and (not inside.all() or (found == NO_INFORMATION).any()):
-            return True
-        return bool(((found == LETHAL) | (found == INSCRIBED)).any())
+        return bool(self.grid.look_up(self._lasting, (x, y), False))
 
     def clearance(self, poses: Numbers) -> float:
         """Return how near to something the robot comes [m] at poses (n, 3) in `map` [m], [rad]; below 0 it touches it.
 
         Ways keep off further, by up to the side of a cell: who follows one may be a little off.
         """
-        return self._clearance(poses, self._away)
+        return self._clearance(poses, self.away)
 
     def comes_nearer(self, pose: Pose2, poses: Sequence[Pose2] | Numbers, least: float) -> bool:
         """Return whether less than `least` [m] is left to something at some poses, and less than at a pose before.
@@ -259,7 +243,7 @@ class LayeredCosts:
         near = slice(low[1], high[1] + 1), slice(low[0], high[0] + 1)
         solid = {"": self._walls[near] | self._marks[near]} | {name: zone[near] for name, zone in self._zones.items()}
         return {
-            name: [self._clearance(poses, _distances(found) * self.grid.resolution, low) for poses in parts]
+            name: [self._clearance(poses, distances(found) * self.grid.resolution, low) for poses in parts]
             for name, found in solid.items()
         }
 
@@ -293,14 +277,8 @@ class LayeredCosts:
         from scipy.ndimage import map_coordinates
 
         column, row = self.grid.to_cells(points).T - 0.5
-        away = map_coordinates(self._away, (row, column), order=1, mode="nearest")
+        away = map_coordinates(self.away, (row, column), order=1, mode="nearest")
         return float(away.min()) - math.sqrt(0.5) * self.grid.resolution
-
-    @property
-    def away(self) -> Numbers:
-        """Return how far the middle of each cell is from that of the nearest obstacle [m], exactly up to the
-        inflation."""
-        return self._away
 
     @property
     def solid(self) -> NDArray[np.bool_]:
@@ -310,7 +288,7 @@ class LayeredCosts:
     @property
     def has_room(self) -> bool:
         """Return whether the map and its zones leave room for the robot anywhere."""
-        return float(_distances(self._lasting).max() - 1) * self.grid.resolution > self.settings.radius
+        return float(distances(self._lasting).max() - 1) * self.grid.resolution > self.settings.radius
 
     def cell_of(self, x: float, y: float) -> tuple[int, int]:
         """Return the row and the column of a point of `map` [m], which may be beside it."""
@@ -319,9 +297,7 @@ class LayeredCosts:
 
     def share_at(self, x: float, y: float) -> float:
         """Return the share of the speed at a point of `map` [m]."""
-        row, column = self.cell_of(x, y)
-        rows, columns = self.values.shape
-        return float(self.shares[row, column]) if 0 <= row < rows and 0 <= column < columns else 1.0
+        return float(self.grid.look_up(self.shares, (x, y), 1.0))
 
     def _inflate(self, rows: slice, columns: slice) -> None:
         """Compute the costs of a part of the map again; what is around it counts, too."""
@@ -333,8 +309,8 @@ class LayeredCosts:
             slice(part.indices(size)[0] - wide.start, part.indices(size)[1] - wide.start)
             for part, wide, size in zip((rows, columns), around, self.values.shape, strict=True)
         )
-        middles = _distances(solid)[inner]
-        self._away[rows, columns] = middles * side
+        middles = distances(solid)[inner]
+        self.away[rows, columns] = middles * side
         away = (middles - 1) * side  # from any place of a cell to the edge of an obstacle
         found = DEAREST * np.exp(-settings.decay * np.maximum(away - settings.radius, 0.0))
         found[away > settings.inflation] = 0.0
@@ -349,7 +325,7 @@ def rows_of(*poses: Pose2) -> Numbers:
     return np.array([(at.x, at.y, at.heading) for at in poses]).reshape(-1, 3)
 
 
-def _distances(solid: NDArray[np.bool_]) -> Numbers:
+def distances(solid: NDArray[np.bool_]) -> Numbers:
     """Return how far the middle of each cell is from that of the nearest solid one [cells]."""
     from scipy.ndimage import distance_transform_edt
 
@@ -399,10 +375,3 @@ def _window(middle: float, reach: float) -> slice:
 def _wider(part: slice, margin: int, size: int) -> slice:
     start, stop, _ = part.indices(size)
     return slice(max(0, start - margin), min(size, stop + margin))
-
-
-def _inside(grid: GridMap, corners: Sequence[Point2]) -> NDArray[np.bool_]:
-    """Return which cells have their middles in a polygon."""
-    rows, columns = grid.cells.shape
-    middles = grid.to_points(np.stack(np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5), -1))
-    return in_polygon(corners, middles[..., 0], middles[..., 1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 
 from rbxcompose.domains.navigation.companion import SURE
 from rbxcompose.domains.navigation.costs import CostZone
@@ -47,23 +48,7 @@ def _outlined(
     points = tuple(Point(x, y, 0.0) for x, y in (*corners, corners[0]))
     xs, ys = zip(*corners, strict=True)
     middle = Pose(position=Point(sum(xs) / len(xs), sum(ys) / len(ys), 0.0))
-    line = Marker(
-        header=header,
-        ns=kind,
-        id=2 * number,
-        type=Marker.LINE_STRIP,
-        points=points,
-        scale=Vector3(x=LINE),
-        color=colour,
-    )
-    name = Marker(
-        header=header,
-        ns=kind,
-        id=2 * number + 1,
-        type=Marker.TEXT_VIEW_FACING,
-        pose=middle,
-        scale=Vector3(z=TEXT),
-        color=colour,
-        text=text,
-    )
+    mark = partial(Marker, header=header, ns=kind, color=colour)
+    line = mark(id=2 * number, type=Marker.LINE_STRIP, points=points, scale=Vector3(x=LINE))
+    name = mark(id=2 * number + 1, type=Marker.TEXT_VIEW_FACING, pose=middle, scale=Vector3(z=TEXT), text=text)
     return line, name

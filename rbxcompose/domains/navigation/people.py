@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2
+from rbxcompose.domains.navigation.costs import distances
 from rbxcompose.domains.worlds.grid_map import SOLID, GridMap
 
 Numbers = NDArray[np.float64]
@@ -43,20 +44,11 @@ class KnownWalls:
 
     def __init__(self, grid: GridMap, margin: float) -> None:
         """Take a map, and how near to its walls [m] an echo is one of them: the error of the map and of the pose."""
-        from scipy.ndimage import distance_transform_edt
-
-        solid = grid.cells >= SOLID
-        away = distance_transform_edt(~solid) if solid.any() else np.full(solid.shape, np.inf)
-        self._grid, self._near = grid, (away - 0.5) * grid.resolution <= margin
+        self._grid, self._near = grid, (distances(grid.cells >= SOLID) - 0.5) * grid.resolution <= margin
 
     def explain(self, points: Numbers) -> NDArray[np.bool_]:
         """Return which points (n, 2) of `map` [m] are of a wall; beside the map none is."""
-        cells = np.floor(self._grid.to_cells(points)).astype(int)
-        rows, columns = self._near.shape
-        inside = ((cells >= 0) & (cells < (columns, rows))).all(-1)
-        found: NDArray[np.bool_] = np.zeros(len(points), bool)
-        found[inside] = self._near[cells[inside, 1], cells[inside, 0]]
-        return found
+        return self._grid.look_up(self._near, points, False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,10 +244,6 @@ class PeopleTracks:
 
     def _kept(self, track: PersonTrack) -> float:
         return self.forget if track.count >= SEEN_OFTEN else min(DOUBTED, self.forget)
-
-    def clear(self) -> None:
-        """Forget everybody."""
-        self._tracks.clear()
 
     def people(self, time: float) -> list[TrackedPerson]:
         """Return who is seen at a time [s], where it is expected then."""

@@ -57,7 +57,11 @@ class TellsPeople(sdk.Component[C]):
     def tell(self, found: Sequence[TrackedPerson]) -> None:
         """Publish who is seen."""
         header = Header(stamp=to_time(self.stamp), frame_id=self.config.stands_in)
-        self.people(People(header, tuple(map(person_message, found))))
+        told = (
+            Person(one.name, Point(one.x, one.y), Point(one.vx, one.vy), one.reliability, tagnames=(), tags=())
+            for one in found
+        )
+        self.people(People(header, tuple(told)))
         self.markers(people_markers(found, header))
 
     def report(self, found: Sequence[TrackedPerson], problem: str, taken: float) -> None:
@@ -79,8 +83,3 @@ class TellsPeople(sdk.Component[C]):
         walks = math.atan2(nearest.vy, nearest.vx)
         header = Header(stamp=to_time(self.stamp), frame_id=self.config.stands_in)
         self.person(PoseStamped(header, message_of(Pose2(nearest.x, nearest.y, walks))))
-
-
-def person_message(one: TrackedPerson) -> Person:
-    """Return somebody as ROS's people stack does."""
-    return Person(one.name, Point(x=one.x, y=one.y), Point(x=one.vx, y=one.vy), one.reliability, tagnames=(), tags=())

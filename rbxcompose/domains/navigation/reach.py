@@ -59,9 +59,7 @@ class ReachableAreas:
 
     def area_at(self, place: Point2) -> int:
         """Return the number of the area at a point of `map` [m]; 0 where the robot does not fit, or beside the map."""
-        column, row = np.floor(self.grid.to_cells(place)).astype(int).tolist()
-        rows, columns = self.areas.shape
-        return int(self.areas[row, column]) if 0 <= row < rows and 0 <= column < columns else 0
+        return int(self.grid.look_up(self.areas, place, 0))
 
     def nearest(self, place: Point2, area: int | None = None) -> tuple[float, Point2, int]:
         """Return how near to a point of `map` the robot may be, where, and in which area; infinity if nowhere.

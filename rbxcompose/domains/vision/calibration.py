@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import yaml
@@ -36,14 +36,6 @@ class CalibrationError(ValueError):
     """Raised when pictures do not tell how a camera maps directions to pixels, with the reason and a cure."""
 
 
-class CalibrationBoard(Protocol):
-    """A flat board with corners that can be told apart."""
-
-    def corners(self, picture: GreyPicture) -> tuple[Numbers, Numbers]:
-        """Return places of corners on the board (n, 2) [m] and in a picture in grey (n, 2) [px]."""
-        ...
-
-
 class Chessboard:
     """A chessboard with so many inner corners along its rows and its columns."""
 
@@ -52,7 +44,7 @@ class Chessboard:
         self.columns, self.rows, self.square = columns, rows, square
 
     def corners(self, picture: GreyPicture) -> tuple[Numbers, Numbers]:
-        """Return the corners if all are seen."""
+        """Return places of corners on the board (n, 2) [m] and in a picture in grey (n, 2) [px], if all are seen."""
         import cv2
 
         flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
@@ -73,7 +65,7 @@ class TagSheet:
         self.size, self.places, self._finder = size, places, TagFinder(family)
 
     def corners(self, picture: GreyPicture) -> tuple[Numbers, Numbers]:
-        """Return the corners of the tags that are seen."""
+        """Return the same of the tags that are seen."""
         on_board, on_picture = [], []
         square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float) * self.size
         for tag in self._finder.find(picture):
@@ -83,6 +75,10 @@ class TagSheet:
         if not on_board:
             return np.empty((0, 2)), np.empty((0, 2))
         return np.concatenate(on_board), np.concatenate(on_picture)
+
+
+CalibrationBoard = Chessboard | TagSheet
+"""A flat board with corners that can be told apart."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.worlds.optics import Intrinsics
-from rbxcompose.domains.worlds.physics.solids import rotation_matrix
+from rbxcompose.domains.worlds.physics.solids import quaternion_of, rotation_matrix
 from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, GreyPicture, dictionary
 
 Numbers = NDArray[np.float64]
@@ -127,7 +127,7 @@ def board_pose(
         return None
     points = np.concatenate([placed_square(places[tag.number], sizes[tag.number]) for tag in mine])
     corners = np.concatenate([tag.corners for tag in mine])
-    best = min(mine, key=lambda tag: (tag.doubt > 0.5, -_area(tag.corners)))
+    best = min(mine, key=lambda tag: (tag.doubt > 0.5, -cv2.contourArea(tag.corners.astype(np.float32))))
     if best.pose is None:
         return None
     first = best.pose.compose(places[best.number].inverse())
@@ -170,14 +170,7 @@ def spread(points: Numbers, turn: Numbers, shift: Numbers, camera: Intrinsics) -
 
 def pose_from(turn: Numbers, shift: Numbers) -> Transform3:
     """Return a rotation vector (3, 1) and a translation (3, 1) as a transform."""
-    x, y, z = (float(one) for one in shift.ravel())
-    a, b, c = (float(one) for one in turn.ravel())
-    angle = math.sqrt(a * a + b * b + c * c)
-    scale = math.sin(angle / 2) / angle if angle > 1e-12 else 0.5
-    return Transform3((x, y, z), (a * scale, b * scale, c * scale, math.cos(angle / 2)))
+    import cv2
 
-
-def _area(corners: Numbers) -> float:
-    """Return the area of a polygon [px^2]."""
-    x, y = corners.T
-    return abs(float(sum(x[i - 1] * y[i] - x[i] * y[i - 1] for i in range(len(x))))) / 2
+    x, y, z = shift.ravel().tolist()
+    return Transform3((x, y, z), quaternion_of(np.asarray(cv2.Rodrigues(turn)[0], float)))

@@ -21,8 +21,7 @@ def start_in_something(robot: Robot) -> Iterator[Finding]:
     contents = robot.manifest.contents
     if "world" not in contents.root or not contents.is_simulated or (found := contents.of(world)) is None:
         return
-    from rbxcompose.domains.worlds.contact import MAP, overlap  # imports numpy
-    from rbxcompose.domains.worlds.ground import in_polygon
+    from rbxcompose.domains.worlds.contact import MAP, in_polygon, overlap  # imports numpy
     from rbxcompose.domains.worlds.shapes import CircleFootprint
 
     depth, what = overlap(found.file.grid, found.solid_at(0.0), CircleFootprint(found.radius), found.start)

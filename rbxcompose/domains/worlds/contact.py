@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, wrap_angle
@@ -28,7 +28,7 @@ STRIDE = 1e-3  # no point of the robot moves further between two poses that are 
 STAGE = 0.1  # nor within what is examined together [m]
 REFINED = 16  # poses between the last free one and the first that is not, examined twice
 NOISE = 1e-12  # depth that is rounding [m]
-TOUCHING = 1e-3  # points that are so much further away than the nearest one touch as well [m]
+TOUCHING = 1e-3  # what is so near to a robot touches it [m]
 
 Numbers = NDArray[np.float64]
 
@@ -41,8 +41,6 @@ class FirstContact:
     """How much of the motion is free, from 0 to 1."""
     pose: Pose2
     """Where the robot is then, in `map`; it overlaps nothing that it did not overlap before."""
-    point: Point2
-    """The middle of what touches, in the frame of the robot [m]."""
     what: str
     """`map`, or the name of the shape."""
 
@@ -57,13 +55,6 @@ class _Obstacles:
     """(n, 3): x, y, radius."""
     polygons: tuple[tuple[PolygonFootprint, Pose2], ...]
     names: tuple[str, ...]
-
-    def only(self, chosen: NDArray[np.bool_]) -> _Obstacles:
-        """Return some of them."""
-        squares, rounds = len(self.rectangles), len(self.rectangles) + len(self.circles)
-        polygons = tuple(each for each, is_chosen in zip(self.polygons, chosen[rounds:], strict=True) if is_chosen)
-        names = tuple(name for name, is_chosen in zip(self.names, chosen, strict=True) if is_chosen)
-        return _Obstacles(self.rectangles[chosen[:squares]], self.circles[chosen[squares:rounds]], polygons, names)
 
 
 def pose_between(before: Pose2, after: Pose2, part: float) -> Pose2:
@@ -194,9 +185,7 @@ def _first(
         first = int(too_deep.any(1).argmax())
         begin, end, hit = float(parts[first]), float(parts[first + 1]), too_deep[first]
     what = near.names[int(hit.argmax())]
-    pose = pose_between(before, after, begin)
-    touched = hit & np.array([name == what for name in near.names])
-    return FirstContact(begin, pose, _point(near, footprint, pose, touched), what)
+    return FirstContact(begin, pose_between(before, after, begin), what)
 
 
 def _gaps(near: _Obstacles, footprint: Footprint, poses: Numbers) -> Numbers:
@@ -328,28 +317,12 @@ def _turn(pose: Pose2) -> Numbers:
     return np.array([[cos, -sin], [sin, cos]])
 
 
-def _point(near: _Obstacles, footprint: Footprint, pose: Pose2, touched: NDArray[np.bool_]) -> Point2:
-    """Return the middle of where a robot touches obstacles, in its frame [m]."""
-    near = near.only(touched)
-    rectangles, circles = near.rectangles, near.circles
-    if isinstance(footprint, CircleFootprint):
-        found, away = _around_circle(near, pose)
-        found *= (footprint.radius / np.maximum(np.hypot(found[:, 0], found[:, 1]), NOISE))[:, None]
-    else:
-        x, y, cos, sin, a, b = rectangles.T
-        turn = _turn(pose)
-        corners, _, _ = _edges(footprint)
-        placed = corners @ turn.T + (pose.x, pose.y)
-        ends = [(x + u * a * cos - v * b * sin, y + u * a * sin + v * b * cos) for u in (-1, 1) for v in (-1, 1)]
-        points = [np.array(polygon.points) @ _turn(at).T + (at.x, at.y) for polygon, at in near.polygons]
-        others = np.concatenate((np.array(ends).swapaxes(1, 2).reshape(-1, 2), circles[:, :2], *points))
-        others = (others - (pose.x, pose.y)) @ turn
-        radii = np.zeros(len(others))
-        radii[4 * len(rectangles) :][: len(circles)] = circles[:, 2]
-        from_corners = _outside_rectangles(rectangles, placed[None]).min(0, initial=math.inf)
-        for polygon, at in near.polygons:
-            from_corners = np.minimum(from_corners, outside_polygon(polygon, _into(at, placed)))
-        found = np.concatenate((corners, _nearest(footprint, others)))
-        away = np.concatenate((from_corners, outside_polygon(footprint, others) - radii))
-    px, py = found[away <= away.min() + TOUCHING].mean(0).tolist()
-    return px, py
+def in_polygon(corners: Sequence[Point2], x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
+    """Return which points (...) are in a polygon: those from which a line to the right crosses its sides oddly."""
+    px, py = np.asarray(x, float), np.asarray(y, float)
+    inside = np.zeros(px.shape, bool)
+    for (x0, y0), (x1, y1) in zip(corners, (*corners[1:], *corners[:1]), strict=True):
+        if y0 != y1:
+            crosses = (y0 > py) != (y1 > py)
+            inside ^= crosses & (px < x0 + (py - y0) * (x1 - x0) / (y1 - y0))
+    return inside

@@ -88,11 +88,15 @@ class GridMap:
 
     def occupied_at(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Return for points (..., 2) of `map` [m] whether each is in an occupied cell; beside the map none is."""
+        return np.asarray(self.look_up(self.cells, points, FREE) >= SOLID)
+
+    def look_up(self, table: NDArray[Any], points: ArrayLike, beside: float) -> NDArray[Any]:
+        """Return what a table (rows, columns) has for the cells of points (..., 2) of `map` [m]; `beside` the map."""
         found = np.floor(self.to_cells(points))
         with np.errstate(invalid="ignore"):
-            inside = np.asarray(((found >= 0) & (found < self.cells.shape[::-1])).all(-1))
+            inside = np.asarray(((found >= 0) & (found < table.shape[::-1])).all(-1))
         column, row = np.moveaxis(np.where(inside[..., None], found, 0).astype(np.intp), -1, 0)
-        return np.asarray(inside & (self.cells[row, column] >= SOLID))
+        return np.where(inside, table[row, column], beside)
 
 
 def grid_from(

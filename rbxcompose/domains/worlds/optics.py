@@ -10,8 +10,12 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
+from rbxcompose.msgs.builtin_interfaces import Time
+from rbxcompose.msgs.geometry_msgs import TransformStamped
+from rbxcompose.msgs.poses import transform_message
 from rbxcompose.msgs.sensor_msgs import CameraInfo, Image, PointCloud2, PointField
 from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.msgs.tf2_msgs import TFMessage
 
 Numbers = NDArray[np.float64]
 Colours = NDArray[np.uint8]
@@ -31,6 +35,12 @@ def optical_frame(frame: str) -> str:
     if frame.endswith(OPTICAL):
         return frame
     return f"{frame.removesuffix('_frame').removesuffix('_link')}_{OPTICAL}"
+
+
+def optical_link(frame: str, stamp: Time) -> TFMessage:
+    """Return where the optical frame of a camera is in its frame."""
+    link = TransformStamped(Header(stamp, frame), optical_frame(frame), transform_message(TO_OPTICAL))
+    return TFMessage(transforms=(link,))
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections import deque
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
+import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
@@ -14,7 +17,9 @@ from rbxcompose.domains.worlds.world import SimulatedWorld, world_of
 from rbxcompose.msgs.geometry_msgs import Transform
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.poses import pose_of, transform_of
-from rbxcompose.msgs.rbxcompose_msgs import World, WorldRobots
+from rbxcompose.msgs.rbxcompose_msgs import Switches, World, WorldRobots
+from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.sdk.bound import Sender
 from rbxcompose.sdk.ports import BULK
@@ -45,6 +50,11 @@ class WorldSensor(sdk.Component[C]):
     truth = sdk.In(Odometry, "ground_truth")
     moved = sdk.In(TFMessage, "world/moved", is_open=True, may_be_silent=True)
     others = sdk.In(WorldRobots, OTHERS, is_open=True, may_be_silent=True)
+
+    @classmethod
+    def rate_of(cls, config: Any) -> float:
+        """Return how often it measures [Hz]."""
+        return float(config.rate)
 
     @classmethod
     def ports(cls, config: C) -> dict[str, sdk.Port[Any]]:
@@ -102,3 +112,42 @@ def placed(transform: Transform) -> tuple[Pose2, float]:
     """Return the planar part of a transform, and its height [m]."""
     at = transform_of(transform)
     return at.to_pose2(), at.translation[2]
+
+
+class SwitchesConfig(SensorConfig):
+    """What all switches have."""
+
+    rate: sdk.Frequency = Field(50.0, gt=0, le=1000)
+    """How often it says which ones are on."""
+
+
+S = TypeVar("S", bound=SwitchesConfig)
+
+
+class SwitchesSim(WorldSensor[S]):
+    """Switches of one kind around a robot in a simulated world."""
+
+    @classmethod
+    def ports(cls, config: Any) -> dict[str, sdk.Port[Any]]:
+        """Return the ports, with the topic of the switches."""
+        return super().ports(config) | {"switches": sdk.Out(Switches, config.topic, rate=config.rate).named("switches")}
+
+    @abstractmethod
+    def angles(self) -> Mapping[str, float]:
+        """Return in which direction each of the switches is [rad]."""
+
+    @abstractmethod
+    def are_on(self, world: SimulatedWorld, pose: sdk.Pose2) -> Iterable[bool]:
+        """Return which of them are on while the robot is at a pose in `map`."""
+
+    def step(self, dt: float) -> None:
+        """Say which switches are on, if it is known where the robot is."""
+        if self.seen is not None and (place := self.place()) is not None:
+            on = self.are_on(self.seen, place[0])
+            self.tell(self.bound["switches"], switches(self.stamp, self.config.frame, self.angles(), on))
+
+
+def switches(stamp: int, frame: str, angles: Mapping[str, float], on: Iterable[bool]) -> Switches:
+    """Return a message about switches at angles [rad] around the origin of a frame, at a stamp [ns]."""
+    header = Header(stamp=to_time(stamp), frame_id=frame)
+    return Switches(header, tuple(angles), np.array([*angles.values()], float), tuple(map(bool, on)))

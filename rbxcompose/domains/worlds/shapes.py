@@ -1,19 +1,22 @@
-"""What stands or moves in a world beside its map: boxes, cylinders and meshes, and outlines seen from above."""
+"""What is in a world beside its map: boxes, cylinders, meshes, holes, lamps; and outlines from above, of robots too."""
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
-from itertools import pairwise
+from itertools import pairwise, product
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, Transform3, Vector3
+from rbxcompose.domains.body.model import Body, Geometry
 
 Point2 = tuple[float, float]
 FLAT = 1e-12  # an area that is none [m^2]
 STRAIGHT = 1e-9  # a turn that is none [rad]
+LEAST_AREA = 1e-6  # of a hole [m^2]
+RIM = 48  # points on the rim of what is round: up to 0.2 % of its radius is lost
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,3 +312,71 @@ class WorldLight:
     colour: str = ""
     strength: float = 0.6
     """From 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class WorldHole:
+    """A part of the ground that is not there, by the corners of a polygon in `map` [m].
+
+    Raises:
+        ValueError: if it encloses no area.
+    """
+
+    name: str
+    corners: tuple[Point2, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.corners) < 3:
+            raise ValueError("an area has at least three corners")
+        sides = zip(self.corners, (*self.corners[1:], self.corners[0]), strict=True)
+        if abs(sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in sides)) < 2 * LEAST_AREA:
+            raise ValueError("the corners of an area are on one line, or its sides cross")
+
+
+def outline_of(body: Body) -> tuple[float, float]:
+    """Return the radius around the origin of the root, and the height [m], of the collision shapes at rest.
+
+    Meshes are not read. Both are 0 if there are no other shapes.
+    """
+    radius = height = 0.0
+    for x, y, z in _points(body):
+        radius, height = max(radius, math.hypot(x, y)), max(height, z)
+    return radius, height
+
+
+def hull_of(body: Body) -> tuple[Point2, ...]:
+    """Return the corners of the convex hull of the collision shapes at rest, seen from above [m]; meshes are not read.
+
+    They turn left. There are none if there are no other shapes.
+    """
+    return convex_hull((x, y) for x, y, _ in _points(body))
+
+
+def sections_of(body: Body, height: float) -> Iterator[tuple[str, tuple[Point2, ...]]]:
+    """Yield the link and the corners of each collision shape at rest that is at a height [m], seen from above."""
+    poses = body.poses({})
+    for name, link in body.links.items():
+        for shape in link.collisions:
+            points = [poses[name].compose(shape.origin).apply(point) for point in _outermost(shape.geometry)]
+            if points and min(z for *_, z in points) <= height <= max(z for *_, z in points):
+                yield name, convex_hull((x, y) for x, y, _ in points)
+
+
+def _points(body: Body) -> Iterator[Vector3]:
+    poses = body.poses({})
+    for name, link in body.links.items():
+        for shape in link.collisions:
+            yield from map(poses[name].compose(shape.origin).apply, _outermost(shape.geometry))
+
+
+def _outermost(geometry: Geometry) -> Iterator[Vector3]:
+    rim = [(math.cos(math.tau * turn / RIM), math.sin(math.tau * turn / RIM)) for turn in range(RIM)]
+    match geometry.kind, geometry.size:
+        case "box", (x, y, z):
+            yield from product((-x / 2, x / 2), (-y / 2, y / 2), (-z / 2, z / 2))
+        case ("cylinder" | "capsule") as form, (radius, length):
+            top = length / 2 + (radius if form == "capsule" else 0.0)
+            yield from ((radius * x, radius * y, z) for x, y in rim for z in (-top, top))
+        case "sphere", (radius, *_):
+            yield from ((radius * x, radius * y, 0.0) for x, y in rim)
+            yield from ((0.0, 0.0, -radius), (0.0, 0.0, radius))

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2
-from rbxcompose.domains.worlds.contact import TOUCHING, FirstContact, first_contact, overlap, touching
+from rbxcompose.domains.worlds.contact import TOUCHING, FirstContact, first_contact, in_polygon, overlap, touching
 from rbxcompose.domains.worlds.grid_map import GridMap
-from rbxcompose.domains.worlds.ground import WorldHole, in_polygon
 from rbxcompose.domains.worlds.poses import message_of, pose_in
 from rbxcompose.domains.worlds.ray_casting import Numbers, Rays
 from rbxcompose.domains.worlds.shapes import (
@@ -23,6 +22,7 @@ from rbxcompose.domains.worlds.shapes import (
     ShapePath,
     WorldBox,
     WorldCylinder,
+    WorldHole,
     WorldHull,
     WorldLight,
     WorldMesh,
@@ -63,10 +63,6 @@ class SimulatedWorld:
     def rays(self) -> Rays:
         """Return what casts rays in the map."""
         return Rays(self.grid)
-
-    def shapes_at(self, time: float) -> list[WorldShape]:
-        """Return the shapes as they stand at a time [s]."""
-        return [shape.at(time) for shape in self.shapes]
 
     def with_moved(self, places: Mapping[str, tuple[Pose2, float]]) -> SimulatedWorld:
         """Return the same with things elsewhere: their poses in `map`, and the heights [m] of their middles."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 import sys
 from collections.abc import Mapping, Sequence
 
@@ -110,31 +111,21 @@ class _Wheel:
             self._publisher(twist_message(velocity))
 
 
+_ARROWS = {"A": _FORWARD, "B": _BACK, "D": _LEFT, "C": _RIGHT}
 _KEYS = {
     "w": _FORWARD,
     "s": _BACK,
     "a": _LEFT,
     "d": _RIGHT,
-    "\x1b[A": _FORWARD,
-    "\x1b[B": _BACK,
-    "\x1b[D": _LEFT,
-    "\x1b[C": _RIGHT,
-    "\x1bOA": _FORWARD,
-    "\x1bOB": _BACK,
-    "\x1bOD": _LEFT,
-    "\x1bOC": _RIGHT,
     " ": _STILL,
+    **{f"\x1b{mode}{end}": way for mode in "[O" for end, way in _ARROWS.items()},
 }
+_KEY = re.compile(r"\x1b[\[O][ABCD]|.", re.DOTALL)
 
 
 def keys(text: str) -> list[str]:
     """Return the keys that a terminal has sent; the escape sequence of an arrow key counts as one key."""
-    found: list[str] = []
-    while text:
-        length = 3 if text[:3] in _KEYS else 1
-        found.append(text[:length].lower() if length == 1 else text[:length])
-        text = text[length:]
-    return found
+    return [key if len(key) > 1 else key.lower() for key in _KEY.findall(text)]
 
 
 def is_end(key: str) -> bool:

@@ -8,10 +8,8 @@ from pydantic import Field
 
 from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Velocity2
-from rbxcompose.domains.bases.driving import commands_motion
-from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.domains.bases.driving import BaseDriver
 from rbxcompose.msgs.nav2_msgs import Wait
-from rbxcompose.msgs.poses import twist_message
 from rbxcompose.msgs.stamps import to_duration, to_seconds
 
 LONGEST = 24 * 3600.0  # [s]
@@ -57,7 +55,7 @@ class ChoreCore:
 
 
 @sdk.component("chore_sim")
-class ChoreSim(sdk.Component[ChoreSimConfig]):
+class ChoreSim(BaseDriver[ChoreSimConfig]):
     """A chore such as vacuuming: it takes as long as its goal says and moves the base a little.
 
     Its skill is called `chore` unless `connect` names it. A second goal is refused while it is busy.
@@ -69,13 +67,7 @@ class ChoreSim(sdk.Component[ChoreSimConfig]):
     rate = 20.0
     steps_for_goals = True
     simulated = True
-    cmd_vel = sdk.Out(Twist, "cmd_vel", qos="command")
     chore = sdk.ServesAction(Wait, "chore", claims="base", pausable=True)
-
-    @classmethod
-    def capabilities(cls, config: ChoreSimConfig) -> tuple[sdk.Capability, ...]:
-        """Declare how fast it moves the base."""
-        return (commands_motion(config),)
 
     def configure(self) -> None:
         """Do nothing."""
@@ -131,4 +123,4 @@ class ChoreSim(sdk.Component[ChoreSimConfig]):
     def drive(self, velocity: Velocity2) -> None:
         """Publish a velocity."""
         self.moving = velocity != AT_REST
-        self.cmd_vel(twist_message(velocity))
+        super().drive(velocity)

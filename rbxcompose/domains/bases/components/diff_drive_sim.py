@@ -189,7 +189,11 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
     def ports(cls, config: DiffDriveSimConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports, with the rate of the odometry."""
         odom = sdk.Out(Odometry, "odom", rate=config.rate).named("odom")
-        return super().ports(config) | {"odom": odom} | in_world(config)
+        found = super().ports(config) | {"odom": odom}
+        if not config.in_world:
+            return found
+        found |= {"world": IN_WORLD["world"], **BY_PHYSICS} if config.by_physics else IN_WORLD
+        return found | (WITH_WHEELS if config.wheel_distance else {})
 
     @classmethod
     def capabilities(cls, config: DiffDriveSimConfig) -> tuple[sdk.Capability, ...]:
@@ -312,7 +316,7 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
 
     def stay_on_ground(self, world: SimulatedWorld, before: Pose2, wheel_distance: float) -> None:
         """Do not move while a wheel has no ground, and tell which one."""
-        from rbxcompose.domains.worlds.switches import switches
+        from rbxcompose.domains.worlds.sensors import switches  # imports numpy
 
         wheels = {"left": (0.0, wheel_distance / 2), "right": (0.0, -wheel_distance / 2)}
         if self.hangs:
@@ -370,14 +374,6 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
         has_contacts = self.world is not None and not self.config.by_physics
         touched = {"contacts": str(self.contacts)} if has_contacts else {}
         return {"distance driven": f"{self.core.distance:.2f} m", **touched}
-
-
-def in_world(config: DiffDriveSimConfig) -> dict[str, sdk.Port[Any]]:
-    """Return the ports of a base that stands in a world."""
-    if not config.in_world:
-        return {}
-    ports = {"world": IN_WORLD["world"], **BY_PHYSICS} if config.by_physics else IN_WORLD
-    return ports | (WITH_WHEELS if config.wheel_distance else {})
 
 
 def placed(pose: Pose2) -> geometry.Transform:

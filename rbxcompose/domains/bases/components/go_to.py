@@ -10,12 +10,11 @@ from typing import Annotated
 from pydantic import Field
 
 from rbxcompose import sdk
-from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
-from rbxcompose.domains.bases.driving import GoToCore, GoToSettings, commands_motion, least_time
+from rbxcompose.base.geometry import AT_REST, Pose2
+from rbxcompose.domains.bases.driving import BaseDriver, GoToCore, GoToSettings, least_time
 from rbxcompose.domains.worlds.poses import message_of, pose_in
-from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist
+from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
-from rbxcompose.msgs.poses import twist_message
 from rbxcompose.msgs.stamps import LONGEST, to_duration, to_time
 from rbxcompose.msgs.std_msgs import Header
 
@@ -38,7 +37,7 @@ class GoToConfig(sdk.Config):
 
 
 @sdk.component("go_to")
-class GoTo(sdk.Component[GoToConfig]):
+class GoTo(BaseDriver[GoToConfig]):
     """Drives to a pose in `map`: turns to it, drives straight, turns to its heading.
 
     Example:
@@ -47,7 +46,6 @@ class GoTo(sdk.Component[GoToConfig]):
 
     rate = 20.0
     steps_for_goals = True
-    cmd_vel = sdk.Out(Twist, "cmd_vel", qos="command")
     pose = sdk.Looks(source="base_footprint", target=MAP)
     go_to = sdk.ServesAction(NavigateToPose, "go_to", claims="base")
 
@@ -55,9 +53,8 @@ class GoTo(sdk.Component[GoToConfig]):
     def capabilities(cls, config: GoToConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it drives and how near it comes."""
         tolerance = sdk.Setting(config.tolerance, "tolerance")
-        return commands_motion(config), sdk.Navigates(
-            "go_to", tolerance, least_time=partial(fastest, settings_of(config))
-        )
+        goes = sdk.Navigates("go_to", tolerance, least_time=partial(fastest, settings_of(config)))
+        return (*super().capabilities(config), goes)
 
     def configure(self) -> None:
         """Build the core."""
@@ -124,10 +121,6 @@ class GoTo(sdk.Component[GoToConfig]):
         """Command a halt: no step follows while robot time stands still."""
         if self.driving is not None:
             self.drive(AT_REST)
-
-    def drive(self, velocity: Velocity2) -> None:
-        """Publish a velocity."""
-        self.cmd_vel(twist_message(velocity))
 
 
 def fastest(settings: GoToSettings, start: Pose2, goal: Pose2, base: sdk.Drives | None) -> float:

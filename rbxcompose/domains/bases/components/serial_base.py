@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -148,20 +148,9 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
             self.odom(odometry_message(self.odometry, header, BASE))
         self.tf(odometry_transform(self.odometry, header, BASE))
         if self.battery.is_wanted:
-            unknown = math.nan
-            self.battery(
-                BatteryState(
-                    Header(header.stamp),
-                    voltage=state.voltage,
-                    temperature=unknown,
-                    current=unknown,
-                    charge=unknown,
-                    capacity=unknown,
-                    design_capacity=unknown,
-                    percentage=unknown,
-                    present=True,
-                )
-            )
+            unmeasured = ("temperature", "current", "charge", "capacity", "design_capacity", "percentage")
+            unknown: dict[str, Any] = dict.fromkeys(unmeasured, math.nan)
+            self.battery(BatteryState(Header(header.stamp), voltage=state.voltage, present=True, **unknown))
 
     def step(self, dt: float) -> None:
         """Take what the board says, and say how fast its wheels should turn."""
@@ -231,8 +220,7 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
     def hold(self) -> None:
         """Rest: robot time stands still."""
         self.drive.rest()
-        if self.line.is_open:
-            self.say(WheelSpeeds())
+        self.stand()
 
     def go_on(self) -> None:
         """Brake until the next command: robot time stood still, or has jumped."""

@@ -154,14 +154,8 @@ class DiffDriveController(Controller[DiffDriveConfig]):
         tick = self.wheels[0].per_tick
         radius = config.wheel_radius or 1.0 / ((config.ticks_per_metre or math.nan) * tick)
         rolling = WheelGeometry(config.wheel_distance, radius)
-        limits = BaseLimits(
-            config.max_speed,
-            config.max_turn_rate,
-            config.acceleration,
-            config.turn_acceleration,
-            config.jerk,
-            config.turn_jerk,
-        )
+        speeds = config.max_speed, config.max_turn_rate, config.acceleration, config.turn_acceleration
+        limits = BaseLimits(*speeds, config.jerk, config.turn_jerk)
         own = [wheel.rules.limits for wheel in self.wheels]
         least = min((item.acceleration for item in own if item.acceleration is not None), default=math.inf)
         self.drive = WheelDrive(

@@ -14,10 +14,10 @@ import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
-from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
+from rbxcompose.base.geometry import AT_REST, Pose2
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import ANGLE, LENGTH, MOST
-from rbxcompose.domains.bases.driving import commands_motion
+from rbxcompose.domains.bases.driving import BaseDriver
 from rbxcompose.domains.navigation.costs import (
     DEAREST,
     INSCRIBED,
@@ -39,7 +39,6 @@ from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav2_msgs import BackUp as Nav2BackUp
 from rbxcompose.msgs.nav2_msgs import NavigateThroughPoses, NavigateToPose, Spin
 from rbxcompose.msgs.nav_msgs import OccupancyGrid, Path
-from rbxcompose.msgs.poses import twist_message
 from rbxcompose.msgs.rbxcompose_msgs import BackUp, RunMission
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import LONGEST, to_duration, to_time
@@ -135,7 +134,7 @@ class NavigatorConfig(sdk.Config):
 
 
 @sdk.component("navigator")
-class Navigator(sdk.Component[NavigatorConfig]):
+class Navigator(BaseDriver[NavigatorConfig]):
     """Drives to poses of the map on the cheapest way that keeps off walls, and off what its laser sees.
 
     Example:
@@ -144,7 +143,6 @@ class Navigator(sdk.Component[NavigatorConfig]):
 
     made_by = "The section `navigation` runs it."
     rate = 20.0
-    cmd_vel = sdk.Out(geometry.Twist, "cmd_vel", qos="command")
     plan = sdk.Out(Path, "plan")
     costmap = sdk.Out(OccupancyGrid, "global_costmap/costmap", qos="latched")
     map = sdk.In(OccupancyGrid, "map", qos="latched", limits=BULK)
@@ -174,7 +172,7 @@ class Navigator(sdk.Component[NavigatorConfig]):
     def capabilities(cls, config: NavigatorConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it drives and how near it comes."""
         return (
-            commands_motion(config),
+            *super().capabilities(config),
             sdk.Navigates("go_to", sdk.Setting(config.tolerance, "tolerance")),
             sdk.NeedsExtra(sdk.Setting("scipy"), sdk.Setting("navigation")),
         )
@@ -543,10 +541,6 @@ class Navigator(sdk.Component[NavigatorConfig]):
         """Command a halt."""
         self.follower.halt()
         self.drive(AT_REST)
-
-    def drive(self, velocity: Velocity2) -> None:
-        """Publish a velocity."""
-        self.cmd_vel(twist_message(velocity))
 
     def show(self) -> None:
         """Publish the costs, if anybody looks, at most once a second."""

@@ -10,10 +10,10 @@ import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
-from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
+from rbxcompose.base.geometry import AT_REST, Pose2
 from rbxcompose.base.units import LENGTH, TIME
-from rbxcompose.domains.bases.driving import commands_motion
-from rbxcompose.domains.navigation.companion import CompanionSettings, CompanionState, PersonCompanion, whom_to_follow
+from rbxcompose.domains.bases.driving import BaseDriver
+from rbxcompose.domains.navigation.companion import CompanionState, PersonCompanion, whom_to_follow
 from rbxcompose.domains.navigation.costs import CostSettings, CostZone, LayeredCosts
 from rbxcompose.domains.navigation.follower import FollowerSettings
 from rbxcompose.domains.navigation.people import TrackedPerson
@@ -22,10 +22,8 @@ from rbxcompose.domains.worlds.poses import NewestMessage, pose_in, rays_of
 from rbxcompose.domains.worlds.shapes import PolygonFootprint
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_of
 from rbxcompose.manifest.fields import TopicName
-from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav_msgs import OccupancyGrid
 from rbxcompose.msgs.people_msgs import People
-from rbxcompose.msgs.poses import twist_message
 from rbxcompose.msgs.rbxcompose_msgs import FollowPerson
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.sdk.ports import BULK
@@ -71,7 +69,7 @@ class PersonFollowerConfig(sdk.Config):
 
 
 @sdk.component("person_follower")
-class PersonFollower(sdk.Component[PersonFollowerConfig]):
+class PersonFollower(BaseDriver[PersonFollowerConfig]):
     """Drives after the person who is nearest ahead when a goal begins, around what the map and its laser show.
 
     It keeps a distance, and more of it the faster it is, so that it stands when a person who turns back comes up to it.
@@ -85,7 +83,6 @@ class PersonFollower(sdk.Component[PersonFollowerConfig]):
 
     rate = 20.0
     steps_for_goals = True
-    cmd_vel = sdk.Out(Twist, "cmd_vel", qos="command")
     people = sdk.In(People, "people", may_be_silent=True)
     map = sdk.In(OccupancyGrid, "map", qos="latched", limits=BULK, is_open=True, may_be_silent=True)
     follow = sdk.ServesAction(
@@ -108,7 +105,7 @@ class PersonFollower(sdk.Component[PersonFollowerConfig]):
     @classmethod
     def capabilities(cls, config: PersonFollowerConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it drives, and what it imports."""
-        return (commands_motion(config), sdk.NeedsExtra(sdk.Setting("scipy"), sdk.Setting("navigation")))
+        return (*super().capabilities(config), sdk.NeedsExtra(sdk.Setting("scipy"), sdk.Setting("navigation")))
 
     def configure(self) -> None:
         """Follow nobody yet."""
@@ -226,8 +223,8 @@ class PersonFollower(sdk.Component[PersonFollowerConfig]):
                     self.fail(goal, NOBODY, f"nobody was ahead for {patience:g} s")
                 return
             driving = FollowerSettings(config.speed, config.turn_rate, config.acceleration)
-            settings = CompanionSettings(driving, request.distance or config.distance, patience)
-            self.companion = PersonCompanion(settings, target, people)
+            distance = request.distance or config.distance
+            self.companion = PersonCompanion(driving, distance, patience, target, people)
             self.info(f"follows {target.name}")
         companion = self.companion
         self.drive(companion.update(self.now, dt, pose, people, costs))
@@ -275,7 +272,3 @@ class PersonFollower(sdk.Component[PersonFollowerConfig]):
         if self.companion is not None:
             self.companion.halt()
         self.drive(AT_REST)
-
-    def drive(self, velocity: Velocity2) -> None:
-        """Publish a velocity."""
-        self.cmd_vel(twist_message(velocity))

@@ -52,18 +52,9 @@ _LONGEST = 220  # characters of a list of names in a finding
 _NUMBERED = (float, int)
 
 
-def _speed(value: float) -> str:
-    return quantity(value, "m/s")
-
-
-def _turn_rate(value: float) -> str:
-    return quantity(value, "rad/s")
-
-
-def _acceleration(value: float) -> str:
-    return quantity(value, "m/s^2")
-
-
+_speed = partial(quantity, unit="m/s")
+_turn_rate = partial(quantity, unit="rad/s")
+_acceleration = partial(quantity, unit="m/s^2")
 _TOLERANCES: Mapping[str, tuple[tuple[str, ...], Callable[[float], str]]] = {
     "follower.tolerance": (("xy_goal_tolerance",), length),
     "follower.heading_tolerance": (("yaw_goal_tolerance",), angle),
@@ -420,10 +411,6 @@ def _names(given: ForeignMap, *keys: str) -> list[str] | None:
     return None
 
 
-def _other(out: ForeignNavigation, given: ForeignMap) -> None:
-    out.leave_rest(given)
-
-
 _READERS: Mapping[str, Reader] = {  # in the order in which they count
     "map_server": _map_server,
     "amcl": _amcl,
@@ -438,7 +425,7 @@ _READERS: Mapping[str, Reader] = {  # in the order in which they count
     "planner_server": _planners,
     "NavfnROS": _planner,
     "GlobalPlanner": _planner,
-    "move_base": _other,
+    "move_base": ForeignNavigation.leave_rest,
 }
 
 

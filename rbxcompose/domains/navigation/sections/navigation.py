@@ -15,10 +15,16 @@ from rbxcompose.base.geometry import Pose2
 from rbxcompose.compiler.sections.missions import MissionEntry, missions
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.worlds.grid_map import GridMap, MapError, read_map
-from rbxcompose.domains.worlds.ground import WorldHole
-from rbxcompose.domains.worlds.outline import hull_of, outline_of
 from rbxcompose.domains.worlds.sections.world import WorldOfRobot, world
-from rbxcompose.domains.worlds.shapes import CircleFootprint, Footprint, Point2, PolygonFootprint
+from rbxcompose.domains.worlds.shapes import (
+    CircleFootprint,
+    Footprint,
+    Point2,
+    PolygonFootprint,
+    WorldHole,
+    hull_of,
+    outline_of,
+)
 from rbxcompose.domains.worlds.world_file import PlanarPose
 from rbxcompose.manifest.fields import FileName, TopicName
 from rbxcompose.manifest.files import resolve
@@ -263,14 +269,9 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
     model = found.model
     known = contents.of(missions)
     config = {
-        "radius": found.radius,
-        "corners": found.footprint.points if isinstance(found.footprint, PolygonFootprint) else (),
-        "inflation": model.costs.inflation.radius,
+        **_room(found),
         "unknown_is_free": model.costs.unknown,
-        "zones": found.zones,
         **({} if model.costs.map_only else _laser(model.costs.obstacles, wiring)),
-        "sees": model.costs.obstacles.range,
-        "silence": model.costs.obstacles.silence,
         "patience": model.planner.patience,
         **model.follower.model_dump(),
         "recovery": RECOVER,
@@ -289,6 +290,19 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         yield from _people(found, model.people, wiring)
 
 
+def _room(found: NavigationOfRobot) -> dict[str, object]:
+    """Return how much room the robot needs around what it sees."""
+    costs = found.model.costs
+    return {
+        "radius": found.radius,
+        "corners": found.footprint.points if isinstance(found.footprint, PolygonFootprint) else (),
+        "inflation": costs.inflation.radius,
+        "zones": found.zones,
+        "sees": costs.obstacles.range,
+        "silence": costs.obstacles.silence,
+    }
+
+
 def _people(found: NavigationOfRobot, model: PeopleModel, wiring: Wiring) -> Iterator[WantedComponent]:
     laser = _laser(found.model.costs.obstacles, wiring)
     if "scan_frame" in laser:
@@ -298,12 +312,7 @@ def _people(found: NavigationOfRobot, model: PeopleModel, wiring: Wiring) -> Ite
         **laser,
         "distance": model.distance,
         "patience": model.patience,
-        "sees": found.model.costs.obstacles.range,
-        "silence": found.model.costs.obstacles.silence,
-        "radius": found.radius,
-        "corners": found.footprint.points if isinstance(found.footprint, PolygonFootprint) else (),
-        "inflation": found.model.costs.inflation.radius,
-        "zones": found.zones,
+        **_room(found),
         **{name: getattr(driving, name) for name in ("speed", "turn_rate", "acceleration")},
     }
     tracker, sees, names = "people_tracker", laser, ("navigation", "people", "tags", "names")

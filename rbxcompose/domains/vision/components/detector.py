@@ -21,18 +21,10 @@ from rbxcompose import sdk
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.manifest.fields import TopicName
+from rbxcompose.msgs import vision_msgs as vision
 from rbxcompose.msgs.images import WrongPictureError, pixels
 from rbxcompose.msgs.sensor_msgs import Image
 from rbxcompose.msgs.std_msgs import Header
-from rbxcompose.msgs.vision_msgs import (
-    BoundingBox2D,
-    Detection2D,
-    Detection2DArray,
-    ObjectHypothesis,
-    ObjectHypothesisWithPose,
-    Point2D,
-    Pose2D,
-)
 from rbxcompose.sdk.ports import BULK
 
 SILENCE = 2.0  # [s] without a picture after which diagnostics say so
@@ -252,7 +244,7 @@ class Detector(sdk.Component[DetectorConfig]):
         image: sdk.Port[Any] = sdk.In(Image, config.image, qos="bulk", limits=BULK)
         return super().ports(config) | {
             "image": image.named("image"),
-            "found": sdk.Out(Detection2DArray, config.topic).named("found"),
+            "found": sdk.Out(vision.Detection2DArray, config.topic).named("found"),
         }
 
     @classmethod
@@ -301,12 +293,12 @@ class Detector(sdk.Component[DetectorConfig]):
             return str(error)
         chosen = [thing for thing in found if thing.name in config.only or not config.only]
         boxes = tuple(detection(message.header, thing) for thing in chosen)
-        self.bound["found"](Detection2DArray(message.header, boxes))
+        self.bound["found"](vision.Detection2DArray(message.header, boxes))
         return ""
 
 
-def detection(header: Header, thing: FoundThing) -> Detection2D:
+def detection(header: Header, thing: FoundThing) -> vision.Detection2D:
     """Return what was found as a message."""
-    result = ObjectHypothesisWithPose(ObjectHypothesis(thing.name, thing.score))
-    box = BoundingBox2D(Pose2D(Point2D(thing.x, thing.y)), thing.width, thing.height)
-    return Detection2D(header, (result,), box, thing.name)
+    result = vision.ObjectHypothesisWithPose(vision.ObjectHypothesis(thing.name, thing.score))
+    box = vision.BoundingBox2D(vision.Pose2D(vision.Point2D(thing.x, thing.y)), thing.width, thing.height)
+    return vision.Detection2D(header, (result,), box, thing.name)

@@ -14,19 +14,13 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.units import TIME
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import geometry_msgs as geometry
+from rbxcompose.msgs import vision_msgs as vision
 from rbxcompose.msgs.clouds import CloudError, rows_of
 from rbxcompose.msgs.poses import pose_message, pose_of
 from rbxcompose.msgs.rbxcompose_msgs import FindObjects
 from rbxcompose.msgs.sensor_msgs import PointCloud2
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.std_msgs import Header
-from rbxcompose.msgs.vision_msgs import (
-    BoundingBox3D,
-    Detection3D,
-    Detection3DArray,
-    ObjectHypothesis,
-    ObjectHypothesisWithPose,
-)
 from rbxcompose.sdk.ports import BULK
 
 if TYPE_CHECKING:
@@ -122,12 +116,12 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
         cloud = sdk.In(PointCloud2, config.points, qos="bulk", is_open=True, max_rate=rate, limits=BULK)
         found: dict[str, sdk.Port[Any]] = {
             CLOUD: cloud.named(CLOUD),
-            SEEN: sdk.Out(Detection3DArray, config.topic).named(SEEN),
-            TABLE: sdk.Out(Detection3DArray, config.table).named(TABLE),
+            SEEN: sdk.Out(vision.Detection3DArray, config.topic).named(SEEN),
+            TABLE: sdk.Out(vision.Detection3DArray, config.table).named(TABLE),
             LOOK: sdk.Looks(source=config.frame, target=config.level).named(LOOK),
         }
         if config.tags is not None:
-            found[TAGS] = sdk.In(Detection3DArray, config.tags, may_be_silent=True).named(TAGS)
+            found[TAGS] = sdk.In(vision.Detection3DArray, config.tags, may_be_silent=True).named(TAGS)
         return super().ports(config) | found
 
     @classmethod
@@ -154,7 +148,7 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
         self.steady = self.make_look(config.pictures, config.still)
         self.found: list[NamedThing] = []
         self.newest: PointCloud2 | None = None  # one that is to be used
-        self.newest_tags: Detection3DArray | None = None
+        self.newest_tags: vision.Detection3DArray | None = None
         self.came_at, self.newest_at, self.used_at, self.tags_at = self.now, -math.inf, -math.inf, -math.inf
         self.problem, self.outcome, self.said = "", NOT_SEEN, ""
 
@@ -171,7 +165,7 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
             self.newest, self.newest_at = message, self.now
             self.take_cloud()
 
-    def on_tags(self, message: Detection3DArray) -> None:
+    def on_tags(self, message: vision.Detection3DArray) -> None:
         """Keep what tags are seen: where the camera was then may become known later."""
         self.tags_at, self.newest_tags = self.now, message
 
@@ -225,8 +219,8 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
         to_camera = camera.inverse()
         header = Header(message.header.stamp, self.config.frame)
         detections = tuple(detection(header, one.name, one.thing, to_camera) for one in self.found)
-        self.bound[SEEN](Detection3DArray(header, detections))
-        self.bound[TABLE](Detection3DArray(header, (detection(header, TABLE, found.table, to_camera),)))
+        self.bound[SEEN](vision.Detection3DArray(header, detections))
+        self.bound[TABLE](vision.Detection3DArray(header, (detection(header, TABLE, found.table, to_camera),)))
         if self.goal is not None:
             self.judge(self.goal)
 
@@ -283,9 +277,9 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
         self.status(Level.WARN if problem else Level.OK, problem or f"saw {seen}" + " now" * self.is_looking)
 
 
-def detection(header: Header, name: str, thing: TabletopThing, to_camera: Transform3) -> Detection3D:
+def detection(header: Header, name: str, thing: TabletopThing, to_camera: Transform3) -> vision.Detection3D:
     """Return a thing in the level frame as a message in the frame of the camera."""
     pose = pose_message(to_camera.compose(thing.pose))
-    hypothesis = ObjectHypothesis(class_id=thing.kind, score=thing.confidence)
-    result = ObjectHypothesisWithPose(hypothesis, geometry.PoseWithCovariance(pose=pose))
-    return Detection3D(header, (result,), BoundingBox3D(pose, geometry.Vector3(*thing.size)), name)
+    hypothesis = vision.ObjectHypothesis(class_id=thing.kind, score=thing.confidence)
+    result = vision.ObjectHypothesisWithPose(hypothesis, geometry.PoseWithCovariance(pose=pose))
+    return vision.Detection3D(header, (result,), vision.BoundingBox3D(pose, geometry.Vector3(*thing.size)), name)

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rbxcompose import sdk
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.vision.known_tags import KnownTags
-from rbxcompose.domains.vision.tags import SeenTag, TagFinder, board_pose
+from rbxcompose.domains.vision.tags import Numbers, SeenTag, TagFinder, board_pose
 from rbxcompose.domains.worlds.optics import Intrinsics
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import geometry_msgs as geometry
+from rbxcompose.msgs import vision_msgs as vision
 from rbxcompose.msgs.builtin_interfaces import Time
 from rbxcompose.msgs.images import WrongPictureError, grey
 from rbxcompose.msgs.poses import pose_message, transform_message
@@ -22,18 +23,7 @@ from rbxcompose.msgs.sensor_msgs import CameraInfo, Image
 from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.std_msgs import Header, String
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.msgs.vision_msgs import (
-    BoundingBox3D,
-    Detection3D,
-    Detection3DArray,
-    ObjectHypothesis,
-    ObjectHypothesisWithPose,
-)
 from rbxcompose.sdk.ports import BULK
-
-if TYPE_CHECKING:
-    from rbxcompose.domains.vision.known_tags import KnownTags
-from rbxcompose.domains.vision.tags import Numbers
 
 THICK = 0.001  # of the box that stands for a tag [m]
 SILENCE = 2.0  # [s] without a picture after which diagnostics say so
@@ -93,7 +83,7 @@ class TagDetector(sdk.Component[TagDetectorConfig]):
         return super().ports(config) | {
             "image": sdk.In(Image, config.image, qos="bulk", limits=BULK).named("image"),
             "info": sdk.In(CameraInfo, config.info).named("info"),
-            "seen": sdk.Out(Detection3DArray, config.topic).named("seen"),
+            "seen": sdk.Out(vision.Detection3DArray, config.topic).named("seen"),
         }
 
     @classmethod
@@ -143,7 +133,7 @@ class TagDetector(sdk.Component[TagDetectorConfig]):
         seen = [self.sight(tag) for tag in found]
         if camera is not None:
             seen += self.seen_boards(found, camera)
-        self.bound["seen"](Detection3DArray(header, tuple(self.detection(header, one) for one in seen)))
+        self.bound["seen"](vision.Detection3DArray(header, tuple(self.detection(header, one) for one in seen)))
         placed = self.placed(seen)
         if placed and not self.is_ahead(header):
             transforms = [
@@ -202,16 +192,19 @@ class TagDetector(sdk.Component[TagDetectorConfig]):
                 seen.append(Sight((name,), THICK, *placed))
         return seen
 
-    def detection(self, header: Header, one: Sight) -> Detection3D:
+    def detection(self, header: Header, one: Sight) -> vision.Detection3D:
         """Return what was seen as a message; without a pose, its score is 0."""
         pose = geometry.PoseWithCovariance()
-        box = BoundingBox3D()
+        box = vision.BoundingBox3D()
         if one.pose is not None and one.covariance is not None:
             pose = geometry.PoseWithCovariance(pose_message(one.pose), one.covariance.ravel())
-            box = BoundingBox3D(pose.pose, geometry.Vector3(one.size, one.size, THICK))
+            box = vision.BoundingBox3D(pose.pose, geometry.Vector3(one.size, one.size, THICK))
         score = 0.0 if one.pose is None else 1.0 - one.doubt
-        results = [ObjectHypothesisWithPose(ObjectHypothesis(class_id=name, score=score), pose) for name in one.names]
-        return Detection3D(header, tuple(results), box, one.name)
+        results = [
+            vision.ObjectHypothesisWithPose(vision.ObjectHypothesis(class_id=name, score=score), pose)
+            for name in one.names
+        ]
+        return vision.Detection3D(header, tuple(results), box, one.name)
 
     def step(self, dt: float) -> None:
         """Report whether pictures come, and whether they can be used."""

@@ -15,10 +15,8 @@ from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Pose2, Transform3, Velocity2, rotate, wrap_angle
 from rbxcompose.base.levels import Level
 from rbxcompose.base.units import LENGTH, TIME
-from rbxcompose.domains.bases.driving import GoToCore, GoToSettings, commands_motion
+from rbxcompose.domains.bases.driving import BaseDriver, GoToCore, GoToSettings
 from rbxcompose.domains.vision.tag_watcher import SQUARE, TagWatcher, TagWatcherConfig, WatchedTag
-from rbxcompose.msgs.geometry_msgs import Twist
-from rbxcompose.msgs.poses import twist_message
 from rbxcompose.msgs.rbxcompose_msgs import DockAt
 
 SILENCE = 1.0  # [s] without anything from the camera, after which it stands
@@ -242,7 +240,7 @@ class Docking:
 
 
 @sdk.component("tag_docking")
-class TagDocking(TagWatcher[TagDockingConfig]):
+class TagDocking(BaseDriver[TagDockingConfig], TagWatcher[TagDockingConfig]):
     """Drives in front of a tag or a board, and faces it squarely.
 
     It turns around if it does not see the tag, drives to a point on its normal, and straight in. Between pictures it
@@ -254,15 +252,9 @@ class TagDocking(TagWatcher[TagDockingConfig]):
 
     rate = 20.0
     steps_for_goals = True
-    cmd_vel = sdk.Out(Twist, "cmd_vel", qos="command")
     dock = sdk.ServesAction(
         DockAt, "dock_at", claims="base", outcomes=ENDS, measures={"distance": LENGTH, "patience": TIME}
     )
-
-    @classmethod
-    def capabilities(cls, config: TagDockingConfig) -> tuple[sdk.Capability, ...]:
-        """Declare how fast it drives."""
-        return (commands_motion(config),)
 
     def configure(self) -> None:
         """Dock at nothing yet."""
@@ -348,7 +340,3 @@ class TagDocking(TagWatcher[TagDockingConfig]):
     def stop(self) -> None:
         """Command a halt."""
         self.drive(AT_REST)
-
-    def drive(self, velocity: Velocity2) -> None:
-        """Publish a velocity."""
-        self.cmd_vel(twist_message(velocity))

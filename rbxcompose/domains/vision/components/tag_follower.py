@@ -15,10 +15,8 @@ from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Vector3, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.base.units import LENGTH, TIME
-from rbxcompose.domains.bases.driving import commands_motion
+from rbxcompose.domains.bases.driving import BaseDriver
 from rbxcompose.domains.vision.tag_watcher import TagWatcher, TagWatcherConfig, WatchedTag
-from rbxcompose.msgs.geometry_msgs import Twist
-from rbxcompose.msgs.poses import twist_message
 from rbxcompose.msgs.rbxcompose_msgs import FollowTag
 
 LOST, NOT_SEEN = "lost", "not_seen"
@@ -110,7 +108,7 @@ def _nearer(last: float, goal: float, most: float) -> float:
 
 
 @sdk.component("tag_follower")
-class TagFollower(TagWatcher[TagFollowerConfig]):
+class TagFollower(BaseDriver[TagFollowerConfig], TagWatcher[TagFollowerConfig]):
     """Drives so that a tag stays ahead at a distance: the book's figures, with angles for distances to the side.
 
     Without the tag it slows down; it stops at once if the camera is silent. It sees no obstacles: give it a mux with
@@ -121,7 +119,6 @@ class TagFollower(TagWatcher[TagFollowerConfig]):
     """
 
     rate = 20.0
-    cmd_vel = sdk.Out(Twist, "cmd_vel", qos="command")
     follow = sdk.ServesAction(
         FollowTag,
         "follow_tag",
@@ -129,11 +126,6 @@ class TagFollower(TagWatcher[TagFollowerConfig]):
         outcomes={LOST: "failure", NOT_SEEN: "failure"},
         measures={"distance": LENGTH, "patience": TIME, "duration": TIME},
     )
-
-    @classmethod
-    def capabilities(cls, config: TagFollowerConfig) -> tuple[sdk.Capability, ...]:
-        """Declare how fast it drives."""
-        return (commands_motion(config),)
 
     def configure(self) -> None:
         """Follow nothing yet."""
@@ -181,12 +173,12 @@ class TagFollower(TagWatcher[TagFollowerConfig]):
         self.drives = True
         aim = self.aim()
         if self.silent > config.silence:
-            self.send(self.following.halt())
+            self.drive(self.following.halt())
         elif aim is None or self.now - self.seen > SOON:
-            self.send(self.following.without(dt))
+            self.drive(self.following.without(dt))
         else:
             asked = goal.request.distance if goal is not None else 0.0
-            self.send(self.following.towards(config, asked or config.distance, *aim, dt))
+            self.drive(self.following.towards(config, asked or config.distance, *aim, dt))
         gone = self.now - max(self.seen, self.began)
         self.status(Level.WARN if problem else Level.OK, problem or ("follows" if gone <= SOON else "has lost the tag"))
         if goal is not None:
@@ -234,8 +226,4 @@ class TagFollower(TagWatcher[TagFollowerConfig]):
     def rest(self) -> None:
         """Command a halt."""
         self.drives = False
-        self.send(self.following.halt())
-
-    def send(self, velocity: Velocity2) -> None:
-        """Publish a velocity."""
-        self.cmd_vel(twist_message(velocity))
+        self.drive(self.following.halt())

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.domains.worlds.optics import picture_message
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.sensor_msgs import Image
 from rbxcompose.msgs.stamps import to_time
@@ -67,8 +68,7 @@ class TestPicture(sdk.Component[TestPictureConfig]):
         self.time += dt
         picture = with_square(self.bars, self.time)
         header = Header(stamp=to_time(self.stamp), frame_id=self.config.frame)
-        height, width, _ = picture.shape
-        self.image(Image(header, height, width, "rgb8", 0, 3 * width, picture.tobytes()))
+        self.image(picture_message(header, picture))
 
 
 def bars(width: int, height: int) -> np.ndarray[Any, np.dtype[np.uint8]]:

@@ -11,10 +11,8 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.vision.calibration import read_calibration
-from rbxcompose.domains.worlds.optics import TO_OPTICAL, info_message, optical_frame
+from rbxcompose.domains.worlds.optics import info_message, optical_frame, optical_link
 from rbxcompose.manifest.fields import TopicName
-from rbxcompose.msgs.geometry_msgs import TransformStamped
-from rbxcompose.msgs.poses import transform_message
 from rbxcompose.msgs.sensor_msgs import CameraInfo, Image
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
@@ -142,10 +140,7 @@ class UsbCamera(sdk.Component[UsbCameraConfig]):
         self.image(Image(header, height, width, "bgr8", 0, 3 * width, picture.tobytes()))
         self.state = TaskStatus(Level.OK, f"{width} x {height}", {"device": self.config.device})
         if "tf" in self.bound:
-            mounted = TransformStamped(
-                Header(header.stamp, self.config.frame), header.frame_id, transform_message(TO_OPTICAL)
-            )
-            self.bound["tf"](TFMessage(transforms=(mounted,)))
+            self.bound["tf"](optical_link(self.config.frame, header.stamp))
         if (known := self.known) is None:
             return
         if (known.width, known.height) == (width, height):

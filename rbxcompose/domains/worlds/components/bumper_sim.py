@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from rbxcompose import sdk
-from rbxcompose.domains.worlds.switches import SwitchesConfig, SwitchesSim
+from rbxcompose.domains.worlds.sensors import SwitchesConfig, SwitchesSim
 from rbxcompose.domains.worlds.world import SimulatedWorld
 from rbxcompose.manifest.fields import TopicName
 
@@ -45,11 +45,6 @@ class BumperSim(SwitchesSim[BumperSimConfig]):
     Example:
         bumpers: {type: bumper_sim, bumpers: {left: [0 deg, 90 deg], right: [-90 deg, 0 deg]}}
     """
-
-    @classmethod
-    def topic_of(cls, config: BumperSimConfig) -> str:
-        """Return where it publishes."""
-        return config.topic
 
     def angles(self) -> Mapping[str, float]:
         """Return the middle of each bumper [rad]."""

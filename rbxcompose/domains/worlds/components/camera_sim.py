@@ -19,14 +19,13 @@ from rbxcompose.domains.worlds.optics import (
     depth_message,
     info_message,
     optical_frame,
+    optical_link,
     picture_message,
 )
 from rbxcompose.domains.worlds.sensors import SensorConfig, WorldSensor
 from rbxcompose.domains.worlds.shapes import WorldShape
 from rbxcompose.manifest.fields import TopicName
-from rbxcompose.msgs.geometry_msgs import TransformStamped
 from rbxcompose.msgs.images import pixels
-from rbxcompose.msgs.poses import transform_message
 from rbxcompose.msgs.sensor_msgs import CameraInfo, Image, PointCloud2
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Empty, Header
@@ -130,11 +129,6 @@ class CameraSim(WorldSensor[CameraSimConfig]):
     """
 
     @classmethod
-    def rate_of(cls, config: CameraSimConfig) -> float:
-        """Return how often it takes a picture [Hz]."""
-        return config.rate
-
-    @classmethod
     def ports(cls, config: CameraSimConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports, with the topics of its pictures."""
         topic, rate = config.topic, config.rate
@@ -187,9 +181,7 @@ class CameraSim(WorldSensor[CameraSimConfig]):
         config = self.config
         header = Header(stamp=to_time(self.stamp), frame_id=config.optical_frame)
         if "tf" in self.bound:
-            mounted = transform_message(TO_OPTICAL)
-            frame = Header(stamp=header.stamp, frame_id=config.frame)
-            self.bound["tf"](TFMessage(transforms=(TransformStamped(frame, header.frame_id, mounted),)))
+            self.bound["tf"](optical_link(config.frame, header.stamp))
         self.tell(self.bound["info"], info_message(header, self.camera))
         # Asked once for each picture: diagnostics count what nobody wants, too.
         self.wanted = {name for name in PICTURES if name in self.bound and self.bound[name].is_wanted}

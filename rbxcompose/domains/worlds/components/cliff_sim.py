@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from pydantic import Field
 
 from rbxcompose import sdk
-from rbxcompose.domains.worlds.switches import SwitchesConfig, SwitchesSim
+from rbxcompose.domains.worlds.sensors import SwitchesConfig, SwitchesSim
 from rbxcompose.domains.worlds.world import SimulatedWorld
 from rbxcompose.manifest.fields import TopicName
 
@@ -31,11 +31,6 @@ class CliffSim(SwitchesSim[CliffSimConfig]):
     Example:
         cliffs: {type: cliff_sim, sensors: {left: [12 cm, 10 cm], right: [12 cm, -10 cm]}}
     """
-
-    @classmethod
-    def topic_of(cls, config: CliffSimConfig) -> str:
-        """Return where it publishes."""
-        return config.topic
 
     @classmethod
     def capabilities(cls, config: CliffSimConfig) -> tuple[sdk.Capability, ...]:

@@ -49,11 +49,6 @@ class ImuSim(WorldSensor[ImuSimConfig]):
     """
 
     @classmethod
-    def rate_of(cls, config: ImuSimConfig) -> float:
-        """Return how often it measures [Hz]."""
-        return config.rate
-
-    @classmethod
     def ports(cls, config: ImuSimConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports, with its topic."""
         found = super().ports(config) | {"imu": sdk.Out(Imu, config.topic, rate=config.rate).named("imu")}

@@ -49,11 +49,6 @@ class LaserSim(WorldSensor[LaserSimConfig]):
     """
 
     @classmethod
-    def rate_of(cls, config: LaserSimConfig) -> float:
-        """Return how often it scans [Hz]."""
-        return config.rate
-
-    @classmethod
     def ports(cls, config: LaserSimConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports, with the topic of the scans."""
         return super().ports(config) | {"scan": sdk.Out(LaserScan, config.topic, rate=config.rate).named("scan")}

@@ -18,10 +18,10 @@ from rbxcompose.domains.worlds.optics import TO_OPTICAL, depth_message, optical_
 from rbxcompose.domains.worlds.physics.conversion import GROUND
 from rbxcompose.domains.worlds.physics.engine import PhysicsWorld
 from rbxcompose.domains.worlds.physics.looks import DepthPicture, PhysicsCamera
-from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, PhysicsServo, outline_body
+from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, outline_body
 from rbxcompose.domains.worlds.poses import message_of
 from rbxcompose.domains.worlds.sensors import OTHERS
-from rbxcompose.domains.worlds.shapes import ShapePath, WorldShape
+from rbxcompose.domains.worlds.shapes import ShapePath
 from rbxcompose.domains.worlds.world import MAP_FRAME, world_of
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import Odometry
@@ -157,10 +157,12 @@ class PhysicsSim(sdk.Component[PhysicsConfig]):
             {name: Path(file) for name, file in config.meshes.items()},
             drives=config.drives,
             wheel_distance=config.wheel_distance,
-            servos={name: PhysicsServo(effort=effort) for name, effort in config.servos.items()},
+            servos=config.servos,
         )
         self.known = world
-        world = replace(world, shapes=(*world.shapes, *map(kinematic, world.robots)))
+        # Other robots are moved, and nothing else moves them.
+        others = (replace(one, path=ShapePath(((0.0, one.pose.x, one.pose.y),))) for one in world.robots)
+        world = replace(world, shapes=(*world.shapes, *others))
         loose = {shape.name: shape.mass for shape in world.shapes if shape.mass}
         self.sensors = {topic: one for topic, one in config.sensors.items() if one.frame in robot.body.links}
         cameras = {topic: one for topic, sensor in self.sensors.items() if (one := sensor.camera) is not None}
@@ -305,11 +307,6 @@ class PhysicsSim(sdk.Component[PhysicsConfig]):
     def summary(self) -> dict[str, str]:
         """Report how often it began to touch something."""
         return {"contacts": str(self.contacts)}
-
-
-def kinematic(robot: WorldShape) -> WorldShape:
-    """Return another robot as a shape that is moved, and that nothing else moves."""
-    return replace(robot, path=ShapePath(((0.0, robot.pose.x, robot.pose.y),)))
 
 
 def shooting(topic: str) -> tuple[str, str, str]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.worlds.physics.rigid import GRAVITY
-from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, PhysicsServo, PhysicsWheels, PlacedParts, rolls_freely
+from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, PhysicsWheels, PlacedParts, rolls_freely
 from rbxcompose.domains.worlds.physics.solids import BodyRepair, BodyRepairs
 
 WHEEL_LAG = 0.02  # time constant of wheels that carry the robot and do not slip [s]
@@ -27,8 +27,8 @@ Model = Any  # of an extra, whose stubs are incomplete
 
 def add_actuators(
     spec: Model, robot: PhysicsRobot, placed: PlacedParts, wheels: PhysicsWheels | None, ground: float
-) -> Mapping[str, PhysicsServo]:
-    """Add one for each driven wheel and each held joint, without gains yet; return how the latter are held.
+) -> Mapping[str, float | None]:
+    """Add one for each driven wheel and each held joint, without gains yet; return the efforts that hold the latter.
 
     Raises:
         ValueError: if the robot names a joint that does not move.
@@ -37,17 +37,17 @@ def add_actuators(
     for name in driving:
         _add_actuator(spec, name)
     known = {part.joint.name for part in placed.parts if part.joint}
-    for name in (*robot.servos, *robot.unheld):
+    for name in robot.servos:
         if name not in known:
             raise ValueError(f"'{name}' is no joint that moves")
     servos = {}
     for index, part in enumerate(placed.parts):
         joint = part.joint
-        if joint is None or joint.mimic is not None or joint.name in (*driving, *robot.unheld):
+        if joint is None or joint.mimic is not None or joint.name in driving:
             continue
         if joint.name not in robot.servos and rolls_freely(placed, index, ground):
             continue
-        servos[joint.name] = robot.servos.get(joint.name, PhysicsServo())
+        servos[joint.name] = robot.servos.get(joint.name)
         _add_actuator(spec, joint.name)
     return servos
 
@@ -86,7 +86,7 @@ class Gains:
     placed: PlacedParts
     repairs: BodyRepairs
 
-    def set(self, wheels: PhysicsWheels | None, servos: Mapping[str, PhysicsServo]) -> None:
+    def set(self, wheels: PhysicsWheels | None, servos: Mapping[str, float | None]) -> None:
         """Set them, and the inertia of gears."""
         import mujoco
 
@@ -97,8 +97,8 @@ class Gains:
         moments = np.diag(inertia)
         if wheels is not None:
             self._drive(wheels, moments)
-        for name, servo in servos.items():
-            self._hold(name, servo, float(moments[self._dof(name)]))
+        for name, effort in servos.items():
+            self._hold(name, effort, float(moments[self._dof(name)]))
         for joint in (part.joint for part in self.placed.parts):
             if joint is not None and joint.mimic is not None:
                 dof, leader = self._dof(joint.name), self._dof(joint.mimic.joint)
@@ -118,17 +118,17 @@ class Gains:
             self.model.actuator_gainprm[number, 0], self.model.actuator_biasprm[number, 2] = gain, -gain
             self.model.actuator_forcerange[number] = -effort, effort
 
-    def _hold(self, name: str, servo: PhysicsServo, moment: float) -> None:
+    def _hold(self, name: str, effort: float | None, moment: float) -> None:
         """Let a joint follow a position: torque = stiffness (wanted - position) - damping speed, up to its effort."""
         dof, number = self._dof(name), self.model.actuator(f"joint {name}").id
         joint = self.robot.body.joints[name]
         # Without an effort, three times what lifts all that it carries at the distance that its inertia shows.
         carried = float(self.model.body_subtreemass[self.model.dof_bodyid[dof]])
         enough = 3 * GRAVITY * (carried if joint.slides else math.sqrt(carried * moment))
-        effort = servo.effort if servo.effort is not None else self._effort(name, enough)
+        effort = effort if effort is not None else self._effort(name, enough)
         gear = effort / SPIN_UP[joint.slides]
-        stiffness = servo.stiffness if servo.stiffness is not None else effort / SAG[joint.slides]
-        damping = servo.damping if servo.damping is not None else 2 * math.sqrt(stiffness * (moment + gear))
+        stiffness = effort / SAG[joint.slides]
+        damping = 2 * math.sqrt(stiffness * (moment + gear))
         fastest = joint.limits.velocity if joint.limits and joint.limits.velocity else SPIN_UP[joint.slides] / 10
         self.model.dof_armature[dof], self.model.dof_damping[dof] = gear, DRAG * effort / fastest
         self.model.actuator_gainprm[number, 0] = stiffness

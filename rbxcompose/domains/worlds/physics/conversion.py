@@ -21,16 +21,8 @@ from rbxcompose.base.geometry import Quaternion, Transform3, quaternion_between,
 from rbxcompose.domains.body.model import BodyJoint
 from rbxcompose.domains.worlds.contact import MAP
 from rbxcompose.domains.worlds.grid_map import wall_rectangles
+from rbxcompose.domains.worlds.physics import looks
 from rbxcompose.domains.worlds.physics.actuators import Gains, add_actuators, add_followers
-from rbxcompose.domains.worlds.physics.looks import (
-    WALLS,
-    PhysicsCamera,
-    add_lights,
-    add_looks,
-    add_tag,
-    colour_ground,
-    colour_of,
-)
 from rbxcompose.domains.worlds.physics.rigid import GRAVITY, RigidPart, ensure_mass, rigid_parts
 from rbxcompose.domains.worlds.physics.robot import (
     LEVEL,
@@ -81,7 +73,6 @@ class PhysicsModel:
 
     model: Model
     robot: PhysicsRobot
-    world: SimulatedWorld
     wheels: PhysicsWheels | None
     """None for a robot that stands."""
     signs: Mapping[str, float]
@@ -93,10 +84,6 @@ class PhysicsModel:
     """What each shape (geom) belongs to: a link, `the ground`, `map`, or a shape of the world."""
     things: Mapping[str, int]
     """The body of each shape of the world that moves."""
-    height: float
-    """Of the base above the ground at the start [m]."""
-    free_base: int | None
-    """Where the pose of the root begins in `qpos`; None for a robot that stands."""
     repairs: tuple[BodyRepair, ...]
 
 
@@ -104,7 +91,7 @@ def convert(
     robot: PhysicsRobot,
     world: SimulatedWorld,
     loose: Mapping[str, float] = {},
-    cameras: Mapping[str, PhysicsCamera] = {},
+    cameras: Mapping[str, looks.PhysicsCamera] = {},
     *,
     timestep: float = TIMESTEP,
 ) -> PhysicsModel:
@@ -127,7 +114,7 @@ class _Conversion:
         robot: PhysicsRobot,
         world: SimulatedWorld,
         loose: Mapping[str, float],
-        cameras: Mapping[str, PhysicsCamera],
+        cameras: Mapping[str, looks.PhysicsCamera],
         timestep: float,
     ) -> None:
         import mujoco
@@ -149,7 +136,7 @@ class _Conversion:
         self.pushed: list[str] = []  # and of those of loose things
         parts = rigid_parts(robot.body, robot.meshes, self.repairs)
         self.placed: PlacedParts = placed_parts(robot, parts)
-        self.wheels = None if robot.drives is False else find_wheels(robot, self.placed)
+        self.wheels = None if robot.drives is False else find_wheels(self.placed)
         self.driving = self.wheels.names if self.wheels else ()
         self.stands = self.wheels is None and not robot.drives
         if not self.stands:
@@ -242,7 +229,7 @@ class _Conversion:
                 raise TypeError(f"'{shape.name}' is a part of a shape")
         at.pop("mass", None)
         for tag in shape.tags if self.cameras else ():
-            add_tag(self.spec, holder, tag, shape.solid.height / 2, at)
+            looks.add_tag(self.spec, holder, tag, shape.solid.height / 2, at)
 
     def _add_hulls(
         self, holder: Model, shape: WorldShape, parts: Sequence[tuple[float, WorldHull]], at: Mapping[str, Any]
@@ -383,22 +370,18 @@ class _Conversion:
             if belongs is None:  # a tag
                 continue
             if belongs == GROUND:
-                colour_ground(self.spec, geom)
+                looks.colour_ground(self.spec, geom)
             elif geom.group == OF_WORLD:
-                geom.rgba = (*WALLS, 1.0) if belongs == MAP else colour_of(colours.get(belongs, ""))
+                geom.rgba = (*looks.WALLS, 1.0) if belongs == MAP else looks.colour_of(colours.get(belongs, ""))
         parts = list(zip(self.bodies, self.placed.parts, strict=True))
-        add_looks(self.spec, self.robot, parts, self.cameras, self.repairs)
-        add_lights(self.spec, self.world.lights)
+        looks.add_looks(self.spec, self.robot, parts, self.cameras, self.repairs)
+        looks.add_lights(self.spec, self.world.lights)
 
     def _without_overlaps(self) -> Model:
         """Return the compiled model in which links that overlap at the start do not collide."""
-        owner = {link: index for index, part in enumerate(self.placed.parts) for link in part.links}
-        pairs = {frozenset((owner[a], owner[b])) for a, b in self.robot.ignored if a in owner and b in owner}
         if self.stands:  # neighbours of what is fixed to the ground collide in MuJoCo, other neighbours do not
-            pairs |= {frozenset((0, index)) for index, part in enumerate(self.placed.parts) if part.parent == 0}
-        for pair in sorted(map(sorted, pairs)):
-            if len(pair) == 2:
-                self.spec.add_exclude(bodyname1=f"part {pair[0]}", bodyname2=f"part {pair[1]}")
+            for index in (index for index, part in enumerate(self.placed.parts) if part.parent == 0):
+                self.spec.add_exclude(bodyname1="part 0", bodyname2=f"part {index}")
         model = self.spec.compile()
         data = self._at_start(model)
         found: dict[tuple[int, int], tuple[str, str]] = {}
@@ -444,22 +427,16 @@ class _Conversion:
         return PhysicsModel(
             model,
             self.robot,
-            self.world,
             self.wheels,
             signs,
             poses,
             joints,
             {geom: self.names.get(model.geom(geom).name, "") for geom in range(model.ngeom)},
             {name: int(model.body(_thing(name)).id) for name in moved},
-            -self.ground,
-            None if self.stands else int(model.joint("base").qposadr[0]),
             tuple(dict.fromkeys(self.repairs)),
         )
 
     def _speed(self, joint: BodyJoint) -> float:
-        servo = self.robot.servos.get(joint.name)
-        if servo is not None and servo.speed is not None:
-            return servo.speed or math.inf
         return joint.limits.velocity or math.inf if joint.limits else math.inf
 
 

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import NO_TRANSLATION, Pose2, Transform3, Vector3, Velocity2, quaternion_from_yaw
+from rbxcompose.base.geometry import Pose2, Transform3, Vector3, Velocity2
 from rbxcompose.domains.worlds.inertial import ImuReading
-from rbxcompose.domains.worlds.physics.conversion import OF_ROBOT, OF_WORLD, TIMESTEP, PhysicsModel, convert, xyzw
+from rbxcompose.domains.worlds.physics.conversion import OF_ROBOT, TIMESTEP, PhysicsModel, convert, xyzw
 from rbxcompose.domains.worlds.physics.looks import DepthPicture, Eyes, PhysicsCamera
 from rbxcompose.domains.worlds.physics.robot import PhysicsRobot
 from rbxcompose.domains.worlds.physics.solids import BodyRepair, rotation_matrix
@@ -21,7 +21,6 @@ from rbxcompose.domains.worlds.world import SimulatedWorld
 Numbers = NDArray[np.float64]
 HOLDING = 0.05  # [s] in which wheels make up for an angle that they are behind
 BEHIND = 0.1  # [m/s] that they turn faster for that, at most
-_SEEN = np.array([group == OF_WORLD for group in range(6)], np.uint8)  # groups that rays see
 
 
 class UnstablePhysicsError(Exception):
@@ -248,21 +247,15 @@ class PhysicsWorld:
 
     @property
     def wheel_angles(self) -> tuple[float, float]:
-        """Return how far the left and the right wheels have turned ahead [rad], whether they slipped or not."""
-        return self._of_wheels(self.position)
+        """Return how far the left and the right wheels have turned ahead [rad], whether they slipped or not.
 
-    @property
-    def wheel_speeds(self) -> tuple[float, float]:
-        """Return how fast the left and the right wheels turn ahead [rad/s]."""
-        return self._of_wheels(self.velocity)
-
-    def _of_wheels(self, value: Callable[[str], float]) -> tuple[float, float]:
-        """Return the mean of a value of the wheels at each side; 0 without wheels."""
+        It is the mean of those at each side, and 0 without wheels.
+        """
         wheels, signs = self.converted.wheels, self.converted.signs
         if wheels is None:
             return 0.0, 0.0
         sides = (wheels.left, wheels.right)
-        left, right = (sum(value(name) * signs[name] for name in side) / len(side) for side in sides)
+        left, right = (sum(self.position(name) * signs[name] for name in side) / len(side) for side in sides)
         return left, right
 
     @property
@@ -293,22 +286,6 @@ class PhysicsWorld:
         x, y, z = self._data.xpos[body].tolist()
         return Transform3((x, y, z), xyzw(iter(self._data.xquat[body].tolist())))
 
-    def put(self, pose: Pose2) -> None:
-        """Put a robot that drives at a pose in `map`, at rest on its wheels; its joints stay where they are.
-
-        Raises:
-            ValueError: if it stands fixed to the ground.
-        """
-        place = self.converted.free_base
-        if place is None:
-            raise ValueError("this robot is fixed to the ground")
-        lifted = Transform3((pose.x, pose.y, self.converted.height), quaternion_from_yaw(pose.heading))
-        at = lifted.compose(self.converted.links[self.converted.robot.base_link][1].inverse())
-        x, y, z, w = at.rotation
-        self._data.qpos[place : place + 7] = (*at.translation, w, x, y, z)
-        self._data.qvel[:] = 0.0
-        self._mj.mj_forward(self._model, self._data)
-
     def contacts(self) -> list[Touch]:
         """Return where links of the robot touch anything but links that they are fixed to."""
         found = []
@@ -329,21 +306,6 @@ class PhysicsWorld:
             point, normal = (px, py, pz), (nx, ny, nz)
             found.append(Touch(names[link], names[other], point, normal, float(force[0]), all(own)))
         return found
-
-    def ray(self, link: str, directions: ArrayLike, most: float, origin: Vector3 = NO_TRANSLATION) -> Numbers:
-        """Return how far rays go [m] until they hit anything but the robot itself; inf for `most` [m] and beyond.
-
-        `origin` [m] and `directions` (n, 3), unit vectors, are in the frame of a link.
-        """
-        pose = self.pose_of(link)
-        vectors = np.ascontiguousarray(np.asarray(directions, float).reshape(-1, 3) @ rotation_matrix(pose.rotation).T)
-        count = len(vectors)
-        hit, found = np.empty(count, np.int32), np.empty(count)
-        begin = np.array(pose.apply(origin))
-        self._mj.mj_multiRay(
-            self._model, self._data, begin, vectors.ravel(), _SEEN, 1, -1, hit, found, None, count, most
-        )
-        return np.where((hit >= 0) & (found < most), found, math.inf)
 
     def imu(self, link: str) -> ImuReading:
         """Return what an inertial sensor at the origin of a link measures."""

@@ -23,20 +23,6 @@ DIRECTIONS = 32  # in which that is tried
 
 
 @dataclass(frozen=True, slots=True)
-class PhysicsServo:
-    """How a joint is held at its target. What is None follows from the URDF and from what the joint moves."""
-
-    effort: float | None = None
-    """Greatest torque [Nm] or force [N]. Default: the effort of the URDF."""
-    stiffness: float | None = None
-    """Torque for each radian that is missing [Nm/rad], or force for each metre. Default: all of it at 3 deg or 3 mm."""
-    damping: float | None = None
-    """Torque against the velocity [Nm s/rad, N s/m]. Default: critical for the inertia at rest."""
-    speed: float | None = None
-    """How fast the set point moves to a target [rad/s, m/s]. Default: the velocity of the URDF; 0 is at once."""
-
-
-@dataclass(frozen=True, slots=True)
 class PhysicsWheels:
     """The joints of the wheels that drive, by side."""
 
@@ -62,29 +48,19 @@ class PhysicsRobot:
     """The file of each mesh, by its name in the URDF."""
     drives: bool | None = None
     """Whether it moves freely on wheels; else it is fixed to the ground. Default: whether wheels are found."""
-    left_wheels: tuple[str, ...] = ()
-    """The joints that drive at its left. Default: see `find_wheels`."""
-    right_wheels: tuple[str, ...] = ()
-    """The joints that drive at its right."""
     wheel_radius: float = 0.035
     """Of the wheels that are added if the body has none [m]."""
     wheel_distance: float = 0.23
     """Between the middles of the wheels that are added [m]."""
-    base: str = ""
-    """The link that is put at the start. Default: `base_footprint`, or the root."""
-    servos: Mapping[str, PhysicsServo] = field(default_factory=dict)
-    """How joints are held; one that is not named is held by its URDF."""
-    unheld: frozenset[str] = frozenset()
-    """Joints that nothing holds. Those that carry unpowered wheels are found without."""
+    servos: Mapping[str, float | None] = field(default_factory=dict)
+    """The greatest torque [Nm] or force [N] that holds joints; None is what the URDF says, as for other joints."""
     positions: Mapping[str, float] = field(default_factory=dict)
     """Of joints at the start [rad or m]. Default: at rest."""
-    ignored: Sequence[tuple[str, str]] = ()
-    """Pairs of links that never touch each other."""
 
     @property
     def base_link(self) -> str:
         """Return the link that is put at the start."""
-        return self.base or (FOOTPRINT if FOOTPRINT in self.body.links else self.body.own_root)
+        return FOOTPRINT if FOOTPRINT in self.body.links else self.body.own_root
 
 
 def outline_body(radius: float, height: float) -> Body:
@@ -133,13 +109,7 @@ class PlacedParts:
 
 
 def placed_parts(robot: PhysicsRobot, parts: Sequence[RigidPart]) -> PlacedParts:
-    """Return parts with their places at the start.
-
-    Raises:
-        ValueError: if the base is no link.
-    """
-    if robot.base_link not in robot.body.links:
-        raise ValueError(f"'{robot.base_link}' is no link of '{robot.body.name}'")
+    """Return parts with their places at the start."""
     poses = [Transform3()]
     for part, joint in ((part, part.joint) for part in parts if part.joint is not None):
         moved = joint.origin.inverse().compose(joint.at(robot.body.position(joint, robot.positions)))
@@ -152,39 +122,31 @@ def placed_parts(robot: PhysicsRobot, parts: Sequence[RigidPart]) -> PlacedParts
     return PlacedParts(parts, [base.compose(pose) for pose in poses])
 
 
-def find_wheels(robot: PhysicsRobot, placed: PlacedParts) -> PhysicsWheels | None:
-    """Return the wheels that the robot names, or those that its body shows, or None.
+def find_wheels(placed: PlacedParts) -> PhysicsWheels | None:
+    """Return the wheels that a body shows, or None.
 
     A wheel hangs on the base, or on its suspension, by a continuous joint whose axis points left or right; it reaches
     the ground, and is at one side. Without one at each side there are none.
-
-    Raises:
-        ValueError: if a wheel that the robot names is no joint that turns.
     """
-    named = (*robot.left_wheels, *robot.right_wheels)
     ground = placed.lowest
     found: dict[str, tuple[Vector3, float]] = {}
     for index, part in enumerate(placed.parts):
         joint = part.joint
-        if joint is None or joint.kind not in ("continuous", "revolute"):
+        if joint is None or joint.kind != "continuous" or joint.mimic is not None:
             continue
         x, y, z = placed.poses[index].translation
         middles = [points.mean(0) for points in placed.points_of(index)]
         centre = tuple(np.mean(middles, 0).tolist()) if middles else (x, y, z)
-        shows = (
-            joint.kind == "continuous"
-            and joint.mimic is None
-            and _is_on_base(placed.parts, part)
+        is_wheel = (
+            _is_on_base(placed.parts, part)
             and abs(placed.axis_of(index)[1]) > 0.9
             and placed.lowest_of(index) < ground + LEVEL
             and abs(centre[1]) > LEVEL
         )
-        if joint.name in named or (shows and not named):
+        if is_wheel:
             found[joint.name] = (x, centre[1], z), z - min(placed.lowest_of(index), ground + LEVEL)
-    if missing := [name for name in named if name not in found]:
-        raise ValueError(f"'{missing[0]}' is no joint that turns a wheel")
-    left = robot.left_wheels or tuple(name for name, (at, _) in found.items() if at[1] > 0)
-    right = robot.right_wheels or tuple(name for name, (at, _) in found.items() if at[1] < 0)
+    left = tuple(name for name, (at, _) in found.items() if at[1] > 0)
+    right = tuple(name for name, (at, _) in found.items() if at[1] < 0)
     if not (left and right):
         return None
     sides = [float(np.mean([found[name][0][1] for name in side])) for side in (left, right)]

@@ -12,9 +12,8 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, suggest
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.body.sections.body import body
-from rbxcompose.domains.worlds.outline import outline_of
 from rbxcompose.domains.worlds.sections.simulator import PHYSICS, simulator
-from rbxcompose.domains.worlds.shapes import WorldShape
+from rbxcompose.domains.worlds.shapes import WorldShape, outline_of
 from rbxcompose.domains.worlds.world_file import WORLD, WorldFile, WorldModel, read_world
 from rbxcompose.manifest.fields import FileName
 from rbxcompose.manifest.files import resolve
