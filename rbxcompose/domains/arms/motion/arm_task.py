@@ -17,6 +17,7 @@ from rbxcompose.domains.arms.motion import inverse_kinematics
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import pairs_shown
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace
+from rbxcompose.domains.arms.motion.inverse_kinematics import Posture, kept_solutions, searched
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory, speeds_of
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
 from rbxcompose.domains.arms.motion.planner import (
@@ -28,7 +29,6 @@ from rbxcompose.domains.arms.motion.planner import (
     examined,
     mistake_in_start,
 )
-from rbxcompose.domains.arms.motion.pose_search import Posture, kept_solutions, searched
 from rbxcompose.domains.arms.motion.trace_planner import TraceWish, planned_trace
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 
@@ -307,9 +307,7 @@ class ArmTask:
         elif colliding:
             self._fail(MotionReason.GOAL_IN_COLLISION, pairs_shown(checker.colliding(colliding[0])))
         else:
-            away, angle = found.nearest
-            text = f"the tip got within {away * 100:.1f} cm and {math.degrees(angle):.1f} deg of it"
-            self._fail(MotionReason.GOAL_OUT_OF_REACH, f"{text} in {found.attempts} attempts")
+            self._fail(MotionReason.GOAL_OUT_OF_REACH, f"{found.miss} in {found.attempts} attempts")
 
     def _plan_next(self) -> None:
         """Plan to the next of the positions that would do."""

@@ -320,8 +320,7 @@ def _object(data: Any, root: str) -> PlacedObject:
         ScenePiece(_shape(primitive), _pose(pose))
         for primitive, pose in zip(data["primitives"], data["primitive_poses"], strict=True)
     ]
-    first, *others = pieces
-    return PlacedObject(str(data["id"]), first.shape, root, whole, pieces=tuple(others), shape_pose=first.pose)
+    return PlacedObject.of(str(data["id"]), root, whole, pieces)
 
 
 def _shape(data: Any) -> Geometry:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rbxcompose.base.geometry import Transform3, Vector3, quaternion_about
+from rbxcompose.base.geometry import Transform3, Vector3, quaternion_between
 from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
@@ -56,17 +56,15 @@ def placed_object(message: SceneObject) -> PlacedObject:
     """Return the object of a message; without a shape, it is one that cannot be."""
     pieces = [_piece(shape) for shape in message.shapes] or [ScenePiece(Geometry("nothing"), Transform3())]
     color = message.color
-    return PlacedObject(
+    return PlacedObject.of(
         message.name,
-        pieces[0].shape,
         message.link,
         pose_of(message.pose),
-        message.touches,
-        message.touches_objects,
-        tuple(pieces[1:]),
-        (color.r, color.g, color.b, color.a) if color.a else None,
-        message.padding,
-        pieces[0].pose,
+        pieces,
+        touches=message.touches,
+        touches_objects=message.touches_objects,
+        colour=(color.r, color.g, color.b, color.a) if color.a else None,
+        padding=message.padding,
     )
 
 
@@ -142,7 +140,12 @@ def _shown(shape: Geometry) -> tuple[int, Vector3, Points, Transform3]:
             return Marker.CYLINDER, (2 * radius, 2 * radius, length), (), Transform3()
         case "plane":
             a, b, c, d = shape.size
-            return Marker.CUBE, _SHEET, (), Transform3((-a * d, -b * d, -c * d), _upright((a, b, c)))
+            return (
+                Marker.CUBE,
+                _SHEET,
+                (),
+                Transform3((-a * d, -b * d, -c * d), quaternion_between((0.0, 0.0, 1.0), (a, b, c))),
+            )
         case "octree":
             cells, side = np.array(shape.points).reshape(-1, 3), shape.size[0]
             if shape.file:
@@ -161,14 +164,6 @@ def _cone(radius: float, length: float) -> Iterator[Vector3]:
     rim = [(radius * math.cos(turn), radius * math.sin(turn), -length / 2) for turn in turns]
     for first, second in pairwise(rim):
         yield from (first, second, (0.0, 0.0, length / 2), second, first, (0.0, 0.0, -length / 2))
-
-
-def _upright(normal: Vector3) -> tuple[float, float, float, float]:
-    """Return the rotation from z to a unit vector."""
-    x, y, z = normal
-    across = math.hypot(x, y)
-    axis = (-y / across, x / across, 0.0) if across else (1.0, 0.0, 0.0)
-    return quaternion_about(axis, math.atan2(across, z))
 
 
 def _vector(values: Sequence[float]) -> Vector3:
