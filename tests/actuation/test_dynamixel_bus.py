@@ -13,8 +13,7 @@ from rbxcompose.domains.servos.bus import FoundServo, ServoBus
 from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
 from rbxcompose.domains.servos.models import servo_models
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
-from rbxcompose.domains.servos.twins.servo_line import FakeReply
-from rbxcompose.domains.servos.twins.servo_packets import READ, SYNC_READ, SYNC_WRITE, status
+from rbxcompose.domains.servos.twins.servo_line import READ, SYNC_READ, SYNC_WRITE, FakeReply, status
 from rbxcompose.domains.servos.twins.servo_twin import FakePort
 from tests.actuation.conftest import Plugged
 from tests.soak import rare

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from rbxcompose.base.clock import SteppedClock
 from rbxcompose.domains.servos.models import servo_models
 from rbxcompose.domains.servos.twins.servo_fake import FASTEST, FakeServo
-from rbxcompose.domains.servos.twins.servo_line import FakeLine
-from rbxcompose.domains.servos.twins.servo_packets import packet_one, packet_two, packets
+from rbxcompose.domains.servos.twins.servo_line import FakeLine, packet_one, packet_two, packets
 from tests.loops import for_all
 
 MODELS = sorted(servo_models())

@@ -26,10 +26,9 @@ from rbxcompose.domains.servos.curves import JointSample
 from rbxcompose.domains.servos.joint_drive import JointDrive, PositionDrive, ServoJoint
 from rbxcompose.domains.servos.joint_states import Enable, Hold, JointMode, MoveTo
 from rbxcompose.domains.servos.servo_cycle import ServoCycle, ServoItem, prepare, set_up, with_torque
-from rbxcompose.domains.servos.twins.physics_motor import PhysicsJoints, PhysicsMotor
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo, IdealMotor, ServoMotor
 from rbxcompose.domains.servos.twins.servo_faults import FAULTS, FaultScript, InjectFault, ListFaults
-from rbxcompose.domains.servos.twins.servo_twin import TwinBus, twin_of, twin_servos
+from rbxcompose.domains.servos.twins.servo_twin import PhysicsJoints, PhysicsMotor, TwinBus, twin_of, twin_servos
 from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_time

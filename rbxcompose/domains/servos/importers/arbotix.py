@@ -118,6 +118,11 @@ _JOINTS = {
     "dual": {"joint_left": "l_gripper_joint", "joint_right": "r_gripper_joint"},
     "parallel": {"joint": "gripper_joint"},
 }
+_SIDES = {  # keys of angles with parallel fingers, and of which servos turn the other way
+    "one_sided": (("center",), ("invert",)),
+    "dual": (("center_left", "center_right"), ("invert_left", "invert_right")),
+    "parallel": (("center",), ()),
+}
 _DRIVER = "a default of the controller"
 
 Lines = dict[str, tuple[str, str]]
@@ -146,7 +151,7 @@ def read_gripper(name: str, entry: ForeignMap) -> ArbotixGripper | None:
     keys = ("left", "right") if len(joints) > 1 else ("joint",)
     lines |= {key: (out.word(joint.value), out.place(joint.span)) for key, joint in zip(keys, joints, strict=True)}
     lines |= _scale(entry) if kind_of == "parallel" else _geometry(entry)
-    lines |= _two_sides(entry) if kind_of == "dual" else _one_side(entry, kind_of)
+    lines |= _sides(entry, *_SIDES[kind_of])
     entry.report_unknown_keys()
     return ArbotixGripper(name, entry.span, joints, lines, tuple(value for value, _ in lines.values()))
 
@@ -192,20 +197,13 @@ def _scale(entry: ForeignMap) -> Lines:
     return lines if value > 0 else lines | {"invert": (out.flag(True), where)}
 
 
-def _one_side(entry: ForeignMap, kind_of: str) -> Lines:
-    center = entry.number("center")
-    lines = {"center": (out.angle(center.value), out.place(center.span))} if center else {}
-    if kind_of == "one_sided" and entry.is_set("invert"):
-        lines["invert"] = (out.flag(True), out.place(entry.places("invert")["invert"]))
-    return lines
-
-
-def _two_sides(entry: ForeignMap) -> Lines:
+def _sides(entry: ForeignMap, centers: Iterable[str], inverts: Iterable[str]) -> Lines:
+    """Return the angles with parallel fingers, and which servos turn the other way."""
     lines: Lines = {}
-    for key in ("center_left", "center_right"):
+    for key in centers:
         if (center := entry.number(key)) is not None:
             lines[key] = (out.angle(center.value), out.place(center.span))
-    for key in ("invert_left", "invert_right"):
+    for key in inverts:
         if (invert := entry.flag(key)) is not None and invert.value:
             lines[key] = (out.flag(True), out.place(invert.span))
     return lines
