@@ -101,6 +101,19 @@ SLICES = 16  # of planning in one call, so that the same goal takes the same tim
 LONGEST_CALL = 0.2  # [s] of planning in one call, after which others may run
 
 
+def gone_on(work: Generator[None, None, T], now: Callable[[], float], most: int) -> list[T]:
+    """Go on with work for so many slices at most, unless that takes long; return its result, once it has one."""
+    begin = now()
+    for _ in range(most):
+        try:
+            next(work)
+        except StopIteration as ended:
+            return [ended.value]
+        if now() - begin >= LONGEST_CALL:
+            break  # others may run
+    return []
+
+
 class ArmSite(Protocol):
     """What a goal needs of the component that carries it out."""
 
@@ -297,9 +310,9 @@ class ArmTask:
         return searched(replace(search, is_late=lambda: self._site.now >= ends), posture)
 
     def _solve(self, target: inverse_kinematics.PoseTarget, solving: Solving) -> None:
-        found = self._worked(solving)
-        if found is None:
+        if not (done := gone_on(solving, lambda: self._site.now, SLICES)):
             return
+        found = done[0]
         checker, colliding = self._planner.checker, found.colliding
         self._aims, self._nearest = list(found.free), target if found.is_approximate else None
         if self._aims:
@@ -319,22 +332,8 @@ class ArmTask:
         self._stage()
 
     def _continue_planning(self, planning: Planning) -> None:
-        found = self._worked(planning)
-        if found is not None:
-            self._planned(found)
-
-    def _worked(self, work: Generator[None, None, T]) -> T | None:
-        """Go on with some work; return its result when there is one."""
-        begin = self._site.now
-        for _ in range(SLICES):
-            try:
-                next(work)
-            except StopIteration as ended:
-                result: T = ended.value
-                return result
-            if self._site.now - begin >= LONGEST_CALL:
-                break
-        return None
+        if done := gone_on(planning, lambda: self._site.now, SLICES):
+            self._planned(done[0])
 
     def _planned(self, found: MotionPlan | MotionFailure) -> None:
         self.share = found.share

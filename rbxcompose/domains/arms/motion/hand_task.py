@@ -26,7 +26,7 @@ from rbxcompose.base.geometry import (
     yaw_of,
 )
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.arm_task import LONGEST_CALL, SETTLING, ArmGoal, ArmSite, ArmTask
+from rbxcompose.domains.arms.motion.arm_task import SETTLING, ArmGoal, ArmSite, ArmTask, gone_on
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
 from rbxcompose.domains.arms.motion.grasps import Grasp, grasps_of, least_width, reach_of, solid_of
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace, interpolated
@@ -622,17 +622,10 @@ class HandTask:
         return self.works.planner.checker
 
     def _worked(self, work: Generator[None, None, T]) -> Generator[None, None, T | StageFailure]:
-        """Go on with some work until it has a result, or the goal is cancelled."""
+        """Carry out what takes many slices."""
         while not self.is_canceled:
-            begin = self.site.now
-            for _ in range(TRIES):
-                try:
-                    next(work)
-                except StopIteration as ended:
-                    result: T = ended.value
-                    return result
-                if self.site.now - begin >= LONGEST_CALL:
-                    break
+            if done := gone_on(work, lambda: self.site.now, TRIES):
+                return done[0]
             yield
         return self.fail(MotionReason.INTERRUPTED, "it was cancelled")
 
