@@ -174,15 +174,6 @@ def shown(model: ServoModel, item: str, raw: int) -> tuple[float, str]:
     return (where.to_si(raw), where.unit) if where else (raw, "")
 
 
-def raw_values(model: ServoModel, texts: Iterable[str]) -> dict[str, int]:
-    """Read `goal_position=512` or `goal_position=30 deg`.
-
-    Raises:
-        NotDoneError: if an item is not known, or a value does not fit.
-    """
-    return dict(_raw_value(model, text) for text in texts)
-
-
 def _raw_value(model: ServoModel, text: str) -> tuple[str, int]:
     name, equals, value = text.partition("=")
     if name not in model.items:
@@ -453,7 +444,7 @@ def _show_values(bus: DynamixelBus, found: FoundServo, items: list[str], argumen
 
 def _write(bus: DynamixelBus, arguments: argparse.Namespace) -> int:
     known(bus, arguments.id, arguments)
-    values = raw_values(bus.servos[arguments.id], arguments.values)
+    values = dict(_raw_value(bus.servos[arguments.id], text) for text in arguments.values)
     return written(bus, {arguments.id: values}, arguments)
 
 

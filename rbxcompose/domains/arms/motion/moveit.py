@@ -29,7 +29,7 @@ from rbxcompose.domains.arms.motion.octree_files import cells_of_octomap
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptRange
 from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
-from rbxcompose.domains.arms.motion.scene_messages import joint_trajectory
+from rbxcompose.domains.arms.motion.scene_messages import colour_message, joint_trajectory
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 from rbxcompose.domains.arms.section_models import OMPL, PLANNERS
 from rbxcompose.domains.body.model import Body, Geometry
@@ -62,7 +62,7 @@ from rbxcompose.msgs.poses import pose_message, pose_of
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.shape_msgs import Mesh, MeshTriangle, Plane, SolidPrimitive
 from rbxcompose.msgs.stamps import to_duration, to_seconds
-from rbxcompose.msgs.std_msgs import ColorRGBA, Header
+from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
 
 KINDS = {
@@ -618,7 +618,9 @@ class MoveItScene:
             robot_model_name=self.scene.body.name,
             robot_state=state,
             link_padding=tuple(LinkPadding(link_name=link, padding=padding) for link, padding in self.paddings.items()),
-            object_colors=tuple(ObjectColor(id=item.name, color=_color(item)) for item in objects if item.colour),
+            object_colors=tuple(
+                ObjectColor(id=item.name, color=colour_message(item.colour)) for item in objects if item.colour
+            ),
             world=PlanningSceneWorld(
                 collision_objects=tuple(collision_object(object_) for object_ in objects if object_ not in held)
             ),
@@ -678,11 +680,6 @@ class MoveItScene:
                 self.scene.put(replace(object_, touches=links, touches_objects=others))
 
 
-def _color(thing: scenes.PlacedObject) -> ColorRGBA:
-    red, green, blue, alpha = thing.colour or (0.0, 0.0, 0.0, 0.0)
-    return ColorRGBA(r=red, g=green, b=blue, a=alpha)
-
-
 CODES = {
     MotionReason.UNKNOWN_GOAL: Codes.INVALID_GOAL_CONSTRAINTS,
     MotionReason.UNKNOWN_START: Codes.ROBOT_STATE_STALE,
@@ -717,11 +714,6 @@ def code_of(failure: MotionFailure | None, *, is_moving: bool) -> Codes:
     if is_moving and failure.reason is MotionReason.PATH_IN_COLLISION:
         value = Codes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
     return not_done(value, f"{failure.reason}: {failure.text}")
-
-
-def motion_message(names: tuple[str, ...], trajectory: Trajectory) -> RobotTrajectory:
-    """Return a motion with where it begins as its first point."""
-    return RobotTrajectory(joint_trajectory=joint_trajectory(names, trajectory, begin=0))
 
 
 def trace_message(names: tuple[str, ...], times: list[float], rows: list[list[float]]) -> RobotTrajectory:
@@ -913,10 +905,13 @@ class MoveItTask:
         if planned is None and self.failure is None:  # the arm is where it should be
             here = np.array([[self.measured[name][0] for name in names]])
             planned = Trajectory(np.zeros(1), here, np.zeros_like(here))
+        motion = found.planned_trajectory
+        if planned is not None:
+            motion = RobotTrajectory(joint_trajectory=joint_trajectory(names, planned, begin=0))
         return MoveGroup.Result(
             error_code=self.code,
             trajectory_start=self._begin_state,
-            planned_trajectory=motion_message(names, planned) if planned is not None else found.planned_trajectory,
+            planned_trajectory=motion,
             executed_trajectory=trace_message(names, self._times, self._rows),
             planning_time=self._planned_at - self._began,
         )

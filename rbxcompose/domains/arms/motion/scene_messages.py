@@ -14,7 +14,7 @@ from rbxcompose.base.geometry import Transform3, Vector3, quaternion_between
 from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
-from rbxcompose.domains.arms.motion.scene import PlacedObject, ScenePiece
+from rbxcompose.domains.arms.motion.scene import Colour, PlacedObject, ScenePiece
 from rbxcompose.domains.body.model import Geometry
 from rbxcompose.msgs.geometry_msgs import Point, PoseStamped
 from rbxcompose.msgs.geometry_msgs import Vector3 as Vector3Message
@@ -37,9 +37,11 @@ def joint_trajectory(names: tuple[str, ...], motion: Trajectory, *, begin: int =
     return JointTrajectory(header=Header(stamp=to_time(stamp)), joint_names=names, points=points)
 
 
+NO_COLOUR = (0.0, 0.0, 0.0, 0.0)
+
+
 def object_message(object_: PlacedObject) -> SceneObject:
     """Return an object as a message; an opacity of 0 is no colour."""
-    red, green, blue, alpha = object_.colour or (0.0, 0.0, 0.0, 0.0)
     return SceneObject(
         name=object_.name,
         link=object_.link,
@@ -48,8 +50,14 @@ def object_message(object_: PlacedObject) -> SceneObject:
         touches=object_.touches,
         touches_objects=object_.touches_objects,
         padding=object_.padding,
-        color=ColorRGBA(r=red, g=green, b=blue, a=alpha),
+        color=colour_message(object_.colour or NO_COLOUR),
     )
+
+
+def colour_message(colour: Colour) -> ColorRGBA:
+    """Return a colour as a message."""
+    red, green, blue, alpha = colour
+    return ColorRGBA(r=red, g=green, b=blue, a=alpha)
 
 
 def placed_object(message: SceneObject) -> PlacedObject:
@@ -113,7 +121,6 @@ def path_of(way: Sequence[Vector3], frame: str) -> PathMessage:
 
 def _marker(object_: PlacedObject, piece: ScenePiece, number: int) -> Marker:
     kind, scale, points, at = _shown(piece.shape)
-    red, green, blue, alpha = object_.colour or SAND
     return Marker(
         header=Header(frame_id=object_.link),
         ns=object_.name,
@@ -121,7 +128,7 @@ def _marker(object_: PlacedObject, piece: ScenePiece, number: int) -> Marker:
         type=kind,
         pose=pose_message(piece.pose.compose(at)),
         scale=Vector3Message(x=scale[0], y=scale[1], z=scale[2]),
-        color=ColorRGBA(r=red, g=green, b=blue, a=alpha),
+        color=colour_message(object_.colour or SAND),
         frame_locked=True,
         points=tuple(Point(x=float(x), y=float(y), z=float(z)) for x, y, z in points),
         mesh_resource=Path(piece.shape.file).as_uri() if kind == Marker.MESH_RESOURCE else "",

@@ -131,7 +131,7 @@ class TwinBus:
     def __init__(self, servos: Iterable[FakeServo], clock: Callable[[], float]) -> None:
         self.line = FakeLine(servos, clock)
         self._clock = clock
-        self._statistics = {servo.id: ServoStatistics() for servo in self.line.servos}
+        self.statistics = {servo.id: ServoStatistics() for servo in self.line.servos}
         self._is_out = False
 
     def unplug(self) -> None:
@@ -141,11 +141,6 @@ class TwinBus:
     def replug(self) -> None:
         """Bring it back."""
         self._is_out = False
-
-    @property
-    def statistics(self) -> Mapping[int, ServoStatistics]:
-        """Return how well each servo answers, by id."""
-        return self._statistics
 
     def _asked(self, ids: Iterable[int]) -> Iterator[tuple[int, FakeServo]]:
         """Yield the servos of a request by their ids; those with power hear it, and obey also if they do not answer."""
@@ -163,7 +158,7 @@ class TwinBus:
         now = self._clock()
         for id_, servo in self._asked(ids):
             if self._is_understood(servo):
-                statistics = self._statistics[id_]
+                statistics = self.statistics[id_]
                 statistics.misses, statistics.last_seen = 0, now
                 yield id_, servo
 
@@ -173,7 +168,7 @@ class TwinBus:
         is_missing = faults.is_off or faults.is_mute or faults.delay > PATIENCE or faults.id is not None
         is_spoilt = faults.corrupts or faults.cuts > 0
         if is_missing or is_spoilt:
-            statistics = self._statistics[servo.id]
+            statistics = self.statistics[servo.id]
             statistics.misses += 1
             statistics.timeouts += is_missing
             statistics.errors += not is_missing
@@ -192,7 +187,7 @@ class TwinBus:
         """Return the items of all servos that answered."""
         found, now = {}, self._clock()
         for id_, servo in self._answering(ids):
-            self._statistics[id_].reads += 1
+            self.statistics[id_].reads += 1
             found[id_] = ServoReading({item: servo.get(item) for item in items}, now, servo.alert)
         return found
 
