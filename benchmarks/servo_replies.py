@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from rbxcompose.domains.servos.twins.servo_packets import SYNC_READ, ServoPacket, packets, status
+from rbxcompose.domains.servos.twins.servo_line import SYNC_READ, ServoPacket, packets, status
 
 BAUD = 1_000_000  # [bit/s]
 _BITS, _SLICE = 10, 0.001  # of a byte on the wire; [s]

@@ -37,14 +37,15 @@ def test_a_mute_servo_is_asked_thrice_then_ten_times_a_second_and_again_when_it_
     assert asked == 21
     attention.answered(2, 2.0)
     assert attention.due(IDS, 2.01) == IDS
-    assert (attention.of(2).timeouts, attention.of(2).reads, attention.of(2).last_seen) == (21, 1, 2.0)
+    known = attention.statistics[2]
+    assert (known.timeouts, known.reads, known.last_seen) == (21, 1, 2.0)
 
 
 def test_a_doubtful_servo_is_asked_after_the_others() -> None:
     attention = Attention()
     attention.missed(1, 0.0, is_corrupt=True)
     assert attention.due(IDS, 0.01) == [2, 3, 4, 1]
-    assert attention.of(1).errors == 1
+    assert attention.statistics[1].errors == 1
 
 
 def test_each_silent_servo_has_its_turn_to_be_probed() -> None:

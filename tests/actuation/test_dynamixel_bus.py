@@ -13,8 +13,7 @@ from rbxcompose.domains.servos.bus import FoundServo, ServoBus
 from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
 from rbxcompose.domains.servos.models import servo_models
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
-from rbxcompose.domains.servos.twins.servo_line import FakeReply
-from rbxcompose.domains.servos.twins.servo_packets import READ, SYNC_READ, SYNC_WRITE, status
+from rbxcompose.domains.servos.twins.servo_line import READ, SYNC_READ, SYNC_WRITE, FakeReply, status
 from rbxcompose.domains.servos.twins.servo_twin import FakePort
 from tests.actuation.conftest import Plugged
 from tests.soak import rare
@@ -167,12 +166,12 @@ def test_no_retry_begins_when_the_budget_is_spent(connect: Connect) -> None:
 def test_an_alert_is_told_beside_the_values_and_named_by_the_hardware_error(connect: Connect) -> None:
     bus, port = connect({1: "AX-12", 2: "XL430-W250"})
     for number in (1, 2):
-        port.line[number].heat_to(95)
+        port.line[number].motor.temperature = 95
         port.line[number].step(0.1, 0.1)
     found = bus.read([1, 2], ["present_temperature", "hardware_error"])
     assert [found[one].values for one in (1, 2)] == [{"present_temperature": 95, "hardware_error": 4}] * 2
     assert (found[1].alert, found[2].alert) == (4, 128)
-    port.line[2].heat_to(30)
+    port.line[2].motor.temperature = 30
     assert bus.write({2: {"torque_enable": 1}}, is_confirmed=True) == {2}
     assert bus.reboot(2)  # its reply tells the alert, and is no refusal
     assert not bus.reboot(1)

@@ -141,11 +141,11 @@ def test_a_hot_joint_rests_without_torque_until_it_has_cooled_down() -> None:
     driven.run(3)
     driven.drive.ask(MoveTo(0.5))
     driven.run(3)
-    driven.servo.heat_to(61)
+    driven.servo.motor.temperature = 61
     driven.run(3)
     assert driven.mode == JointMode.RESTING
     assert driven.servo.get("torque_enable") == 0
-    driven.servo.heat_to(40)
+    driven.servo.motor.temperature = 40
     driven.run(round(60 / PERIOD) + 10)
     assert driven.mode == JointMode.RELAXED
 

@@ -116,7 +116,7 @@ def test_a_joint_that_mimics_another_follows_it_with_and_without_torque() -> Non
 def test_one_hot_joint_lets_all_rest_if_that_is_wanted(shares_heat: bool, modes: set[str]) -> None:
     pair = {name: DrivenJointConfig(servos=servos(id_), **LIMITS) for id_, name in enumerate(("pan", "tilt"), 1)}
     machine = Machine(shares_heat=shares_heat, **pair)
-    machine.bus.line[1].heat_to(70)
+    machine.bus.line[1].motor.temperature = 70
     machine.run(10)
     assert {str(drive.mode) for drive in machine.drives.values()} == modes
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.domains.servos.supervision import Periods
+from rbxcompose.domains.servos.components.servo_bus import Periods
 
 
 @given(st.lists(st.integers(1, 5), min_size=1, max_size=50), st.floats(0.0, 0.9))

@@ -6,7 +6,7 @@ import gc
 import os
 import threading
 
-from rbxcompose.domains.servos.supervision import be_prompt
+from rbxcompose.domains.servos.components.servo_bus import be_prompt
 
 
 def test_only_the_thread_that_asks_becomes_prompt() -> None:

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from rbxcompose.base.clock import SteppedClock
 from rbxcompose.domains.servos.models import servo_models
 from rbxcompose.domains.servos.twins.servo_fake import FASTEST, FakeServo
-from rbxcompose.domains.servos.twins.servo_line import FakeLine
-from rbxcompose.domains.servos.twins.servo_packets import packet_one, packet_two, packets
+from rbxcompose.domains.servos.twins.servo_line import FakeLine, packet_one, packet_two, packets
 from tests.loops import for_all
 
 MODELS = sorted(servo_models())
@@ -96,14 +95,14 @@ def test_switching_torque_on_holds_or_snaps_to_the_old_goal(holds: bool) -> None
 def test_too_much_heat_switches_torque_off_and_is_told(name: str) -> None:
     servo = FakeServo(name, 1)
     written(servo, "torque_enable", 1)
-    servo.heat_to(servo.get("temperature_limit") + 1)
+    servo.motor.temperature = servo.get("temperature_limit") + 1
     servo.step(0.1, 0.1)
     assert servo.get("torque_enable") == 0
     assert servo.alert == (4 if servo.model.protocol == 1 else 128)
     written(servo, "torque_enable", 1)
     servo.step(0.1, 0.2)
     assert servo.get("torque_enable") == 0
-    servo.heat_to(30)
+    servo.motor.temperature = 30
     servo.step(0.1, 0.3)
     if servo.model.protocol == 2:
         assert servo.get("hardware_error") == 4, "it stays until the servo starts again"

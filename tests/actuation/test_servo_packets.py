@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.servos.dynamixel_port import PacketsOne, PacketsTwo
-from rbxcompose.domains.servos.twins.servo_packets import ServoPacket, crc_of, packet_one, packet_two, packets, status
+from rbxcompose.domains.servos.twins.servo_line import ServoPacket, crc_of, packet_one, packet_two, packets, status
 
 IDS, CODES = st.integers(0, 252), st.integers(1, 0x9F)
 STUFFY = st.lists(st.sampled_from([0xFF, 0xFD, 0x00, 0x55, 0x12]), max_size=30).map(bytes)

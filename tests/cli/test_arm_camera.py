@@ -14,8 +14,7 @@ import yaml
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
 from rbxcompose.base.transforms import NotConnectedError, TransformTree, UnknownFrameError
 from rbxcompose.commands import main as command
-from rbxcompose.domains.arms.command_camera import CameraFrames, CameraResult, show
-from rbxcompose.domains.arms.hand_eye import HandEye, measured
+from rbxcompose.domains.arms.command_camera import CameraFrames, CameraResult, HandEye, measured, show
 
 MOUNTED = Transform3((0.05, 0.0, 0.12), quaternion_from_rpy(0.0, 0.6, 0.1))  # of the camera on the neck
 OPTICAL = Transform3((0.0, 0.02, 0.0), (-0.5, 0.5, -0.5, 0.5))

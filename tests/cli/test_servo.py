@@ -67,7 +67,7 @@ def test_values_are_shown_raw_and_in_si(servos: Bench) -> None:
     assert "present_voltage   120  12 V" in servos.told("read", "1", "present_voltage", "present_position")
     told = json.loads(servos.told("read", "2", "present_position", "--json"))
     assert told["values"]["present_position"] == {"raw": 2048, "value": 0.0, "unit": "rad"}
-    servos.line[2].heat_to(99)
+    servos.line[2].motor.temperature = 99
     servos.line[2].step(0.1, 0.1)
     told = servos.told("info", "2")
     assert "present_temperature" in told

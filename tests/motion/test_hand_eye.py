@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3, quaternion_about, quaternion_from_rpy
-from rbxcompose.domains.arms.hand_eye import HandSight, PoorMotionsError, StandingHand, measured
+from rbxcompose.domains.arms.command_camera import HandSight, PoorMotionsError, StandingHand, measured
 
 CAMERA = Transform3((0.1, 0.02, 1.2), quaternion_from_rpy(-2.0, 0.1, -1.5))
 TAG = Transform3((0.05, 0.01, -0.03), quaternion_from_rpy(0.3, 1.2, -0.4))

@@ -10,10 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3
-from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseSolutions, PoseTarget
+from rbxcompose.domains.arms.motion.inverse_kinematics import (
+    PoseSearch,
+    PoseSolutions,
+    PoseTarget,
+    Posture,
+    kept_solutions,
+)
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionPlanner, MotionRequest, PlannerSettings
-from rbxcompose.domains.arms.motion.pose_search import Posture, kept_solutions
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 from tests.motion.test_inverse_kinematics import ARM, SPACE
 from tests.motion.test_planner import sampled

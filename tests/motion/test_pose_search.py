@@ -17,10 +17,11 @@ from rbxcompose.domains.arms.motion.inverse_kinematics import (
     PoseSearch,
     PoseSolutions,
     PoseTarget,
+    Posture,
     descended,
+    searched,
     solved,
 )
-from rbxcompose.domains.arms.motion.pose_search import Posture, searched
 from tests.body.kinematics import Three, matrix
 from tests.motion.test_inverse_kinematics import ARM, DESCRIPTION, GROUP, SPACE
 from tests.motion.toy_arm import Array, ended

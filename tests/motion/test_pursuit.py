@@ -8,15 +8,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import rotate
-from rbxcompose.domains.arms.components.arm_tracker import Chase, Pursuit, PursuitSettings
+from rbxcompose.domains.arms.components.arm_tracker import ArmTrackerConfig, Chase, Pursuit
 
 SHOULDER = (0.1, 0.0, 0.5)
-SETTINGS = PursuitSettings(length=0.4)
+SETTINGS = ArmTrackerConfig(
+    name="follower",
+    arm="right",
+    controller="right_controller",
+    base="shoulder",
+    tip="hand",
+    shoulder=SHOULDER,
+    target="target",
+    frame="camera",
+    length=0.4,
+)
 POINTS = st.tuples(*[st.floats(-2, 2)] * 3)
 
 
 def pursuit() -> Pursuit:
-    return Pursuit(SETTINGS, SHOULDER, 0.0)
+    return Pursuit(SETTINGS, 0.0)
 
 
 @given(POINTS, POINTS)
@@ -50,7 +60,7 @@ def test_what_moves_by_less_than_a_centimetre_is_where_it_was_however_often_it_d
 
 
 def test_nothing_is_followed_before_a_point_has_come_and_it_is_lost_when_none_comes_any_more() -> None:
-    one = Pursuit(SETTINGS, SHOULDER, 5.0)
+    one = Pursuit(SETTINGS, 5.0)
     assert one.next(SHOULDER) is None
     assert one.state is Chase.WAITING
     assert [one.is_lost(now, 2.0) for now in (5.0, 7.0, 7.1)] == [False, False, True]

@@ -12,12 +12,13 @@ import pytest
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
-from rbxcompose.domains.arms.arm_config import ArmConfig, ArmPlannerConfig, ArmWorks
+from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
 from rbxcompose.domains.arms.motion.figures import ended, sampled
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
+from rbxcompose.domains.arms.section_models import PlannerModel
 from rbxcompose.domains.body.model import Geometry
 from tests.motion.toy_arm import Array
 from tests.shipped import robot_and_plan
@@ -53,7 +54,7 @@ def works_of(robot: str, is_fast: bool) -> ArmWorks:
     _, plan = robot_and_plan(robot)
     [config] = (instance.config for instance in plan.instances if instance.type == "arm")
     assert isinstance(config, ArmConfig)
-    return ArmWorks(config.model_copy(update={"planner": ArmPlannerConfig(time=TIME)}), lambda: 0.0, is_fast=is_fast)
+    return ArmWorks(config.model_copy(update={"planner": PlannerModel(time=TIME)}), lambda: 0.0, is_fast=is_fast)
 
 
 def box(chance: Random, name: str, link: str, reach: float) -> PlacedObject:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rbxcompose.domains.arms.motion.collisions import TOUCH, MeshChecker, adjacent_pairs
 from rbxcompose.domains.arms.motion.planner import MotionPlanner
 from rbxcompose.domains.arms.motion.scene import PlacedObject
-from rbxcompose.domains.arms.motion.tip_servo import CRUISE, LEAD, ServoMotion, TipServo, Wish
+from rbxcompose.domains.arms.teleoperation import CRUISE, LEAD, ServoMotion, TipServo, Wish
 from rbxcompose.domains.body.model import Geometry
 from tests.motion.test_inverse_kinematics import ARM
 from tests.motion.test_tracing import READY, SIX

@@ -14,8 +14,7 @@ from rbxcompose.domains.servos.joint_states import JointPolicy
 from rbxcompose.domains.servos.limits import MotionLimits
 from rbxcompose.domains.servos.models import servo_models
 from rbxcompose.domains.servos.transmission import Gear
-from rbxcompose.domains.servos.twins.physics_motor import WINDUP, PhysicsJoints, PhysicsMotor
-from rbxcompose.domains.servos.twins.servo_twin import TwinBus, twin_servos
+from rbxcompose.domains.servos.twins.servo_twin import WINDUP, PhysicsJoints, PhysicsMotor, TwinBus, twin_servos
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Header
 

@@ -22,7 +22,7 @@ from rbxcompose.domains.arms.motion.inverse_kinematics import ANGLE_TOLERANCE, R
 from rbxcompose.domains.arms.motion.numba_cache import is_installed, keep_libraries
 from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
-from rbxcompose.domains.arms.section_models import AUTOMATIC, FAST, HandConfig
+from rbxcompose.domains.arms.section_models import AUTOMATIC, FAST, HandConfig, PlannerModel
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.link_pairs import LinkPair
 from rbxcompose.domains.body.urdf import body_of
@@ -48,23 +48,6 @@ class ArmJointConfig(Config):
     """Whether it turns without an end."""
     slides: bool = False
     """Whether its positions are lengths."""
-
-
-class ArmPlannerConfig(Config):
-    """How motions are planned."""
-
-    type: str = AUTOMATIC
-    """The planner."""
-    time: float = 5.0
-    """How long it may search [s]."""
-    attempts: int = 5
-    """How many paths it may find that collide when they are examined finely."""
-    seed: int = 1
-    """The same seed gives the same path."""
-    simplify: bool = True
-    """Whether a path that was found is shortened."""
-    processes: int = 1
-    """How many plan to several ways to or from an object at once."""
 
 
 class ArmSolverConfig(Config):
@@ -121,7 +104,7 @@ class ArmConfig(Config):
     """The action of the controller."""
     stream: str = ""
     """The topic on which the controller takes trajectories one after the other; empty if it takes none."""
-    planner: ArmPlannerConfig = ArmPlannerConfig()
+    planner: PlannerModel = PlannerModel()
     """How motions are planned."""
     kinematics: ArmSolverConfig = ArmSolverConfig()
     """How positions of joints are searched for a pose of the tip."""

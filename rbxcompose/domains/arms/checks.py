@@ -299,9 +299,9 @@ def penetration(box: SolidBox, other: SolidBox) -> float:
     OBBTree, 1996). Otherwise the least overlap along these is what would have to be moved.
     """
     first, second = box.axes, other.axes
-    way = _less(other.pose.translation, box.pose.translation)
+    x, y, z = (to - at for to, at in zip(other.pose.translation, box.pose.translation, strict=True))
     return min(
-        _reach(box, first, axis) + _reach(other, second, axis) - abs(_dot(way, axis))
+        _reach(box, first, axis) + _reach(other, second, axis) - abs(_dot((x, y, z), axis))
         for axis in (*first, *second, *_normals(first, second))
     )
 
@@ -319,10 +319,6 @@ def _reach(box: SolidBox, axes: list[Vector3], along: Vector3) -> float:
 
 def _dot(vector: Vector3, other: Vector3) -> float:
     return vector[0] * other[0] + vector[1] * other[1] + vector[2] * other[2]
-
-
-def _less(vector: Vector3, other: Vector3) -> Vector3:
-    return vector[0] - other[0], vector[1] - other[1], vector[2] - other[2]
 
 
 _OPTICAL = "_optical"  # by REP 103, such a frame is that of its camera, with the suffix `_optical`
@@ -445,13 +441,16 @@ def _too_far(robot: Robot, body: Body, reach: WrittenReach, frame: str) -> Findi
         return None
     far = {axis: abs(value) for axis, value in zip(_AXES, (x, y, z), strict=True) if axis in reach.arguments}
     span = reach.arguments[max(far, key=lambda axis: far[axis])].value.span if far else reach.node.span
-    shown, most = (format_quantity(round(value, 3), LENGTH, "m" if value >= 1.0 else "cm") for value in (away, length))
+    shown, most, help_text = _far_words(away, length, "choose a place nearer to it")
+    message = f"this is {shown} from the first joint of '{reach.name}', and all its links together are {most} long"
+    return reach_goal.at(span, message, help=help_text)
+
+
+def _far_words(away: float, length: float, cure: str) -> tuple[str, str, str]:
+    """Return how far away something is, how long the arm is, and what to do: its unit is wrong, or that cure."""
+    shown, most = (format_quantity(round(each, 3), LENGTH, "m" if each >= 1.0 else "cm") for each in (away, length))
     is_unit = away > _TIMES * length
-    return reach_goal.at(
-        span,
-        f"this is {shown} from the first joint of '{reach.name}', and all its links together are {most} long",
-        help="is a unit wrong? A number without a unit counts in metres" if is_unit else "choose a place nearer to it",
-    )
+    return shown, most, "is a unit wrong? A number without a unit counts in metres" if is_unit else cure
 
 
 def _too_stiff(reach: WrittenReach) -> Finding | None:
@@ -655,16 +654,9 @@ class _Reaches:
         length = length_of(self.robot, self.body, robot) + math.hypot(*fingers)
         if away <= length + slack + 0.001:
             return
-        shown, most = (format_quantity(round(item, 3), LENGTH, "m" if item >= 1.0 else "cm") for item in (away, length))
-        is_unit = away > _TIMES * length
-        yield too_far.at(
-            span,
-            f"{what} is {shown} from the first joint of '{name}', which reaches {most} with all its links",
-            help="is a unit wrong? A number without a unit counts in metres"
-            if is_unit
-            else "place it nearer to the arm",
-            related=related,
-        )
+        shown, most, help_text = _far_words(away, length, "place it nearer to the arm")
+        message = f"{what} is {shown} from the first joint of '{name}', which reaches {most} with all its links"
+        yield too_far.at(span, message, help=help_text, related=related)
 
 
 def _steps(robot: Robot, skill: str) -> Iterator[MissionNode]:
@@ -680,17 +672,9 @@ def _word(node: MissionNode) -> str:
 
 def _radius(thing: PlacedObject) -> float:
     """Return how far a thing reaches from its origin at most [m]; infinite if that is unknown."""
-    axes: tuple[Vector3, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), _UP)
-    sides = [
-        (reach_of(thing, thing.pose.rotation, axis), reach_of(thing, thing.pose.rotation, _back(axis))) for axis in axes
-    ]
-    far = [max(ahead, back) if ahead is not None and back is not None else math.inf for ahead, back in sides]
-    return math.hypot(*far)
-
-
-def _back(axis: Vector3) -> Vector3:
-    x, y, z = axis
-    return (-x, -y, -z)
+    axes = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)]
+    ends = [end for axis in axes if (end := reach_of(thing, thing.pose.rotation, axis)) is not None]
+    return math.hypot(*map(max, ends[:3], ends[3:])) if ends else math.inf
 
 
 def _from_spot(body: Body, arm: ArmOfRobot, spot: SpotModel, on: PlacedObject | None) -> float | None:

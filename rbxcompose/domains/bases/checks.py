@@ -13,7 +13,6 @@ from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import OTHER_TYPE, MessageFlow, is_written, period_of, setting_span
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent
 from rbxcompose.compiler.model.skills import constants
-from rbxcompose.domains.bases.checks import lead_of, speed_within
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.missions.analysis.facts import number_of, published

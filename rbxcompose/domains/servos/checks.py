@@ -128,13 +128,18 @@ def driven_joints(robot: Robot) -> Iterator[DrivenJoint]:
                     )
 
 
+def models_on(robot: Robot, bus: str) -> dict[str, ServoModel]:
+    """Return the models of all actuators of a bus."""
+    contents = robot.manifest.contents
+    own = {name: entry for name, entry in contents.of(actuators).items() if entry.bus == bus}
+    return {name: model for name, entry in own.items() if (model := model_of(contents, entry))}
+
+
 @check("RBX2227")
 def baud_of_servo(robot: Robot) -> Iterator[Finding]:
     """A servo does not have the rate of its bus."""
     for bus in driven_buses(robot):
-        contents = robot.manifest.contents
-        own = {name: actuator for name, actuator in contents.of(actuators).items() if actuator.bus == bus.name}
-        models = {name: model for name, entry in own.items() if (model := model_of(contents, entry))}
+        models = models_on(robot, bus.name)
         unfit = [name for name, model in models.items() if model.code_of(bus.baud) is None]
         if unfit:
             names = sorted({models[name].name for name in unfit})
@@ -151,9 +156,7 @@ def baud_of_servo(robot: Robot) -> Iterator[Finding]:
 def supply_voltage(robot: Robot) -> Iterator[Finding]:
     """Servos on one bus need different voltages."""
     for bus in driven_buses(robot):
-        contents = robot.manifest.contents
-        own = {name: actuator for name, actuator in contents.of(actuators).items() if actuator.bus == bus.name}
-        models = {name: model for name, entry in own.items() if (model := model_of(contents, entry))}
+        models = models_on(robot, bus.name)
         if not models:
             continue
         strong = max(models, key=lambda name: models[name].volts[0])

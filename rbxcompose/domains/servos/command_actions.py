@@ -174,15 +174,6 @@ def shown(model: ServoModel, item: str, raw: int) -> tuple[float, str]:
     return (where.to_si(raw), where.unit) if where else (raw, "")
 
 
-def raw_values(model: ServoModel, texts: Iterable[str]) -> dict[str, int]:
-    """Read `goal_position=512` or `goal_position=30 deg`.
-
-    Raises:
-        NotDoneError: if an item is not known, or a value does not fit.
-    """
-    return dict(_raw_value(model, text) for text in texts)
-
-
 def _raw_value(model: ServoModel, text: str) -> tuple[str, int]:
     name, equals, value = text.partition("=")
     if name not in model.items:
@@ -206,31 +197,9 @@ def _quantity(unit: str, text: str) -> float:
 _TORQUE, _LIMIT, _MOST = "torque_enable", "torque_limit", "max_torque"
 
 
-def relax(arguments: argparse.Namespace) -> int:
+def _relaxed(bus: DynamixelBus, ids: Sequence[int], arguments: argparse.Namespace) -> int:
     """Switch torque off."""
-    return _with_servos(arguments, lambda bus, ids: written(bus, {item: {_TORQUE: 0} for item in ids}, arguments))
-
-
-def disable(arguments: argparse.Namespace) -> int:
-    """Switch torque off, so that no goal switches it on again."""
-    return _with_servos(arguments, lambda bus, ids: _disabled(bus, ids, arguments))
-
-
-def enable(arguments: argparse.Namespace) -> int:
-    """Switch torque on, where servos are."""
-    return _with_servos(arguments, lambda bus, ids: _enabled(bus, ids, arguments))
-
-
-def _with_servos(arguments: argparse.Namespace, do: Callable[[DynamixelBus, Sequence[int]], int]) -> int:
-    with bus_at(arguments, arguments.baud[0]) as bus:
-        ids = arguments.ids
-        if arguments.all:
-            ids = [servo.id for servo in bus.scan(range(arguments.last + 1), protocols(arguments)) if servo.model]
-        if not ids:
-            return refuse(SILENT.at(None, "no servo is named and none answers", help="name ids, or use --all"))
-        for number in ids:
-            known(bus, number, arguments)
-        return do(bus, ids)
+    return written(bus, {item: {_TORQUE: 0} for item in ids}, arguments)
 
 
 def _disabled(bus: DynamixelBus, ids: Sequence[int], arguments: argparse.Namespace) -> int:
@@ -416,9 +385,8 @@ def _scan(arguments: argparse.Namespace) -> int:
     return _listed(found, arguments)
 
 
-def _ping(arguments: argparse.Namespace) -> int:
-    with bus_at(arguments, arguments.baud[0]) as bus:
-        answers = {one: bus.ping(one, arguments.protocol) for one in arguments.ids}
+def _ping(bus: DynamixelBus, arguments: argparse.Namespace) -> int:
+    answers = {one: bus.ping(one, arguments.protocol) for one in arguments.ids}
     for one in (name for name, found in answers.items() if found is None):
         refuse(SILENT.at(None, f"no servo answers at id {one}", help=elsewhere(arguments)))
     found = [servo for servo in answers.values() if servo]
@@ -439,20 +407,18 @@ def _listed(found: list[FoundServo], arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _info(arguments: argparse.Namespace) -> int:
-    with bus_at(arguments, arguments.baud[0]) as bus:
-        found = known(bus, arguments.id, arguments)
-        return _show_values(bus, found, list(bus.servos[arguments.id].items), arguments)
+def _info(bus: DynamixelBus, arguments: argparse.Namespace) -> int:
+    found = known(bus, arguments.id, arguments)
+    return _show_values(bus, found, list(bus.servos[arguments.id].items), arguments)
 
 
-def _read(arguments: argparse.Namespace) -> int:
-    with bus_at(arguments, arguments.baud[0]) as bus:
-        found = known(bus, arguments.id, arguments)
-        model = bus.servos[found.id]
-        wrong = [name for name in arguments.items if name not in model.items and name != "hardware_error"]
-        if wrong:
-            return refuse(unknown_item(model, wrong[0]))
-        return _show_values(bus, found, arguments.items, arguments)
+def _read(bus: DynamixelBus, arguments: argparse.Namespace) -> int:
+    found = known(bus, arguments.id, arguments)
+    model = bus.servos[found.id]
+    wrong = [name for name in arguments.items if name not in model.items and name != "hardware_error"]
+    if wrong:
+        return refuse(unknown_item(model, wrong[0]))
+    return _show_values(bus, found, arguments.items, arguments)
 
 
 def _show_values(bus: DynamixelBus, found: FoundServo, items: list[str], arguments: argparse.Namespace) -> int:
@@ -476,54 +442,78 @@ def _show_values(bus: DynamixelBus, found: FoundServo, items: list[str], argumen
     return 0
 
 
-def _write(arguments: argparse.Namespace) -> int:
-    with bus_at(arguments, arguments.baud[0]) as bus:
-        known(bus, arguments.id, arguments)
-        values = raw_values(bus.servos[arguments.id], arguments.values)
-        return written(bus, {arguments.id: values}, arguments)
+def _write(bus: DynamixelBus, arguments: argparse.Namespace) -> int:
+    known(bus, arguments.id, arguments)
+    values = dict(_raw_value(bus.servos[arguments.id], text) for text in arguments.values)
+    return written(bus, {arguments.id: values}, arguments)
 
 
-def _set_id(arguments: argparse.Namespace) -> int:
-    with bus_at(arguments, arguments.baud[0]) as bus:
-        if finding := change_id(bus, arguments.old, arguments.new):
-            return refuse(finding)
+def _set_id(bus: DynamixelBus, arguments: argparse.Namespace) -> int:
+    if finding := change_id(bus, arguments.old, arguments.new):
+        return refuse(finding)
     emit(json.dumps({"id": arguments.new}) if arguments.json else f"the servo has the id {arguments.new}")
     return 0
 
 
-def _reboot(arguments: argparse.Namespace) -> int:
-    with bus_at(arguments, arguments.baud[0]) as bus:
-        for one in arguments.ids:
-            found = known(bus, one, arguments)
-            if not bus.reboot(one):
-                words = f"the servo at id {one} has not started again"
-                old = "protocol 1.0 has no reboot: switch it off and on" if found.protocol == 1 else ""
-                return refuse(REFUSED.at(None, words, help=old))
+def _reboot(bus: DynamixelBus, arguments: argparse.Namespace) -> int:
+    for one in arguments.ids:
+        found = known(bus, one, arguments)
+        if not bus.reboot(one):
+            words = f"the servo at id {one} has not started again"
+            old = "protocol 1.0 has no reboot: switch it off and on" if found.protocol == 1 else ""
+            return refuse(REFUSED.at(None, words, help=old))
     return 0
 
 
-def _identify(arguments: argparse.Namespace) -> int:
-    with bus_at(arguments, arguments.baud[0]) as bus:
-        for one in arguments.ids:
-            known(bus, one, arguments)
-        for blink in range(2 * _BLINKS):
-            bus.write({one: {"led": 1 - blink % 2} for one in arguments.ids}, is_confirmed=True)
-            time.sleep(_HALF)
+def _identify(bus: DynamixelBus, arguments: argparse.Namespace) -> int:
+    for one in arguments.ids:
+        known(bus, one, arguments)
+    for blink in range(2 * _BLINKS):
+        bus.write({one: {"led": 1 - blink % 2} for one in arguments.ids}, is_confirmed=True)
+        time.sleep(_HALF)
     return 0
+
+
+def _on_bus(do: Callable[[DynamixelBus, argparse.Namespace], int]) -> Callable[[argparse.Namespace], int]:
+    """Return an action that opens the bus."""
+
+    def run(arguments: argparse.Namespace) -> int:
+        with bus_at(arguments, arguments.baud[0]) as bus:
+            return do(bus, arguments)
+
+    return run
+
+
+def _on_servos(
+    do: Callable[[DynamixelBus, Sequence[int], argparse.Namespace], int],
+) -> Callable[[argparse.Namespace], int]:
+    """Return an action with known servos: those that are named, or all that answer."""
+
+    def run(bus: DynamixelBus, arguments: argparse.Namespace) -> int:
+        ids = arguments.ids
+        if arguments.all:
+            ids = [servo.id for servo in bus.scan(range(arguments.last + 1), protocols(arguments)) if servo.model]
+        if not ids:
+            return refuse(SILENT.at(None, "no servo is named and none answers", help="name ids, or use --all"))
+        for number in ids:
+            known(bus, number, arguments)
+        return do(bus, ids, arguments)
+
+    return _on_bus(run)
 
 
 ACTIONS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "scan": _scan,
-    "ping": _ping,
-    "info": _info,
-    "read": _read,
-    "write": _write,
-    "set-id": _set_id,
-    "reboot": _reboot,
-    "relax": relax,
-    "disable": disable,
-    "enable": enable,
-    "identify": _identify,
+    "ping": _on_bus(_ping),
+    "info": _on_bus(_info),
+    "read": _on_bus(_read),
+    "write": _on_bus(_write),
+    "set-id": _on_bus(_set_id),
+    "reboot": _on_bus(_reboot),
+    "relax": _on_servos(_relaxed),
+    "disable": _on_servos(_disabled),
+    "enable": _on_servos(_enabled),
+    "identify": _on_bus(_identify),
     "new-robot": new_robot,
 }
 """By name."""

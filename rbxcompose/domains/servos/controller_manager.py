@@ -74,13 +74,9 @@ class ControllerManager:
     def leading(self) -> list[Controller[ControllerConfig]]:
         """Return the active controllers, and those that still bring joints to rest that nobody else leads."""
         taken = {joint for controller in self.active for joint in controller.config.claimed}
-        self._leaving = {
-            name for name in self._leaving if self.controllers[name].leads and not taken & {*self._led(name)}
-        }
+        leaving = [self.controllers[name] for name in self._leaving]
+        self._leaving = {one.name for one in leaving if one.leads and not taken & {*one.config.claimed}}
         return [controller for name, controller in self.controllers.items() if name in self._active | self._leaving]
-
-    def _led(self, name: str) -> tuple[str, ...]:
-        return self.controllers[name].config.claimed
 
     def is_active(self, name: str) -> bool:
         """Return whether a controller leads its joints."""

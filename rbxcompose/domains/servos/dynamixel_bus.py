@@ -39,10 +39,6 @@ class Attention:
         self.statistics: defaultdict[int, servo_bus.ServoStatistics] = defaultdict(servo_bus.ServoStatistics)
         self._probed: dict[int, float] = {}
 
-    def of(self, id: int) -> servo_bus.ServoStatistics:
-        """Return the statistics of a servo."""
-        return self.statistics[id]
-
     def is_silent(self, id: int) -> bool:
         """Tell whether a servo is skipped."""
         return self.statistics[id].misses >= self.patience
@@ -220,6 +216,7 @@ class DynamixelBus:
         self.is_fast = is_fast
         self.servos = dict(servos or {})
         self.attention = Attention()
+        self.statistics = self.attention.statistics
         self._patience = timeout
         self._clock = clock
         self._packets = packets_by_protocol()
@@ -250,11 +247,6 @@ class DynamixelBus:
     def __exit__(self, *_: object) -> None:
         """Close it."""
         self.close()
-
-    @property
-    def statistics(self) -> Mapping[int, servo_bus.ServoStatistics]:
-        """Return how well each servo answers, by id."""
-        return self.attention.statistics
 
     @property
     def is_open(self) -> bool:
@@ -327,12 +319,12 @@ class DynamixelBus:
         read = GroupRead({number: self._plan(number, names) for number in self.attention.due(ids, began)})
         with self._in_use() as port:
             if self.is_fast:
-                sure = [number for number in read.plans if not self.attention.of(number).misses]
+                sure = [number for number in read.plans if not self.statistics[number].misses]
                 self._reader.attempt(port, read, self._models(sure), is_fast=True)
             asked = list(read.open)
             for _ in range(self.retries + 1):
                 self._reader.attempt(port, read, self._models(asked))
-                failed = [number for number in asked if number in read.open and not self.attention.of(number).misses]
+                failed = [number for number in asked if number in read.open and not self.statistics[number].misses]
                 if not failed or (budget is not None and self._clock() - began + self._timeout > budget):
                     break
                 asked = in_other_order(failed)

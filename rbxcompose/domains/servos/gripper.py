@@ -8,24 +8,10 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from typing import Literal, Protocol
+from typing import Literal
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.servos.transmission import Calibration
-
-
-class GripperModel(Protocol):
-    """From the opening to the angles of the servos and back, exact within the domain."""
-
-    @property
-    def openings(self) -> tuple[float, float]:
-        """The least and the greatest opening [m]."""
-
-    def angles(self, opening: float) -> tuple[float, ...]:
-        """Return the angle of each servo [rad]. ValueError outside of the domain."""
-
-    def opening(self, angles: Sequence[float]) -> float:
-        """Return the opening at measured angles [m]; beyond the domain, that of its nearest end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +133,10 @@ class CalibratedGripper:
     def opening(self, angles: Sequence[float]) -> float:
         """Return the opening at the measured angle [m]."""
         return self.table.inverse(angles[0])
+
+
+GripperModel = FingerGripper | ParallelGripper | CalibratedGripper
+"""From the opening to the angles of the servos and back, exact within the domain."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -204,11 +204,6 @@ def has_fired(values: Mapping[str, int]) -> bool:
     return values.get(WATCHDOG) == _FIRED
 
 
-def is_unarmed(values: Mapping[str, int]) -> bool:
-    """Return whether a servo has no watchdog: it has started again."""
-    return values.get(WATCHDOG) == 0
-
-
 def _changes(joint: ServoJoint, servo: JointServo, values: Mapping[str, int]) -> dict[str, int]:
     """Return what differs from what the joint needs; ranges of positions that somebody has set are kept."""
     if modes := servo.model.family.modes:
@@ -340,7 +335,7 @@ class ServoCycle:
         """Arm a watchdog that has stopped a servo, or that it has forgotten without its supply."""
         if has_fired(values):
             drive.was_cut()
-        if has_fired(values) or (is_unarmed(values) and self.watchdog > 0):
+        if has_fired(values) or (values.get(WATCHDOG) == 0 and self.watchdog > 0):
             arm(self.bus, servo, self.watchdog)
 
     def _mimic(self) -> None:

@@ -224,8 +224,8 @@ def plan_trajectory(
         draft.place()
         draft.keep_in_range()
         draft.make_way_to_first_point()
-        curves = draft.curves_within_speed()
-        return TrajectoryPlan(begin_of(goal, now), draft.in_range(curves), tuple(draft.notes))
+        curves = {name: draft.in_range(name, curve) for name, curve in draft.curves_within_speed().items()}
+        return TrajectoryPlan(begin_of(goal, now), curves, tuple(draft.notes))
     except _Unfit as unfit:
         return unfit.refusal
 
@@ -336,11 +336,8 @@ class _Draft:
         limits = self.joints[name].limits
         raise _Unfit(f"joint '{name}' would move at {curves[name].speed:.3g}, its limit is {limits.speed:.3g}", name)
 
-    def in_range(self, curves: Mapping[str, Curve]) -> dict[str, Curve]:
-        """Return the curves; one that leaves the range between its points is calmed, clamped or refused."""
-        return {name: self._in_range(name, curve) for name, curve in curves.items()}
-
-    def _in_range(self, name: str, curve: Curve) -> Curve:
+    def in_range(self, name: str, curve: Curve) -> Curve:
+        """Return the curve of a joint; if it leaves the range between its points it is calmed, clamped or refused."""
         limits = self.joints[name].limits
         if _is_within(curve, limits):
             return curve

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import field, replace
+from dataclasses import field
 from typing import Any, Protocol
 
 from rbxcompose.base.dataclass import dataclass
@@ -91,15 +91,6 @@ class TrajectoryOutcome:
 
     code: TrajectoryCode
     message: str
-    joint: str = ""
-    """The joint that decided; empty if none did."""
-    error: float = 0.0
-    """Its error [rad, m, rad/s or m/s]."""
-    tolerance: float = 0.0
-    """What it exceeded."""
-    time: float = 0.0
-    """[s] since the trajectory began."""
-    is_canceled: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,25 +195,24 @@ class TrajectoryFollower:
 
     def cancel(self, now: float) -> TrajectoryOutcome | None:
         """Bring the joints to rest on demand; return the outcome, None if no trajectory runs."""
-        return self._stop(now, TrajectoryOutcome(TrajectoryCode.SUCCESSFUL, "canceled", is_canceled=True))
+        return self._stop(now, TrajectoryOutcome(TrajectoryCode.SUCCESSFUL, "canceled"))
 
-    def abort(self, now: float, reason: str, joint: str = "") -> TrajectoryOutcome | None:
+    def abort(self, now: float, reason: str) -> TrajectoryOutcome | None:
         """Bring the joints to rest since one, or something else, has failed; return the outcome as `cancel` does."""
-        return self._stop(now, TrajectoryOutcome(TrajectoryCode.PATH_TOLERANCE_VIOLATED, reason, joint))
+        return self._stop(now, TrajectoryOutcome(TrajectoryCode.PATH_TOLERANCE_VIOLATED, reason))
 
     def lose(self, joint: str, now: float, reason: str) -> TrajectoryOutcome | None:
         """Stop leading a joint at once, for it has no torque any more; return the outcome if that ends a trajectory."""
         runs = [run for run in (self._run, self._next) if run is not None and joint in run.plan.curves]
-        outcome = self.abort(now, reason, joint) if runs else None
+        outcome = self.abort(now, reason) if runs else None
         self._motions.pop(joint, None)
         return outcome
 
     def _stop(self, now: float, outcome: TrajectoryOutcome) -> TrajectoryOutcome | None:
-        run = self._next or self._run
-        if run is None:
+        if not self.is_following:
             return None
         self._end(now)
-        return replace(outcome, time=max(0.0, now - run.plan.begin))
+        return outcome
 
     def _end(self, now: float) -> None:
         self._motions = {name: self._brake(name, now) for name in self._motions}
@@ -272,27 +262,26 @@ class TrajectoryFollower:
         run = self._run
         if run is None:
             return None
-        time, end = now - run.plan.begin, run.plan.end if run.is_live else run.plan.end + now - self.pace.time(now)
+        end = run.plan.end if run.is_live else run.plan.end + now - self.pace.time(now)
         if now < end or self._next is not None:
-            return self._path_violation(run, time, desired, measured)
-        open_ = self._not_arrived(run, time, desired, measured, commanded)
+            return self._path_violation(run, desired, measured)
+        open_ = self._not_arrived(run, desired, measured, commanded)
         allowed = self.policy.goal_time if run.goal.goal_time is None else run.goal.goal_time
         if open_ is None:
-            return TrajectoryOutcome(TrajectoryCode.SUCCESSFUL, "arrived", time=time)
+            return TrajectoryOutcome(TrajectoryCode.SUCCESSFUL, "arrived")
         return open_ if now > end + allowed else None
 
-    def _path_violation(self, run: _Run, time: float, desired: Samples, measured: Samples) -> TrajectoryOutcome | None:
+    def _path_violation(self, run: _Run, desired: Samples, measured: Samples) -> TrajectoryOutcome | None:
         for name in run.plan.curves:
             tolerance = self._tolerance(run, name).path
             error = self._error(name, desired[name], measured[name])
             if tolerance is not None and not abs(error) <= tolerance:
                 message = f"joint '{name}' is {abs(error):.3g} from its path, more than {tolerance:.3g}"
-                code = TrajectoryCode.PATH_TOLERANCE_VIOLATED
-                return TrajectoryOutcome(code, message, name, abs(error), tolerance, time)
+                return TrajectoryOutcome(TrajectoryCode.PATH_TOLERANCE_VIOLATED, message)
         return None
 
     def _not_arrived(
-        self, run: _Run, time: float, desired: Samples, measured: Samples, commanded: Samples
+        self, run: _Run, desired: Samples, measured: Samples, commanded: Samples
     ) -> TrajectoryOutcome | None:
         """Return how it fails if it ends now; None if all joints have arrived."""
         for name in run.plan.curves:
@@ -305,8 +294,7 @@ class TrajectoryFollower:
             for words, error, limit in checks:
                 if limit is not None and not abs(error) <= limit:
                     message = f"joint '{name}' is {abs(error):.3g} {words}, more than {limit:.3g}"
-                    code = TrajectoryCode.GOAL_TOLERANCE_VIOLATED
-                    return TrajectoryOutcome(code, message, name, abs(error), limit, time)
+                    return TrajectoryOutcome(TrajectoryCode.GOAL_TOLERANCE_VIOLATED, message)
         return None
 
     def _tolerance(self, run: _Run, joint: str) -> TrajectoryTolerance:

@@ -7,7 +7,6 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Protocol
 
 from rbxcompose.base.dataclass import dataclass
 
@@ -62,19 +61,6 @@ def _interpolated(pairs: Sequence[Pair], x: float) -> float:
 NUDGE = 1e-4  # [rad], over which a table's slope is taken
 
 
-class Transmission(Protocol):
-    """From the angle of a servo to the position of its joint [rad or m], and back."""
-
-    def position(self, angle: float) -> float:
-        """Return the position of the joint."""
-
-    def angle(self, position: float) -> float:
-        """Return the angle of the servo."""
-
-    def slope(self, angle: float) -> float:
-        """Return how much the joint moves for each radian of the servo, there."""
-
-
 @dataclass(frozen=True, slots=True)
 class Gear:
     """The servo turns `ratio` times for each turn of the joint, which is at `offset` [rad] when the servo is at 0.
@@ -121,3 +107,7 @@ class Measured:
         first, last = self.table.pairs[0][0], self.table.pairs[-1][0]
         at = max(first + NUDGE, min(last - NUDGE, angle))
         return (self.table.value(at + NUDGE) - self.table.value(at - NUDGE)) / (2 * NUDGE)
+
+
+Transmission = Gear | Measured
+"""From the angle of a servo, counted from neutral, to the position of a joint and back."""

@@ -52,10 +52,9 @@ from rbxcompose.domains.arms.command_line import (
 from rbxcompose.domains.arms.goals import goal_of
 from rbxcompose.domains.arms.motion import figures as measures
 from rbxcompose.domains.arms.motion.groups import Array, moved_links
-from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseSolutions, PoseTarget
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseSolutions, PoseTarget, Posture, searched
 from rbxcompose.domains.arms.motion.path_constraints import KeptTip
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest, Planning
-from rbxcompose.domains.arms.motion.pose_search import Posture, searched
 from rbxcompose.domains.arms.motion.reach import DIRECTIONS, Cut, ReachMap, reached
 from rbxcompose.domains.arms.motion.trace_planner import planned_trace
 from rbxcompose.domains.arms.reasons import MotionFailure
@@ -256,7 +255,7 @@ def run_inverse(arguments: argparse.Namespace, robot: ArmOfRobot, works: ArmWork
         emit(f"solution {number}{words}: {shown(works, solution)}")
     if each:
         return 0
-    words = f"goal_out_of_reach: the tip got within {_far(*found.nearest)} of it"
+    words = f"goal_out_of_reach: {found.miss}"
     if found.colliding:
         words = f"goal_in_collision: all {len(found.colliding)} solutions collide"
     raise NotDoneError(NO_MOTION.at(None, words))

@@ -11,7 +11,6 @@ from enum import StrEnum
 from typing import Any
 
 from rbxcompose import sdk
-from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, quaternion_from_rpy
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import TIME
@@ -31,26 +30,47 @@ class Chase(StrEnum):
     FAR = "far"  # the point is beyond what the arm cares for: it rests
 
 
-@dataclass(frozen=True, slots=True)
-class PursuitSettings:
-    """The distances: `length` of the arm from its shoulder, of which it uses a `share`."""
+class ArmTrackerConfig(sdk.Config):
+    """An arm, the point that it follows, and the distances; lengths in [m]."""
 
+    name: str
+    """Its name, which begins the topic of its action."""
+    arm: str
+    """The arm."""
+    controller: str
+    """The controller of the arm."""
+    base: str
+    """The link that carries the arm."""
+    tip: str
+    """The link at its end."""
+    shoulder: tuple[float, float, float]
+    """Where the arm begins, in the frame of its base."""
+    target: str
+    """The topic with the point."""
+    frame: str
+    """The frame in which the point is told."""
+    rest: str = ""
+    """The pose to which the arm goes when the point is too far away; empty if it stays where it is."""
+    head: str = ""
+    """The head that looks at the point; empty if none does."""
     length: float
+    """How far the arm reaches from its shoulder."""
     share: float = 0.9
+    """How much of that it uses."""
     moved: float = 0.01
-    """What moved by less is where it was."""
+    """A point that moved by less is where it was."""
     close: float = 0.025
     """The tip is there when it is nearer than this."""
     farthest: float = 1.2
-    """Beyond this, from the shoulder, the arm rests."""
+    """Beyond this the arm rests."""
 
 
 class Pursuit:
     """Follows a point; `shoulder` is where the arm begins."""
 
-    def __init__(self, settings: PursuitSettings, shoulder: Vector3, now: float) -> None:
-        self.state, self.goal, self.distance = Chase.WAITING, shoulder, math.inf
-        self._settings, self._shoulder = settings, shoulder
+    def __init__(self, settings: ArmTrackerConfig, now: float) -> None:
+        self.state, self.goal, self.distance = Chase.WAITING, settings.shoulder, math.inf
+        self._settings, self._shoulder = settings, settings.shoulder
         self._seen: Vector3 | None = None
         self._at = now
 
@@ -89,41 +109,6 @@ FOLLOW, TARGET, POSE, REST, HEAD = "follow", "target", "pose", "rest", "head"  #
 SEEN, TIP = "seen", "tip"  # its looks
 PATIENCE = 2.0  # [s] without a point, unless a goal says otherwise
 LOST = "lost"
-
-
-class ArmTrackerConfig(sdk.Config):
-    """An arm, the point that it follows, and the distances; lengths in [m]."""
-
-    name: str
-    """Its name, which begins the topic of its action."""
-    arm: str
-    """The arm."""
-    controller: str
-    """The controller of the arm."""
-    base: str
-    """The link that carries the arm."""
-    tip: str
-    """The link at its end."""
-    shoulder: tuple[float, float, float]
-    """Where the arm begins, in the frame of its base."""
-    target: str
-    """The topic with the point."""
-    frame: str
-    """The frame in which the point is told."""
-    rest: str = ""
-    """The pose to which the arm goes when the point is too far away; empty if it stays where it is."""
-    head: str = ""
-    """The head that looks at the point; empty if none does."""
-    length: float
-    """How far the arm reaches from its shoulder."""
-    share: float = 0.9
-    """How much of that it uses."""
-    moved: float = 0.01
-    """A point that moved by less is where it was."""
-    close: float = 0.025
-    """The tip is there when it is nearer than this."""
-    farthest: float = 1.2
-    """Beyond this the arm rests."""
 
 
 @sdk.component("arm_tracker")
@@ -208,9 +193,7 @@ class ArmTracker(sdk.Component[ArmTrackerConfig]):
         if goal is not self.goal:
             self.end()
             self.goal, self.began = goal, self.now
-            one = self.config
-            settings = PursuitSettings(one.length, one.share, one.moved, one.close, one.farthest)
-            self.core = Pursuit(settings, one.shoulder, self.now)
+            self.core = Pursuit(self.config, self.now)
         if goal is None:
             return
         patience = goal.request.patience or PATIENCE

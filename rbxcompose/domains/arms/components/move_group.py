@@ -137,7 +137,7 @@ class MoveGroupServer(sdk.Component[MoveGroupConfig]):
         def ended(end: sdk.Ended[MoveGroup.Result]) -> None:
             reply(end.result or MoveGroup.Result(error_code=_lost(end)))
 
-        if wrong is None and any(entry.is_for(MoveGroup) for entry in self.passed.values()):
+        if wrong is None and "move_action" in self.passed:
             wrong = not_done(MoveItErrorCodes.FAILURE, "a goal of 'move_action' is carried out")
         if wrong is not None:
             reply(MoveGroup.Result(error_code=wrong))
@@ -154,10 +154,6 @@ class Passed:
         self.goal, self._result = goal, result
         self._sent: sdk.SentGoal | None = None
         self._is_canceled = False
-
-    def is_for(self, action: type[Any]) -> bool:
-        """Return whether it is a goal of an action."""
-        return self._result is action.Result
 
     def send(self, arm: Any, ended: Callable[[Passed], None]) -> None:
         """Send it to the arm; `ended` is called at its end."""

@@ -248,19 +248,12 @@ class Scene(Component[SceneConfig]):
 
     def on_attach_object(self, request: AttachObject.Request) -> AttachObject.Response:
         """Let an object move with a link."""
-        try:
-            said = self.attach(scene_view.AttachInScene(request.object, request.link, request.touches))
-        except Refused as refusal:
-            return AttachObject.Response(success=False, message=str(refusal))
-        return AttachObject.Response(success=True, message=said)
+        wanted = scene_view.AttachInScene(request.object, request.link, request.touches)
+        return AttachObject.Response(**_outcome(lambda: self.attach(wanted)))
 
     def on_detach_object(self, request: DetachObject.Request) -> DetachObject.Response:
         """Let an object stay where it is."""
-        try:
-            said = self.detach(scene_view.DetachInScene(request.object))
-        except Refused as refusal:
-            return DetachObject.Response(success=False, message=str(refusal))
-        return DetachObject.Response(success=True, message=said)
+        return DetachObject.Response(**_outcome(lambda: self.detach(scene_view.DetachInScene(request.object))))
 
     @answers(scene_view.AddToScene)
     def add(self, request: scene_view.AddToScene) -> str:
@@ -352,6 +345,14 @@ def _without_points(object_: PlacedObject) -> PlacedObject:
     return replace(object_, shape=pieces[0].shape, pieces=tuple(pieces[1:]))
 
 
+def _outcome(change: Callable[[], str]) -> dict[str, Any]:
+    """Return the fields of a response: whether a change was done, and its words."""
+    try:
+        return {"success": True, "message": change()}
+    except Refused as refusal:
+        return {"success": False, "message": str(refusal)}
+
+
 def _look(frame: str) -> str:
     return f"in_{frame}"
 
@@ -371,17 +372,5 @@ def _placed(name: str, config: ObjectConfig) -> PlacedObject:
         )
         for each in config.shapes
     ]
-    first, *rest = pieces
-    pose = Transform3(config.position, config.rotation)
-    return PlacedObject(
-        name,
-        first.shape,
-        config.link,
-        pose,
-        config.touches,
-        config.touches_objects,
-        tuple(rest),
-        config.colour,
-        config.padding,
-        first.pose,
-    )
+    more = {key: getattr(config, key) for key in ("touches", "touches_objects", "colour", "padding")}
+    return PlacedObject.of(name, config.link, Transform3(config.position, config.rotation), pieces, **more)

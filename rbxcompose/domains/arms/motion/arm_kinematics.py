@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,23 +28,11 @@ class _Entry:
     turns: bool
 
 
-@dataclass(frozen=True, slots=True)
-class _Entries:
-    """Several of them as arrays."""
-
-    places: NDArray[np.int64]
-    indices: NDArray[np.int64]
-    multipliers: Array
-    offsets: Array
-
-    @classmethod
-    def of(cls, each: Sequence[_Entry]) -> Self:
-        return cls(
-            np.array([entry.place for entry in each], dtype=np.int64),
-            np.array([entry.index for entry in each], dtype=np.int64),
-            np.array([entry.multiplier for entry in each], dtype=float),
-            np.array([entry.offset for entry in each], dtype=float),
-        )
+def _arrays(entries: Sequence[_Entry]) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array]:
+    """Return places, indices, multipliers and offsets of several of them."""
+    rows = np.array([(each.place, each.index, each.multiplier, each.offset) for each in entries], dtype=float)
+    places, indices, multipliers, offsets = rows.reshape(-1, 4).T
+    return places.astype(np.int64), indices.astype(np.int64), multipliers.copy(), offsets.copy()
 
 
 class ArmKinematics:
@@ -62,8 +50,8 @@ class ArmKinematics:
         self._tip = self.whole.frames[group.tip]
         self._way = list(self.body.joints_above(group.tip))[::-1]
         entries = [entry for name in self.whole.places if (entry := self._entry(name)) is not None]
-        self._entries = _Entries.of([one for one in entries if not one.turns])
-        self._turning = _Entries.of([one for one in entries if one.turns])
+        self._entries = _arrays([one for one in entries if not one.turns])
+        self._turning = _arrays([one for one in entries if one.turns])
         columns = np.zeros((self.whole.model.nv, len(group.joints)))
         for entry in entries:
             columns[entry.column, entry.index] = entry.multiplier
@@ -149,11 +137,12 @@ class ArmKinematics:
 
     def q(self, values: Array) -> Array:
         """Return the configuration for positions of the arm's joints, of shape (n,)."""
-        found, entries = self._base.copy(), self._entries
-        found[entries.places] = entries.multipliers * values[entries.indices] + entries.offsets
-        if len((turning := self._turning).places):
-            angles = turning.multipliers * values[turning.indices] + turning.offsets
-            found[turning.places], found[turning.places + 1] = np.cos(angles), np.sin(angles)
+        found, (places, indices, multipliers, offsets) = self._base.copy(), self._entries
+        found[places] = multipliers * values[indices] + offsets
+        places, indices, multipliers, offsets = self._turning
+        if len(places):
+            angles = multipliers * values[indices] + offsets
+            found[places], found[places + 1] = np.cos(angles), np.sin(angles)
         return found
 
     def _entry(self, name: str) -> _Entry | None:

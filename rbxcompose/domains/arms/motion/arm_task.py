@@ -17,6 +17,7 @@ from rbxcompose.domains.arms.motion import inverse_kinematics
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import pairs_shown
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace
+from rbxcompose.domains.arms.motion.inverse_kinematics import Posture, kept_solutions, searched
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory, speeds_of
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
 from rbxcompose.domains.arms.motion.planner import (
@@ -28,7 +29,6 @@ from rbxcompose.domains.arms.motion.planner import (
     examined,
     mistake_in_start,
 )
-from rbxcompose.domains.arms.motion.pose_search import Posture, kept_solutions, searched
 from rbxcompose.domains.arms.motion.trace_planner import TraceWish, planned_trace
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 
@@ -99,6 +99,19 @@ NEARBY = 200  # positions that are tried for a goal with a tolerance
 OTHER_AIMS = (MotionReason.NO_PATH_IN_TIME, MotionReason.PATH_IN_COLLISION, MotionReason.NOT_KEPT)  # may help
 SLICES = 16  # of planning in one call, so that the same goal takes the same time on a stepped clock
 LONGEST_CALL = 0.2  # [s] of planning in one call, after which others may run
+
+
+def gone_on(work: Generator[None, None, T], now: Callable[[], float], most: int) -> list[T]:
+    """Go on with work for so many slices at most, unless that takes long; return its result, once it has one."""
+    begin = now()
+    for _ in range(most):
+        try:
+            next(work)
+        except StopIteration as ended:
+            return [ended.value]
+        if now() - begin >= LONGEST_CALL:
+            break  # others may run
+    return []
 
 
 class ArmSite(Protocol):
@@ -297,9 +310,9 @@ class ArmTask:
         return searched(replace(search, is_late=lambda: self._site.now >= ends), posture)
 
     def _solve(self, target: inverse_kinematics.PoseTarget, solving: Solving) -> None:
-        found = self._worked(solving)
-        if found is None:
+        if not (done := gone_on(solving, lambda: self._site.now, SLICES)):
             return
+        found = done[0]
         checker, colliding = self._planner.checker, found.colliding
         self._aims, self._nearest = list(found.free), target if found.is_approximate else None
         if self._aims:
@@ -307,9 +320,7 @@ class ArmTask:
         elif colliding:
             self._fail(MotionReason.GOAL_IN_COLLISION, pairs_shown(checker.colliding(colliding[0])))
         else:
-            away, angle = found.nearest
-            text = f"the tip got within {away * 100:.1f} cm and {math.degrees(angle):.1f} deg of it"
-            self._fail(MotionReason.GOAL_OUT_OF_REACH, f"{text} in {found.attempts} attempts")
+            self._fail(MotionReason.GOAL_OUT_OF_REACH, f"{found.miss} in {found.attempts} attempts")
 
     def _plan_next(self) -> None:
         """Plan to the next of the positions that would do."""
@@ -321,22 +332,8 @@ class ArmTask:
         self._stage()
 
     def _continue_planning(self, planning: Planning) -> None:
-        found = self._worked(planning)
-        if found is not None:
-            self._planned(found)
-
-    def _worked(self, work: Generator[None, None, T]) -> T | None:
-        """Go on with some work; return its result when there is one."""
-        begin = self._site.now
-        for _ in range(SLICES):
-            try:
-                next(work)
-            except StopIteration as ended:
-                result: T = ended.value
-                return result
-            if self._site.now - begin >= LONGEST_CALL:
-                break
-        return None
+        if done := gone_on(planning, lambda: self._site.now, SLICES):
+            self._planned(done[0])
 
     def _planned(self, found: MotionPlan | MotionFailure) -> None:
         self.share = found.share

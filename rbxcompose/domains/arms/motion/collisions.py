@@ -10,7 +10,7 @@ from importlib import import_module
 from itertools import chain, combinations, product
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Protocol, TypeGuard
+from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +19,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, Array, JointSpace, moved_links, solid_link
-from rbxcompose.domains.arms.motion.octree_files import read_cells
+from rbxcompose.domains.arms.motion.octree_files import cells_in
 from rbxcompose.domains.arms.motion.parametrisation import toppra
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
 from rbxcompose.domains.body.description import Description
@@ -27,6 +27,9 @@ from rbxcompose.domains.body.link_pairs import CollisionMatrix, LinkPair, PairRe
 from rbxcompose.domains.body.meshes import read_mesh
 from rbxcompose.domains.body.model import Body, BodyJoint, Geometry
 from rbxcompose.domains.servos.limits import MotionLimits
+
+if TYPE_CHECKING:
+    from rbxcompose.domains.arms.motion.sphere_checker import SphereChecker
 
 Coal = Any  # of an extra, without types
 STL = ".stl"
@@ -86,8 +89,7 @@ def coal_shape(geometry: Geometry, meshes: Mapping[str, Path]) -> Coal:
         case "plane":
             return coal.Halfspace(np.array(geometry.size[:3]), -geometry.size[3])
         case "octree":
-            cells, side = np.array(geometry.points).reshape(-1, 3), geometry.size[0]
-            return coal.makeOctree(*(read_cells(Path(geometry.file), side) if geometry.file else (cells, side)))
+            return coal.makeOctree(*cells_in(geometry))
     scale = np.array(geometry.size or (1.0, 1.0, 1.0))
     if geometry.points:
         return _triangles(np.array(geometry.points).reshape(-1, 3) * scale, geometry.triangles)
@@ -174,22 +176,7 @@ class Checker(Protocol):
         """Return the links and objects but those `ignored` that a shape, at a pose in the root's frame, is within."""
 
 
-class SearchingChecker(Checker, Protocol):
-    """One that examines many positions at once, and can search a way by itself."""
-
-    def first_bad(self, points: Array) -> int | None:
-        """Return the first of some positions, of shape (m, n), where something collides; None if there is none."""
-
-    def prepare(self, space: JointSpace) -> None:
-        """Do at once what would delay the first motion."""
-
-    def ways(
-        self, space: JointSpace, start: Array, goal: Array, *, seed: int, resolution: float, simplify: bool
-    ) -> Generator[int, None, Array | str]:
-        """Search a way; return its points, of shape (m, n), or why there is none. Yield how many were examined."""
-
-
-def can_search(checker: Checker) -> TypeGuard[SearchingChecker]:
+def can_search(checker: Checker) -> TypeGuard[SphereChecker]:
     """Return whether a checker is one that searches; `isinstance` of a protocol takes as long as 50 positions."""
     return hasattr(checker, "ways")
 
@@ -243,10 +230,10 @@ class MeshChecker:
         """
         import pinocchio
 
-        self._pinocchio, self._model = pinocchio, model
+        self._pinocchio, self.kinematics = pinocchio, model
         self._geometry: Any = pinocchio.GeometryModel()
         self._owners: list[str] = []
-        self._parts: list[CheckedPart] = []
+        self.parts: list[CheckedPart] = []  # all shapes, in the order in which `watched_parts` counts them
         self._kinds: list[str] = []  # coal's kind of each shape
         self._moved = dict(moved_links(model.body, model.group.joints))
         self._paddings = dict(paddings)
@@ -266,17 +253,17 @@ class MeshChecker:
 
     def is_free(self, values: Array) -> bool:
         """Return whether nothing collides."""
-        whole, find = self._model.whole, self._pinocchio.computeCollisions
-        if find(whole.model, whole.data, self._manager, self._model.q(values), True):
+        whole, find = self.kinematics.whole, self._pinocchio.computeCollisions
+        if find(whole.model, whole.data, self._manager, self.kinematics.q(values), True):
             return False
         check = self._pinocchio.computeCollision
         return not any(check(self._geometry, self._data, index) for index in self._apart)
 
     def colliding(self, values: Array) -> list[LinkPair]:
         """Return all pairs that collide, without the help of the tree."""
-        whole = self._model.whole
+        whole = self.kinematics.whole
         self._pinocchio.computeCollisions(
-            whole.model, whole.data, self._geometry, self._data, self._model.q(values), False
+            whole.model, whole.data, self._geometry, self._data, self.kinematics.q(values), False
         )
         found = (
             pair_of(self._owners[pair.first], self._owners[pair.second])
@@ -289,9 +276,9 @@ class MeshChecker:
         """Return the links and objects but those `ignored` that a shape, at a pose in the root's frame, is within."""
         import coal
 
-        whole, placed = self._model.whole, coal_shape(shape, {})
+        whole, placed = self.kinematics.whole, coal_shape(shape, {})
         self._pinocchio.updateGeometryPlacements(
-            whole.model, whole.data, self._geometry, self._data, self._model.q(values)
+            whole.model, whole.data, self._geometry, self._data, self.kinematics.q(values)
         )
         x, y, z, w = at.rotation
         there = coal.Transform3s(coal.Quaternion(w, x, y, z), np.array(at.translation))
@@ -309,9 +296,7 @@ class MeshChecker:
     @property
     def watched(self) -> frozenset[str]:
         """Return the links and objects that belong to a pair."""
-        return frozenset(
-            self._owners[name] for pair in self._geometry.collisionPairs for name in (pair.first, pair.second)
-        )
+        return frozenset(name for pair in self.watched_pairs for name in pair)
 
     def pairs(self, values: Array, between: Collection[str] = ()) -> tuple[PairDistance, ...]:
         """Return the distances of the pairs with all of `between`: what collides first, then the nearest.
@@ -351,26 +336,11 @@ class MeshChecker:
         pairs = self._geometry.collisionPairs
         return {pair_of(self._owners[pair.first], self._owners[pair.second]) for pair in pairs}
 
-    @property
-    def kinematics(self) -> ArmKinematics:
-        """Return the body."""
-        return self._model
-
-    @property
-    def parts(self) -> list[CheckedPart]:
-        """Return all shapes, in the order in which `watched_parts` counts them."""
-        return self._parts
-
-    @property
-    def watched_parts(self) -> list[tuple[int, int, float]]:
-        """Return the pairs of shapes that it examines, and how far they must be from each other [m]."""
-        return self._watched_parts
-
     def collides(self, values: Array, pairs: Iterable[int]) -> bool:
         """Return whether one of some pairs collides, by their places in `watched_parts`."""
-        whole, check = self._model.whole, self._pinocchio.computeCollision
+        whole, check = self.kinematics.whole, self._pinocchio.computeCollision
         self._pinocchio.updateGeometryPlacements(
-            whole.model, whole.data, self._geometry, self._data, self._model.q(values)
+            whole.model, whole.data, self._geometry, self._data, self.kinematics.q(values)
         )
         return any(check(self._geometry, self._data, pair) for pair in pairs)
 
@@ -379,28 +349,28 @@ class MeshChecker:
         # Pairs with a plane, of which the tree overlooks some that are inclined or keep a distance; and
         # with a flat mesh, since it takes boxes without a thickness for empty.
         self._apart: list[int] = []
-        self._watched_parts: list[tuple[int, int, float]] = []
+        self.watched_parts: list[tuple[int, int, float]] = []  # pairs, and how far they must be from each other [m]
         # Asking coal for each pair takes long.
         overlooked = [self._is_overlooked(one) for one in range(len(self._owners))]
         requests = zip(self._data.collisionRequests, self._geometry.collisionPairs, strict=True)
         for index, (request, pair) in enumerate(requests):
             first, second = pair.first, pair.second
             request.security_margin = margin = self._margin(first, second)
-            self._watched_parts.append((first, second, margin))
+            self.watched_parts.append((first, second, margin))
             if overlooked[first] or overlooked[second]:
                 self._apart.append(index)
         self._manager = self._pinocchio.BroadPhaseManager_DynamicAABBTreeCollisionManager(
-            self._model.whole.model, self._geometry, self._data
+            self.kinematics.whole.model, self._geometry, self._data
         )
 
     def _add(self, owner: str, link: str, known: Shapes, geometry: Geometry, origin: Transform3) -> None:
-        frame = self._model.whole.model.frames[self._model.whole.frames[link]]
+        frame = self.kinematics.whole.model.frames[self.kinematics.whole.frames[link]]
         placement = frame.placement * self._pinocchio.XYZQUATToSE3(
             np.array((*origin.translation, *origin.rotation), dtype=float)
         )
         name = f"{owner}_{len(self._owners)}"
         self._owners.append(owner)
-        self._parts.append(CheckedPart(geometry, link, origin, shape := known.of(geometry)))
+        self.parts.append(CheckedPart(geometry, link, origin, shape := known.of(geometry)))
         self._kinds.append(str(shape.getObjectType()))
         self._geometry.addGeometryObject(
             self._pinocchio.GeometryObject(name, frame.parentJoint, frame.parentFrame, placement, shape)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping
+from dataclasses import astuple
 from itertools import combinations, islice, pairwise
 from pathlib import Path
 from typing import Any, TypeVar
@@ -162,14 +163,7 @@ class Tries:
 
     def with_(self, other: Tries) -> Tries:
         """Return these tries and others."""
-        return Tries(
-            self.count + other.count,
-            self.solved + other.solved,
-            self.times + other.times,
-            self.lengths + other.lengths,
-            self.colliding + other.colliding,
-            self.failures + other.failures,
-        )
+        return Tries(*(one + two for one, two in zip(astuple(self), astuple(other), strict=True)))
 
 
 NO_TRIES = Tries(0, 0, ())
@@ -320,8 +314,7 @@ def _object(data: Any, root: str) -> PlacedObject:
         ScenePiece(_shape(primitive), _pose(pose))
         for primitive, pose in zip(data["primitives"], data["primitive_poses"], strict=True)
     ]
-    first, *others = pieces
-    return PlacedObject(str(data["id"]), first.shape, root, whole, pieces=tuple(others), shape_pose=first.pose)
+    return PlacedObject.of(str(data["id"]), root, whole, pieces)
 
 
 def _shape(data: Any) -> Geometry:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Generator, Iterable, Iterator,
 from contextlib import closing
 from dataclasses import replace
 from itertools import product
-from typing import ClassVar, Protocol, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from rbxcompose.base.geometry import (
     yaw_of,
 )
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.arm_task import LONGEST_CALL, SETTLING, ArmGoal, ArmSite, ArmTask
+from rbxcompose.domains.arms.motion.arm_task import SETTLING, ArmGoal, ArmSite, ArmTask, gone_on
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
 from rbxcompose.domains.arms.motion.grasps import Grasp, grasps_of, least_width, reach_of, solid_of
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace, interpolated
@@ -36,6 +36,9 @@ from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.reasons import GraspReason, MotionFailure, MotionReason, StageFailure
 from rbxcompose.domains.body.link_pairs import LinkPair
 from rbxcompose.domains.body.model import Geometry
+
+if TYPE_CHECKING:
+    from rbxcompose.domains.arms.arm_config import ArmWorks
 
 STEP = 0.005  # [m] between poses of the tip
 TURN = 0.1  # [rad] between them
@@ -201,9 +204,7 @@ class ContactSearch:
             if solutions.colliding:
                 pairs = pairs_shown(coming.colliding(solutions.colliding[0]))
                 return 1, StageFailure(to, MotionReason.GOAL_IN_COLLISION, pairs)
-            away, angle = solutions.nearest
-            text = f"the tip got within {away * 100:.1f} cm and {math.degrees(angle):.1f} deg of it"
-            return 0, StageFailure(to, MotionReason.GOAL_OUT_OF_REACH, text)
+            return 0, StageFailure(to, MotionReason.GOAL_OUT_OF_REACH, solutions.miss)
         leaving, failed = checkers.leaving(contact), list[_Failed]()
         for values in solutions.free:
             come = self._line(to, values, contact.moved(contact.before), coming)
@@ -280,15 +281,6 @@ class PlanningHelper(Protocol):
         """Let go of the job."""
 
 
-class PlansWithHelp(Protocol):
-    """What plans for an arm among objects, and who helps it."""
-
-    planner: MotionPlanner
-    objects: tuple[PlacedObject, ...]
-    paddings: Mapping[str, float]
-    helpers: Sequence[PlanningHelper]
-
-
 class _Found:
     """What was found, and who plans the motion to it."""
 
@@ -315,7 +307,7 @@ class WaysAhead:
     """One search for ways. Close it at the end."""
 
     def __init__(
-        self, search: ContactSearch, contacts: Iterable[Contact], checkers: ContactCheckers, works: PlansWithHelp
+        self, search: ContactSearch, contacts: Iterable[Contact], checkers: ContactCheckers, works: ArmWorks
     ) -> None:
         self._search, self._contacts, self._checkers, self._works = search, list(contacts), checkers, works
         self._scene = (works.objects, works.paddings)
@@ -475,15 +467,6 @@ class HandSite(ArmSite, Protocol):
         """Let an object stay where it is; `ended` gets why that cannot be, or nothing."""
 
 
-class HandWorks(PlansWithHelp, Protocol):
-    """What plans for an arm."""
-
-    kinematics: ArmKinematics
-
-    def checker(self, objects: Iterable[PlacedObject]) -> Checker:
-        """Return a checker among these objects."""
-
-
 class AlongPath(MotionPlanner):
     """A planner that knows the way: the points of a path, of shape (m, n), after where the arm is."""
 
@@ -502,7 +485,7 @@ class HandTask:
     stages: ClassVar[tuple[str, ...]]
     """Names of its stages, in order; each is carried out by the method of that name."""
 
-    def __init__(self, site: HandSite, works: HandWorks, hand: Hand, pace: ArmGoal) -> None:
+    def __init__(self, site: HandSite, works: ArmWorks, hand: Hand, pace: ArmGoal) -> None:
         """Begin; `pace` has the shares of speed and acceleration."""
         self.failure: StageFailure | None = None
         self.is_over = self.is_canceled = False
@@ -614,10 +597,8 @@ class HandTask:
         touching = self.works.checker([*others, replace(held, touches=(*held.touches, *below))])
         return NearChecker(self.kinematics, strict, touching, tip.translation)
 
-    def reached(
-        self, contacts: Iterable[Contact], checkers: ContactCheckers, lines: tuple[str, str]
-    ) -> Generator[None, None, ContactWay | StageFailure]:
-        """Go to where the line to a contact begins, the first one that a motion is planned to, and return its way."""
+    def approached(self, contacts: Iterable[Contact], checkers: ContactCheckers, lines: tuple[str, str]) -> Work:
+        """Go to where the line to a contact begins, the first one that a motion is planned to, and keep its way."""
         space = self.space.inside(SPARE)
         search = ContactSearch(self.kinematics, space, self.here, self.works.planner.settings.seed, lines)
         failure = self.fail(MotionReason.GOAL_OUT_OF_REACH, "there is no way to it")
@@ -630,7 +611,8 @@ class HandTask:
                     return found
                 failed = yield from self._led(HelpedPlanner(self.works.planner, ways), found.coming[0], self._usual)
                 if failed is None:
-                    return found
+                    self._way = found
+                    return None
                 failure = self.fail(failed.reason, failed.text)
                 if failed.reason not in (MotionReason.NO_PATH_IN_TIME, MotionReason.PATH_IN_COLLISION):
                     break
@@ -640,17 +622,10 @@ class HandTask:
         return self.works.planner.checker
 
     def _worked(self, work: Generator[None, None, T]) -> Generator[None, None, T | StageFailure]:
-        """Go on with some work until it has a result, or the goal is cancelled."""
+        """Carry out what takes many slices."""
         while not self.is_canceled:
-            begin = self.site.now
-            for _ in range(TRIES):
-                try:
-                    next(work)
-                except StopIteration as ended:
-                    result: T = ended.value
-                    return result
-                if self.site.now - begin >= LONGEST_CALL:
-                    break
+            if done := gone_on(work, lambda: self.site.now, TRIES):
+                return done[0]
             yield
         return self.fail(MotionReason.INTERRUPTED, "it was cancelled")
 
@@ -734,7 +709,7 @@ class PickTask(HandTask):
 
     stages = ("choose", "open", "approach", "grasp", "close", "attach", "lift")
 
-    def __init__(self, site: HandSite, works: HandWorks, hand: Hand, goal: PickGoal, pace: ArmGoal) -> None:
+    def __init__(self, site: HandSite, works: ArmWorks, hand: Hand, goal: PickGoal, pace: ArmGoal) -> None:
         super().__init__(site, works, hand, pace)
         self._goal = goal
         self._grasps: list[Grasp] = []
@@ -786,11 +761,8 @@ class PickTask(HandTask):
 
     def approach(self) -> Work:
         """Find a grasp whose lines are free, and go to where the first one begins."""
-        way = yield from self.reached(map(self._contact, self._grasps), self, ("grasp", "lift"))
-        if isinstance(way, StageFailure):
-            return None if self._has_moved else way  # the next stage begins again
-        self._way = way
-        return None
+        failure = yield from self.approached(map(self._contact, self._grasps), self, ("grasp", "lift"))
+        return failure if failure is None or not self._has_moved else None  # the next stage begins again
 
     def grasp(self) -> Work:
         """Go straight to the object, which open fingers do not touch; begin again if it is not where it was."""
@@ -902,7 +874,7 @@ class PlaceTask(HandTask):
 
     stages = ("choose", "approach", "lower", "open", "detach", "retreat")
 
-    def __init__(self, site: HandSite, works: HandWorks, hand: Hand, goal: PlaceGoal, pace: ArmGoal) -> None:
+    def __init__(self, site: HandSite, works: ArmWorks, hand: Hand, goal: PlaceGoal, pace: ArmGoal) -> None:
         super().__init__(site, works, hand, pace)
         self._goal = goal
 
@@ -962,11 +934,7 @@ class PlaceTask(HandTask):
 
     def approach(self) -> Work:
         """Find a pose whose lines are free, and go above it."""
-        way = yield from self.reached(self._contacts(), self, ("lower", "retreat"))
-        if isinstance(way, StageFailure):
-            return way
-        self._way = way
-        return None
+        return self.approached(self._contacts(), self, ("lower", "retreat"))
 
     def lower(self) -> Work:
         """Go straight down until the object stands."""

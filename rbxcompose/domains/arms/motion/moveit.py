@@ -17,13 +17,19 @@ from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.arm_task import ArmGoal, ArmSite, ArmTask, GivenTask
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace
-from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseSolutions, PoseTarget, SolverSettings
+from rbxcompose.domains.arms.motion.inverse_kinematics import (
+    PoseSearch,
+    PoseSolutions,
+    PoseTarget,
+    Posture,
+    SolverSettings,
+    searched,
+)
 from rbxcompose.domains.arms.motion.octree_files import cells_of_octomap
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptRange
 from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
-from rbxcompose.domains.arms.motion.pose_search import Posture, searched
-from rbxcompose.domains.arms.motion.scene_messages import joint_trajectory
+from rbxcompose.domains.arms.motion.scene_messages import colour_message, joint_trajectory
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 from rbxcompose.domains.arms.section_models import OMPL, PLANNERS
 from rbxcompose.domains.body.model import Body, Geometry
@@ -56,7 +62,7 @@ from rbxcompose.msgs.poses import pose_message, pose_of
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.shape_msgs import Mesh, MeshTriangle, Plane, SolidPrimitive
 from rbxcompose.msgs.stamps import to_duration, to_seconds
-from rbxcompose.msgs.std_msgs import ColorRGBA, Header
+from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
 
 KINDS = {
@@ -78,9 +84,7 @@ def object_of(message: CollisionObject, root: str) -> scenes.PlacedObject:
     pieces = list(pieces_of(message))
     if not pieces:
         raise scenes.SceneError(f"'{message.id}' has no shapes")
-    first, *rest = pieces
-    link, pose = message.header.frame_id or root, pose_of(message.pose)
-    return scenes.PlacedObject(message.id, first.shape, link, pose, pieces=tuple(rest), shape_pose=first.pose)
+    return scenes.PlacedObject.of(message.id, message.header.frame_id or root, pose_of(message.pose), pieces)
 
 
 def pieces_of(message: CollisionObject) -> Iterator[scenes.ScenePiece]:
@@ -165,6 +169,10 @@ class RequestError(ValueError):
         self.code = code
 
 
+def _bad_goal(text: str) -> RequestError:
+    return RequestError(Codes.INVALID_GOAL_CONSTRAINTS, text)
+
+
 @dataclass(frozen=True, slots=True)
 class MotionWish:
     """A request as an arm takes it. `start` are positions of joints [rad or m] that differ from where they are."""
@@ -194,7 +202,7 @@ class RequestReader:
             raise RequestError(Codes.START_STATE_INVALID, words)
         if len(request.goal_constraints) != 1:
             words = f"there are {len(request.goal_constraints)} alternatives in 'goal_constraints': one is taken"
-            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, words)
+            raise _bad_goal(words)
         at = {**self.positions, **start}
         goal = replace(
             self._goal(request.goal_constraints[0]),
@@ -236,7 +244,7 @@ class RequestReader:
             return ArmGoal(positions={joint.joint_name: self._joint(joint) for joint in joints}, tolerance=tolerance)
         if joints or len(places) > 1 or len(turns) > 1 or not (places or turns):
             words = "a goal is made of positions of joints, or of a position of the tip, an orientation, or both"
-            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, words)
+            raise _bad_goal(words)
         return self._pose(places[0], turns[0] if turns else None) if places else self._turn(turns[0])
 
     def _turn(self, turn: OrientationConstraint) -> ArmGoal:
@@ -249,10 +257,9 @@ class RequestReader:
     def _joint(self, constraint: JointConstraint) -> float:
         """Return where a joint is wanted."""
         if constraint.joint_name not in self.kinematics.group.joints:
-            words = f"'{constraint.joint_name}' is no joint of the arm '{self.name}'"
-            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, words)
+            raise _bad_goal(f"'{constraint.joint_name}' is no joint of the arm '{self.name}'")
         if min(constraint.tolerance_above, constraint.tolerance_below) < 0.0 or not math.isfinite(constraint.position):
-            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, f"'{constraint.joint_name}' is wanted nowhere")
+            raise _bad_goal(f"'{constraint.joint_name}' is wanted nowhere")
         return constraint.position
 
     def _pose(self, place: PositionConstraint, turn: OrientationConstraint | None) -> ArmGoal:
@@ -261,12 +268,11 @@ class RequestReader:
         middle, tolerance = _region(place)
         if turn is None or all(one >= math.pi for one in _tolerances(turn)):
             if any((offset.x, offset.y, offset.z)):
-                words = "a point beside the tip is taken together with an orientation alone"
-                raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, words)
+                raise _bad_goal("a point beside the tip is taken together with an orientation alone")
             return ArmGoal(target=PoseTarget(middle, True, tolerance), frame=frame)
         self._require_tip(turn.link_name)
         if self._frame(turn.header.frame_id) != frame:
-            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "position and orientation are in different frames")
+            raise _bad_goal("position and orientation are in different frames")
         point = Transform3((offset.x, offset.y, offset.z))
         pose = Transform3(middle.translation, _rotation(turn.orientation)).compose(point.inverse())
         return ArmGoal(target=PoseTarget(pose, False, tolerance, min(_tolerances(turn))), frame=frame)
@@ -276,7 +282,7 @@ class RequestReader:
         places, turns = wanted.position_constraints, wanted.orientation_constraints
         _require_visible(wanted)
         if len(places) > 1 or len(turns) > 1:
-            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "on the way, one position and one orientation are kept")
+            raise _bad_goal("on the way, one position and one orientation are kept")
         joints = {}
         for constraint in wanted.joint_constraints:
             middle = self._joint(constraint)
@@ -287,8 +293,7 @@ class RequestReader:
             return Keep(inside=inside, joints=joints, frame=frame)
         turned, is_along_frame = self._turned(turns[0], at)
         if places and not (is_along_frame and frame == self._frame(turns[0].header.frame_id)):
-            words = "position and orientation are kept together only along the axes of one frame"
-            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, words)
+            raise _bad_goal("position and orientation are kept together only along the axes of one frame")
         return Keep(turned, inside, joints, frame if places else self.kinematics.group.tip)
 
     def _box(self, place: PositionConstraint) -> tuple[KeptRange | None, KeptRange | None, KeptRange | None]:
@@ -298,8 +303,7 @@ class RequestReader:
         pose = pose_of(region.primitive_poses[0]) if region.primitive_poses else Transform3()
         is_turned = angle_between(NO_ROTATION, pose.rotation) > AS_BEFORE
         if not is_box or region.meshes or any((offset.x, offset.y, offset.z)) or is_turned:
-            words = "on the way, the tip is kept in one box along the axes of its frame"
-            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, words)
+            raise _bad_goal("on the way, the tip is kept in one box along the axes of its frame")
         sides = region.primitives[0].dimensions.tolist()
         x, y, z = ((at - side / 2, at + side / 2) for at, side in zip(pose.translation, sides, strict=True))
         return x, y, z
@@ -363,18 +367,18 @@ def _require_plain(request: MotionPlanRequest, options: PlanningOptions) -> None
 
 def _require_visible(wanted: Constraints) -> None:
     if wanted.visibility_constraints:
-        raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "an arm does not know what is visible")
+        raise _bad_goal("an arm does not know what is visible")
 
 
 def _region(place: PositionConstraint) -> tuple[Transform3, float]:
     """Return the middle of the part of space where the tip has to be, and how far from it that reaches [m]."""
     region = place.constraint_region
     if len(region.primitives) != 1 or region.meshes or len(region.primitive_poses) > 1:
-        raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "a position is wanted in one sphere or box")
+        raise _bad_goal("a position is wanted in one sphere or box")
     shape, sizes = region.primitives[0], region.primitives[0].dimensions.tolist()
     wanted = {SolidPrimitive.SPHERE: (1, 1.0), SolidPrimitive.BOX: (3, 0.5)}.get(shape.type)
     if wanted is None or len(sizes) != wanted[0] or not min(sizes) > 0.0:
-        raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "a position is wanted in one sphere or box")
+        raise _bad_goal("a position is wanted in one sphere or box")
     pose = pose_of(region.primitive_poses[0]) if region.primitive_poses else Transform3()
     return Transform3(pose.translation), min(sizes) * wanted[1]
 
@@ -382,9 +386,9 @@ def _region(place: PositionConstraint) -> tuple[Transform3, float]:
 def _tolerances(turn: OrientationConstraint) -> Triple:
     found = (turn.absolute_x_axis_tolerance, turn.absolute_y_axis_tolerance, turn.absolute_z_axis_tolerance)
     if not min(found) > 0.0:
-        raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "a tolerance of an orientation is not above 0")
+        raise _bad_goal("a tolerance of an orientation is not above 0")
     if turn.parameterization != OrientationConstraint.XYZ_EULER_ANGLES and len(set(found)) > 1:
-        raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "a rotation vector is taken with one tolerance for all axes")
+        raise _bad_goal("a rotation vector is taken with one tolerance for all axes")
     return found
 
 
@@ -392,7 +396,7 @@ def _rotation(message: Quaternion) -> tuple[float, float, float, float]:
     found = (message.x, message.y, message.z, message.w)
     length = math.hypot(*found)
     if not abs(length - 1.0) <= AS_BEFORE:
-        raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "an orientation is no rotation")
+        raise _bad_goal("an orientation is no rotation")
     x, y, z, w = found
     return x / length, y / length, z / length, w / length
 
@@ -440,14 +444,8 @@ class KinematicsQuery:
         pose = PoseTarget((links[frame] if frame else Transform3()).compose(pose.pose))
         is_free = self.checker.is_free if request.avoid_collisions else lambda values: True
         space, posture = self._constrained(request.constraints.joint_constraints)
-        search = searched(PoseSearch(self.kinematics, space, pose, start, is_free, seed, TRIES, 1), posture)
-        while True:
-            try:
-                next(search)
-            except StopIteration as ended:
-                yield self._answer(ended.value)
-                return
-            yield None
+        search = PoseSearch(self.kinematics, space, pose, start, is_free, seed, TRIES, 1)
+        yield self._answer((yield from searched(search, posture)))
 
     def _constrained(self, wanted: Sequence[JointConstraint]) -> tuple[JointSpace, Posture | None]:
         """Return the joints within what is asked of them, and the positions that are preferred there."""
@@ -620,7 +618,9 @@ class MoveItScene:
             robot_model_name=self.scene.body.name,
             robot_state=state,
             link_padding=tuple(LinkPadding(link_name=link, padding=padding) for link, padding in self.paddings.items()),
-            object_colors=tuple(ObjectColor(id=item.name, color=_color(item)) for item in objects if item.colour),
+            object_colors=tuple(
+                ObjectColor(id=item.name, color=colour_message(item.colour)) for item in objects if item.colour
+            ),
             world=PlanningSceneWorld(
                 collision_objects=tuple(collision_object(object_) for object_ in objects if object_ not in held)
             ),
@@ -680,11 +680,6 @@ class MoveItScene:
                 self.scene.put(replace(object_, touches=links, touches_objects=others))
 
 
-def _color(thing: scenes.PlacedObject) -> ColorRGBA:
-    red, green, blue, alpha = thing.colour or (0.0, 0.0, 0.0, 0.0)
-    return ColorRGBA(r=red, g=green, b=blue, a=alpha)
-
-
 CODES = {
     MotionReason.UNKNOWN_GOAL: Codes.INVALID_GOAL_CONSTRAINTS,
     MotionReason.UNKNOWN_START: Codes.ROBOT_STATE_STALE,
@@ -719,11 +714,6 @@ def code_of(failure: MotionFailure | None, *, is_moving: bool) -> Codes:
     if is_moving and failure.reason is MotionReason.PATH_IN_COLLISION:
         value = Codes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
     return not_done(value, f"{failure.reason}: {failure.text}")
-
-
-def motion_message(names: tuple[str, ...], trajectory: Trajectory) -> RobotTrajectory:
-    """Return a motion with where it begins as its first point."""
-    return RobotTrajectory(joint_trajectory=joint_trajectory(names, trajectory, begin=0))
 
 
 def trace_message(names: tuple[str, ...], times: list[float], rows: list[list[float]]) -> RobotTrajectory:
@@ -915,10 +905,13 @@ class MoveItTask:
         if planned is None and self.failure is None:  # the arm is where it should be
             here = np.array([[self.measured[name][0] for name in names]])
             planned = Trajectory(np.zeros(1), here, np.zeros_like(here))
+        motion = found.planned_trajectory
+        if planned is not None:
+            motion = RobotTrajectory(joint_trajectory=joint_trajectory(names, planned, begin=0))
         return MoveGroup.Result(
             error_code=self.code,
             trajectory_start=self._begin_state,
-            planned_trajectory=motion_message(names, planned) if planned is not None else found.planned_trajectory,
+            planned_trajectory=motion,
             executed_trajectory=trace_message(names, self._times, self._rows),
             planning_time=self._planned_at - self._began,
         )

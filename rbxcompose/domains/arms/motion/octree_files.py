@@ -11,6 +11,7 @@ import numpy as np
 from rbxcompose.base.files import read_regular
 from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.scene import MOST_POINTS
+from rbxcompose.domains.body.model import Geometry
 
 LARGEST = 20_000_000  # [bytes]
 DEPTH = 16  # levels of OctoMap's trees
@@ -39,6 +40,12 @@ def read_cells(path: Path, side: float) -> tuple[Array, float]:
     if points.ndim != 2 or points.shape[1] != 3 or not np.all(np.isfinite(points)):
         raise ValueError(f"'{path.name}' does not have three numbers in each line")
     return cells_of(points, side), side
+
+
+def cells_in(shape: Geometry) -> tuple[Array, float]:
+    """Return what `read_cells` does, of an octree, which has its cells in a file or with it."""
+    side = shape.size[0]
+    return read_cells(Path(shape.file), side) if shape.file else (np.array(shape.points).reshape(-1, 3), side)
 
 
 def cells_of(points: Array, side: float) -> Array:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, conjugate, multiply
+from rbxcompose.base.geometry import Transform3, Vector3, conjugate, multiply, quaternion_between
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
+from rbxcompose.domains.arms.motion.collisions import Checker
 from rbxcompose.domains.arms.motion.groups import ArmJoint, Array, JointSpace, solid_link
 from rbxcompose.domains.body.model import Body, Geometry
 from rbxcompose.domains.worlds.physics.solids import rotation_matrix
@@ -55,17 +56,10 @@ class KeptSight:
         return ""
 
 
-class SeesThings(Protocol):
-    """What knows all shapes of the body, and the things around it."""
-
-    def in_the_way(self, values: Array, shape: Geometry, at: Transform3, ignored: Collection[str]) -> list[str]:
-        """Return the links and objects that a shape at a pose in the root's frame would be within."""
-
-
 class SightLine:
     """Whether a sensor sees its target, at positions of joints of shape (n,)."""
 
-    def __init__(self, kinematics: ArmKinematics, wanted: KeptSight, things: SeesThings) -> None:
+    def __init__(self, kinematics: ArmKinematics, wanted: KeptSight, things: Checker) -> None:
         self.wanted, self._kinematics, self._things = wanted, kinematics, things
         body = kinematics.body
         self._target = wanted.target or body.root
@@ -94,9 +88,9 @@ class SightLine:
         length = float(np.linalg.norm(away))
         if length < NEAREST:
             return []
-        x, y, z = ((eye + point) / 2).tolist()
-        cone = Geometry("cone", (self.wanted.radius, length))
-        return self._things.in_the_way(values, cone, Transform3((x, y, z), _towards(away / length)), self._ignored)
+        (x, y, z), (a, b, c) = ((eye + point) / 2).tolist(), (away / length).tolist()
+        there = Transform3((x, y, z), quaternion_between(_unit(2), (a, b, c)))
+        return self._things.in_the_way(values, Geometry("cone", (self.wanted.radius, length)), there, self._ignored)
 
     def angle(self, values: Array) -> float:
         """Return by how much the target is off the axis [rad]."""
@@ -135,15 +129,6 @@ def _angle(array: Array, other: Array) -> float:
     if float(np.linalg.norm(other)) < NEAREST:
         return math.pi
     return math.atan2(float(np.linalg.norm(np.cross(array, other))), float(array @ other))
-
-
-def _towards(direction: Array) -> Quaternion:
-    """Return a rotation that turns z into a direction."""
-    x, y, z = direction.tolist()
-    if z < -1.0 + 1e-9:
-        return (1.0, 0.0, 0.0, 0.0)
-    size = math.sqrt(2.0 * (1.0 + z))
-    return (-y / size, x / size, 0.0, size / 2.0)
 
 
 KeptRange = tuple[float, float]
@@ -209,7 +194,7 @@ class KeptTip:
     Turns are measured as the angles a, b and c of the rotation about x, then y, then z of axes that turn with them.
     """
 
-    def __init__(self, kinematics: ArmKinematics, keep: Keep, start: Array, things: SeesThings | None = None) -> None:
+    def __init__(self, kinematics: ArmKinematics, keep: Keep, start: Array, things: Checker | None = None) -> None:
         """Build it; `things` know what may be before a target that is to be seen, and are needed for that alone."""
         self._kinematics = kinematics
         if keep.sight is not None and things is None:

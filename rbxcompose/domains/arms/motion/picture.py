@@ -9,11 +9,12 @@ from pathlib import Path
 from textwrap import wrap
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3
 from rbxcompose.domains.arms.motion.groups import Array
-from rbxcompose.domains.arms.motion.octree_files import read_cells
+from rbxcompose.domains.arms.motion.octree_files import cells_in
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.body import picture as body_picture
 from rbxcompose.domains.body.meshes import Solid, joined
@@ -101,13 +102,16 @@ def _solids(thing: PlacedObject, poses: Mapping[str, Transform3], is_red: bool) 
 
 
 def _cells(shape: Geometry) -> Solid:
-    cells, side = np.array(shape.points).reshape(-1, 3), shape.size[0]
-    if shape.file:
-        cells, side = read_cells(Path(shape.file), side)
-    box = next(body_picture.solids_of(Geometry("box", (side,) * 3), {}))
-    vertices = (cells[:, None] + box.vertices[None]).reshape(-1, 3)
-    faces = (box.faces[None] + len(box.vertices) * np.arange(len(cells))[:, None, None]).reshape(-1, 3)
+    vertices, faces = cubes(*cells_in(shape))
     return Solid(vertices, faces, np.tile(SAND, (len(faces), 1)))
+
+
+def cubes(middles: Array, side: float) -> tuple[Array, NDArray[np.int64]]:
+    """Return corners [m] and triangles of cubes around middles [m], the same number of triangles for each."""
+    box = next(body_picture.solids_of(Geometry("box", (side,) * 3), {}))
+    corners = (middles[:, None] + box.vertices[None]).reshape(-1, 3)
+    faces = (box.faces[None] + len(box.vertices) * np.arange(len(middles))[:, None, None]).reshape(-1, 3)
+    return corners, faces
 
 
 def _planes(thing: PlacedObject, poses: Mapping[str, Transform3], bounds: Array) -> Iterator[Solid]:

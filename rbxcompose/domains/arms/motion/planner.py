@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator, Iterator
 from functools import partial
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.domains.arms.motion.collisions import Checker, SearchingChecker, can_search, pairs_shown
+from rbxcompose.domains.arms.motion.collisions import Checker, can_search, pairs_shown
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace, interpolated
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory, curve, jerks_of, speeds_of, timed
 from rbxcompose.domains.arms.motion.path_constraints import KeptTip
@@ -18,6 +19,10 @@ from rbxcompose.domains.arms.section_models import AUTOMATIC, FAST, ompl_planner
 from rbxcompose.domains.body.link_pairs import LinkPair
 from rbxcompose.domains.servos.trajectory import ROUNDING
 
+if TYPE_CHECKING:  # which imports what compiles
+    from rbxcompose.domains.arms.motion.sphere_checker import SphereChecker
+
+T = TypeVar("T")
 SLICE = 1_000  # examined positions, after which an examination lets others run
 
 
@@ -235,25 +240,17 @@ class _Run:
         yield from ()
         return line if is_free else None
 
-    def _fast(self, checker: SearchingChecker, seed: int) -> Generator[None, None, Array | None]:
+    def _fast(self, checker: SphereChecker, seed: int) -> Generator[None, None, Array | None]:
         """Return a path on spheres, None if there is none."""
-        one, before = self._planner.settings, self._examined
-        search = checker.ways(
-            self._space, self.start, self.goal, seed=seed, resolution=RESOLUTION, simplify=one.simplify
+        one, self._found_by = self._planner.settings, FAST
+        found = yield from self._in_time(
+            checker.ways(self._space, self.start, self.goal, seed=seed, resolution=RESOLUTION, simplify=one.simplify),
+            FAST_SHARE,
         )
-        self._found_by = FAST
-        while not self._is_late(FAST_SHARE):
-            try:
-                self._examined = before + next(search)
-            except StopIteration as ended:
-                found: Array | str = ended.value
-                if not isinstance(found, str):
-                    return found
-                self._fast_failed, self._is_fast_hopeless = found, True
-                return None
-            yield
-        search.close()
-        self._fast_failed = f"none in {one.time * FAST_SHARE:g} s"
+        if found is not None and not isinstance(found, str):
+            return found
+        self._is_fast_hopeless = found is not None
+        self._fast_failed = found or f"none in {one.time * FAST_SHARE:g} s"
         return None
 
     def _slow(self, attempt: int) -> Generator[None, None, Array | None]:
@@ -262,16 +259,22 @@ class _Run:
         self._found_by = ompl_planner(settings.planner)
         whole = ((np.inf, 1.0),)  # also of what is kept on the way: to begin again there would only lose time
         for margin, share in whole if self._kept is not None else ((MARGIN, NEAR_SHARE), *whole):
-            search = self._search(attempt, margin)
-            before = self._examined
-            while not self._is_late(share):
-                try:
-                    self._examined = before + next(search)
-                except StopIteration as ended:
-                    found: Array = ended.value
-                    return found
-                yield
-            search.close()
+            found = yield from self._in_time(self._search(attempt, margin), share)
+            if found is not None:
+                return found
+        return None
+
+    def _in_time(self, search: Generator[int, None, T], share: float) -> Generator[None, None, T | None]:
+        """Return what a search finds, None if that takes longer than a share of the time."""
+        before = self._examined
+        while not self._is_late(share):
+            try:
+                self._examined = before + next(search)
+            except StopIteration as ended:
+                found: T = ended.value
+                return found
+            yield
+        search.close()
         return None
 
     def _search(self, attempt: int, margin: float) -> Generator[int, None, Array]:

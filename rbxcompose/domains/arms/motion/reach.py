@@ -11,14 +11,12 @@ from textwrap import wrap
 import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace
-from rbxcompose.domains.arms.motion.picture import ArmPicture, solids_in
+from rbxcompose.domains.arms.motion.picture import ArmPicture, cubes, solids_in
 from rbxcompose.domains.body.meshes import Solid, joined
-from rbxcompose.domains.body.model import Geometry
-from rbxcompose.domains.body.picture import bounds_of, need_for_pictures, placed, png_of, rendered, solids_of
+from rbxcompose.domains.body.picture import bounds_of, need_for_pictures, png_of, rendered
 
 Cell = tuple[int, int, int]
 
@@ -164,11 +162,9 @@ def colours_of(values: Sequence[float], most: float) -> Array:
 
 def _cubes(shown: ReachPicture) -> Solid:
     middles = np.array(list(shown.cells), dtype=float) * shown.side
-    side = shown.side * (_FULL if shown.is_layer else _SMALL)
-    box = placed(next(solids_of(Geometry("box", (side,) * 3), {})), Transform3(), None)
-    vertices = (middles[:, None] + box.vertices[None]).reshape(-1, 3)
-    faces = (box.faces[None] + len(box.vertices) * np.arange(len(middles))[:, None, None]).reshape(-1, 3)
-    return Solid(vertices, faces, np.repeat(colours_of(list(shown.cells.values()), shown.most), len(box.faces), axis=0))
+    vertices, faces = cubes(middles, shown.side * (_FULL if shown.is_layer else _SMALL))
+    colours = colours_of(list(shown.cells.values()), shown.most)
+    return Solid(vertices, faces, np.repeat(colours, len(faces) // len(middles), axis=0))
 
 
 def _with_legend(png: bytes, shown: ReachPicture) -> bytes:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any, Self
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
@@ -109,6 +110,12 @@ class PlacedObject:
     colour: Colour | None = None
     padding: float = 0.0
     shape_pose: Transform3 = Transform3()
+
+    @classmethod
+    def of(cls, name: str, link: str, pose: Transform3, pieces: Sequence[ScenePiece], **more: Any) -> Self:
+        """Return an object of one shape or more."""
+        first, *rest = pieces
+        return cls(name, first.shape, link, pose, pieces=tuple(rest), shape_pose=first.pose, **more)
 
     @property
     def own_pieces(self) -> tuple[ScenePiece, ...]:

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rbxcompose.base.geometry import Transform3, Vector3, quaternion_about
+from rbxcompose.base.geometry import Transform3, Vector3, quaternion_between
 from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
-from rbxcompose.domains.arms.motion.scene import PlacedObject, ScenePiece
+from rbxcompose.domains.arms.motion.scene import Colour, PlacedObject, ScenePiece
 from rbxcompose.domains.body.model import Geometry
 from rbxcompose.msgs.geometry_msgs import Point, PoseStamped
 from rbxcompose.msgs.geometry_msgs import Vector3 as Vector3Message
@@ -37,9 +37,11 @@ def joint_trajectory(names: tuple[str, ...], motion: Trajectory, *, begin: int =
     return JointTrajectory(header=Header(stamp=to_time(stamp)), joint_names=names, points=points)
 
 
+NO_COLOUR = (0.0, 0.0, 0.0, 0.0)
+
+
 def object_message(object_: PlacedObject) -> SceneObject:
     """Return an object as a message; an opacity of 0 is no colour."""
-    red, green, blue, alpha = object_.colour or (0.0, 0.0, 0.0, 0.0)
     return SceneObject(
         name=object_.name,
         link=object_.link,
@@ -48,25 +50,29 @@ def object_message(object_: PlacedObject) -> SceneObject:
         touches=object_.touches,
         touches_objects=object_.touches_objects,
         padding=object_.padding,
-        color=ColorRGBA(r=red, g=green, b=blue, a=alpha),
+        color=colour_message(object_.colour or NO_COLOUR),
     )
+
+
+def colour_message(colour: Colour) -> ColorRGBA:
+    """Return a colour as a message."""
+    red, green, blue, alpha = colour
+    return ColorRGBA(r=red, g=green, b=blue, a=alpha)
 
 
 def placed_object(message: SceneObject) -> PlacedObject:
     """Return the object of a message; without a shape, it is one that cannot be."""
     pieces = [_piece(shape) for shape in message.shapes] or [ScenePiece(Geometry("nothing"), Transform3())]
     color = message.color
-    return PlacedObject(
+    return PlacedObject.of(
         message.name,
-        pieces[0].shape,
         message.link,
         pose_of(message.pose),
-        message.touches,
-        message.touches_objects,
-        tuple(pieces[1:]),
-        (color.r, color.g, color.b, color.a) if color.a else None,
-        message.padding,
-        pieces[0].pose,
+        pieces,
+        touches=message.touches,
+        touches_objects=message.touches_objects,
+        colour=(color.r, color.g, color.b, color.a) if color.a else None,
+        padding=message.padding,
     )
 
 
@@ -115,7 +121,6 @@ def path_of(way: Sequence[Vector3], frame: str) -> PathMessage:
 
 def _marker(object_: PlacedObject, piece: ScenePiece, number: int) -> Marker:
     kind, scale, points, at = _shown(piece.shape)
-    red, green, blue, alpha = object_.colour or SAND
     return Marker(
         header=Header(frame_id=object_.link),
         ns=object_.name,
@@ -123,7 +128,7 @@ def _marker(object_: PlacedObject, piece: ScenePiece, number: int) -> Marker:
         type=kind,
         pose=pose_message(piece.pose.compose(at)),
         scale=Vector3Message(x=scale[0], y=scale[1], z=scale[2]),
-        color=ColorRGBA(r=red, g=green, b=blue, a=alpha),
+        color=colour_message(object_.colour or SAND),
         frame_locked=True,
         points=tuple(Point(x=float(x), y=float(y), z=float(z)) for x, y, z in points),
         mesh_resource=Path(piece.shape.file).as_uri() if kind == Marker.MESH_RESOURCE else "",
@@ -142,7 +147,12 @@ def _shown(shape: Geometry) -> tuple[int, Vector3, Points, Transform3]:
             return Marker.CYLINDER, (2 * radius, 2 * radius, length), (), Transform3()
         case "plane":
             a, b, c, d = shape.size
-            return Marker.CUBE, _SHEET, (), Transform3((-a * d, -b * d, -c * d), _upright((a, b, c)))
+            return (
+                Marker.CUBE,
+                _SHEET,
+                (),
+                Transform3((-a * d, -b * d, -c * d), quaternion_between((0.0, 0.0, 1.0), (a, b, c))),
+            )
         case "octree":
             cells, side = np.array(shape.points).reshape(-1, 3), shape.size[0]
             if shape.file:
@@ -161,14 +171,6 @@ def _cone(radius: float, length: float) -> Iterator[Vector3]:
     rim = [(radius * math.cos(turn), radius * math.sin(turn), -length / 2) for turn in turns]
     for first, second in pairwise(rim):
         yield from (first, second, (0.0, 0.0, length / 2), second, first, (0.0, 0.0, -length / 2))
-
-
-def _upright(normal: Vector3) -> tuple[float, float, float, float]:
-    """Return the rotation from z to a unit vector."""
-    x, y, z = normal
-    across = math.hypot(x, y)
-    axis = (-y / across, x / across, 0.0) if across else (1.0, 0.0, 0.0)
-    return quaternion_about(axis, math.atan2(across, z))
 
 
 def _vector(values: Sequence[float]) -> Vector3:

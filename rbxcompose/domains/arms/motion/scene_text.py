@@ -101,10 +101,7 @@ class _Reader:
         for _ in range(self._count("number of subframes", scene.MOST_SHAPES) if self._has_poses else 0):
             self._next("a subframe")
             self._pose()
-        first, *rest = pieces
-        return scene.PlacedObject(
-            head.rest, first.shape, "", pose, pieces=tuple(rest), colour=colour, shape_pose=first.pose
-        )
+        return scene.PlacedObject.of(head.rest, "", pose, pieces, colour=colour)
 
     def _shape(self) -> Geometry:
         word = self._next("a shape")

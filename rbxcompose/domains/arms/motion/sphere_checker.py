@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Generator, Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from rbxcompose.domains.arms.motion.collisions import CheckedPart, MeshChecker
 from rbxcompose.domains.arms.motion.compiled_collisions import CompiledModel, near_pairs, workspace
 from rbxcompose.domains.arms.motion.fast_search import compile_search, fast_path
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace, leader_of
-from rbxcompose.domains.arms.motion.octree_files import read_cells
+from rbxcompose.domains.arms.motion.octree_files import cells_in
 from rbxcompose.domains.body.link_pairs import LinkPair
 from rbxcompose.domains.body.model import Geometry
 
@@ -197,8 +196,7 @@ def _tree(geometry: Geometry, coal: Coal) -> sphere_trees.SphereTree:
         case "plane":
             return NONE
         case "octree":
-            cells = np.array(geometry.points).reshape(-1, 3), size[0]
-            return sphere_trees.cells_tree(*(read_cells(Path(geometry.file), size[0]) if geometry.file else cells))
+            return sphere_trees.cells_tree(*cells_in(geometry))
     return sphere_trees.kept_mesh_tree(triangles_of(coal))
 
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise
-from typing import Protocol
 
 import numpy as np
 
@@ -37,17 +36,6 @@ class WayPoint:
 
     pose: Transform3
     is_via: bool = False
-
-
-class Leg(Protocol):
-    """A smooth piece of the way; `share` goes from 0 to 1."""
-
-    @property
-    def length(self) -> float:
-        """Return how long it is [m]."""
-
-    def at(self, share: float) -> Transform3:
-        """Return the pose there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +115,10 @@ class Corner:
         inner = float(np.interp(share * self.length, self.lengths, steps))
         before, after = Line(self.first, self.corner).at(inner), Line(self.corner, self.last).at(inner)
         return Line(before, after).at(inner)
+
+
+Leg = Line | Arc | Corner
+"""A piece of a way: its length [m], and its poses at shares from 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)

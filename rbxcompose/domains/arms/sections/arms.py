@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated
 
@@ -278,39 +278,40 @@ def _leads_to(name: str, wanted: str, entries: Mapping[str, ArmModel]) -> bool:
 
 def _group(reading: Reading[ArmModel], name: str, model: ArmModel, known: Body) -> ArmGroup | None:
     """Return the joints of an arm; None after a finding."""
+
+    def refuse(message: str, *path: str | int, help_text: str = "", related: Sequence[Related] = ()) -> None:
+        span = reading.value("arms", name, *path)
+        reading.report.add(NO_CHAIN.at(span, message, help=help_text, related=related))
+
     if model.links:
         if (found := carrying(known, model.links)) is None:
             message = f"no joint of these links carries '{model.links[-1]}', which would be the tip of the arm '{name}'"
-            reading.report.add(NO_CHAIN.at(reading.value("arms", name, "links", len(model.links) - 1), message))
+            refuse(message, "links", len(model.links) - 1)
         return found
     if model.chain is None:
         for index, joint in enumerate(model.joints):
             if not known.joints[joint].moves or known.joints[joint].mimic is not None:
-                span = reading.value("arms", name, "joints", index)
                 words = "follows another joint" if known.joints[joint].mimic else f"is {known.joints[joint].kind}"
-                reading.report.add(NO_CHAIN.at(span, f"'{joint}' {words}, so the arm '{name}' cannot move it"))
+                refuse(f"'{joint}' {words}, so the arm '{name}' cannot move it", "joints", index)
                 return None
         return group_of(known, model.joints)
-    if model.chain.to not in known.links:
+    base, tip = model.chain.from_, model.chain.to
+    if tip not in known.links:
         reading.report.add(_no_such_tip(reading.value("arms", name, "chain", "to"), model.chain, known))
         return None
-    found = chain(known, model.chain.from_, model.chain.to)
-    for index, joint in enumerate(model.passive if found is not None else ()):
-        if found is not None and joint not in found.joints:
-            span = reading.value("arms", name, "passive", index)
-            reading.report.add(NO_CHAIN.at(span, f"'{joint}' is not on the chain of the arm '{name}'"))
-            return None
-    if found is not None and (left := [joint for joint in found.joints if joint not in model.passive]):
-        return ArmGroup(tuple(left), found.base, found.tip)
-    span = reading.value("arms", name, "chain", "to")
-    if found is not None:
-        reading.report.add(NO_CHAIN.at(span, f"nothing moves between '{model.chain.from_}' and '{model.chain.to}'"))
+    if (found := chain(known, base, tip)) is None:
+        help_text = f"write 'chain: {{from: {tip}, to: {base}}}'" if chain(known, tip, base) is not None else ""
+        related = [Related(reading.value("arms", name, "chain", "from"), "its base")]
+        message = f"'{tip}' is not below '{base}', which carries the arm '{name}'"
+        refuse(message, "chain", "to", help_text=help_text, related=related)
         return None
-    message = f"'{model.chain.to}' is not below '{model.chain.from_}', which carries the arm '{name}'"
-    is_turned = chain(known, model.chain.to, model.chain.from_) is not None
-    help_text = f"write 'chain: {{from: {model.chain.to}, to: {model.chain.from_}}}'" if is_turned else ""
-    related = [Related(reading.value("arms", name, "chain", "from"), "its base")]
-    reading.report.add(NO_CHAIN.at(span, message, help=help_text, related=related))
+    for index, joint in enumerate(model.passive):
+        if joint not in found.joints:
+            refuse(f"'{joint}' is not on the chain of the arm '{name}'", "passive", index)
+            return None
+    if left := [joint for joint in found.joints if joint not in model.passive]:
+        return ArmGroup(tuple(left), found.base, found.tip)
+    refuse(f"nothing moves between '{base}' and '{tip}'", "chain", "to")
     return None
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.requests import to_data
@@ -69,36 +69,34 @@ def _state(state: controller_manager.ControllerState) -> str:
     return "active" if state.is_active else "inactive"
 
 
-def _switch(arguments: argparse.Namespace) -> int:
-    folder = find_robot(arguments.robot)
+def _buses(folder: RobotFolder, names: Sequence[str]) -> list[str]:
+    """Return the bus of each of these controllers."""
     buses = {state.name: bus for bus, state in _listed(folder)}
-    names = [*arguments.on, *arguments.off]
-    if not names:
-        raise NotDoneError(REFUSED.at(None, "name a controller to switch on, or one to switch off with --off"))
     for name in names:
         if name not in buses:
             message = clauses(f"there is no controller '{name}'", suggest(name, buses, "controllers"))
             raise NotDoneError(REFUSED.at(None, message))
-    if len({buses[name] for name in names}) > 1:
+    return [buses[name] for name in names]
+
+
+def _switch(arguments: argparse.Namespace) -> int:
+    folder, names = find_robot(arguments.robot), [*arguments.on, *arguments.off]
+    if not names:
+        raise NotDoneError(REFUSED.at(None, "name a controller to switch on, or one to switch off with --off"))
+    buses = _buses(folder, names)
+    if len(set(buses)) > 1:
         raise NotDoneError(REFUSED.at(None, "these controllers are on different buses: switch those of one at a time"))
-    request = controller_manager.SwitchControllers(buses[names[0]], tuple(arguments.on), tuple(arguments.off))
+    request = controller_manager.SwitchControllers(buses[0], tuple(arguments.on), tuple(arguments.off))
     show_answer(arguments, folder, answer_of(folder, request))
     return 0
 
 
 def _speed(arguments: argparse.Namespace) -> int:
     folder = find_robot(arguments.robot)
-    buses = {state.name: bus for bus, state in _listed(folder)}
-    if arguments.name not in buses:
-        message = clauses(f"there is no controller '{arguments.name}'", suggest(arguments.name, buses, "controllers"))
-        raise NotDoneError(REFUSED.at(None, message))
+    [bus] = _buses(folder, [arguments.name])
     try:
         share = to_si(arguments.share, RATIO)
     except UnitError as error:
         raise NotDoneError(REFUSED.at(None, f"'{arguments.share}' {error}", help="write '30 %'")) from error
-    show_answer(
-        arguments,
-        folder,
-        answer_of(folder, controller_manager.ScaleMotion(buses[arguments.name], arguments.name, share)),
-    )
+    show_answer(arguments, folder, answer_of(folder, controller_manager.ScaleMotion(bus, arguments.name, share)))
     return 0

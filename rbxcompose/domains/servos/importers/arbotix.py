@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import PurePath
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Related, Report, Severity, Span, kind
@@ -118,6 +118,11 @@ _JOINTS = {
     "dual": {"joint_left": "l_gripper_joint", "joint_right": "r_gripper_joint"},
     "parallel": {"joint": "gripper_joint"},
 }
+_SIDES = {  # keys of angles with parallel fingers, and of which servos turn the other way
+    "one_sided": (("center",), ("invert",)),
+    "dual": (("center_left", "center_right"), ("invert_left", "invert_right")),
+    "parallel": (("center",), ()),
+}
 _DRIVER = "a default of the controller"
 
 Lines = dict[str, tuple[str, str]]
@@ -146,7 +151,7 @@ def read_gripper(name: str, entry: ForeignMap) -> ArbotixGripper | None:
     keys = ("left", "right") if len(joints) > 1 else ("joint",)
     lines |= {key: (out.word(joint.value), out.place(joint.span)) for key, joint in zip(keys, joints, strict=True)}
     lines |= _scale(entry) if kind_of == "parallel" else _geometry(entry)
-    lines |= _two_sides(entry) if kind_of == "dual" else _one_side(entry, kind_of)
+    lines |= _sides(entry, *_SIDES[kind_of])
     entry.report_unknown_keys()
     return ArbotixGripper(name, entry.span, joints, lines, tuple(value for value, _ in lines.values()))
 
@@ -192,20 +197,13 @@ def _scale(entry: ForeignMap) -> Lines:
     return lines if value > 0 else lines | {"invert": (out.flag(True), where)}
 
 
-def _one_side(entry: ForeignMap, kind_of: str) -> Lines:
-    center = entry.number("center")
-    lines = {"center": (out.angle(center.value), out.place(center.span))} if center else {}
-    if kind_of == "one_sided" and entry.is_set("invert"):
-        lines["invert"] = (out.flag(True), out.place(entry.places("invert")["invert"]))
-    return lines
-
-
-def _two_sides(entry: ForeignMap) -> Lines:
+def _sides(entry: ForeignMap, centers: Iterable[str], inverts: Iterable[str]) -> Lines:
+    """Return the angles with parallel fingers, and which servos turn the other way."""
     lines: Lines = {}
-    for key in ("center_left", "center_right"):
+    for key in centers:
         if (center := entry.number(key)) is not None:
             lines[key] = (out.angle(center.value), out.place(center.span))
-    for key in ("invert_left", "invert_right"):
+    for key in inverts:
         if (invert := entry.flag(key)) is not None and invert.value:
             lines[key] = (out.flag(True), out.place(invert.span))
     return lines
@@ -343,8 +341,6 @@ def guesses(joints: Iterable[ArbotixJoint], span: Span) -> Iterable[Finding]:
         yield GUESSED.at(span, words, help="'rbxcompose servo scan' shows the models of real servos")
 
 
-T = TypeVar("T")
-
 USUAL_RATE = 10.0  # [Hz], of reading and of writing, if a file does not say
 _FASTEST = 1000.0  # [Hz], of a bus
 _MOST_BAUD = 10_000_000
@@ -354,7 +350,7 @@ _DRIVER_OF_THE_BOARD = ("digital_servos", "digital_sensors", "analog_sensors")
 _KEYS = _MAIN | _OTHERS | frozenset(_DRIVER_OF_THE_BOARD)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class ArbotixDriver:
     """A driver: its line, and what is on it. `idle` are keys that need nothing here; `left_out` names lost joints."""
 
@@ -475,37 +471,14 @@ NO_URDF = kind("RBX2239", Severity.WARNING)
 USUAL_PORT = "/dev/ttyUSB0"
 
 
-class Placed(Protocol):
-    """Something that a file has: a joint or a controller."""
-
-    @property
-    def name(self) -> str:
-        """The name."""
-
-    @property
-    def span(self) -> Span:
-        """The place."""
-
-
-P = TypeVar("P", bound=Placed)
-
-
-@dataclass(slots=True)
-class ServoLine:
-    """A serial line: all that files say of it, and the joints on it."""
-
-    port: Given[str] | None = None
-    baud: Given[int] | None = None
-    rate: Given[float] | None = None
-    idle: dict[str, Span] = field(default_factory=dict)
-    joints: dict[str, ArbotixJoint] = field(default_factory=dict)
+P = TypeVar("P", ArbotixJoint, FollowController | DiffController | ArbotixGripper)
 
 
 @dataclass(slots=True)
 class ArbotixRobot:
     """All joints and controllers by their names, and the lines by their ports."""
 
-    lines: dict[str, ServoLine] = field(default_factory=dict)
+    lines: dict[str, ArbotixDriver] = field(default_factory=dict)
     joints: dict[str, ArbotixJoint] = field(default_factory=dict)
     left_out: set[str] = field(default_factory=set)
     controllers: dict[str, FollowController | DiffController | ArbotixGripper] = field(default_factory=dict)
@@ -521,7 +494,7 @@ def merged(files: Sequence[ArbotixFile], report: Report) -> ArbotixRobot:
     drivers = [driver for file in files for driver in file.drivers]
     first_port = next((item.port.value for item in drivers if item.port), USUAL_PORT)
     for driver in drivers:
-        line = robot.lines.setdefault(driver.port.value if driver.port else first_port, ServoLine())
+        line = robot.lines.setdefault(driver.port.value if driver.port else first_port, ArbotixDriver())
         _join(line, driver, report)
         for joint in driver.joints.values():
             if _first(robot.joints, joint, "joint", report):
@@ -546,7 +519,7 @@ def _first(known: dict[str, P], one: P, what: str, report: Report) -> bool:
     return other is one
 
 
-def _join(line: ServoLine, driver: ArbotixDriver, report: Report) -> None:
+def _join(line: ArbotixDriver, driver: ArbotixDriver, report: Report) -> None:
     line.port = line.port or driver.port
     if line.baud and driver.baud and line.baud != driver.baud:
         words = f"one line has two rates: {line.baud.value} and {driver.baud.value} bit/s; the first one counts"
@@ -557,7 +530,7 @@ def _join(line: ServoLine, driver: ArbotixDriver, report: Report) -> None:
     line.idle = {**driver.idle, **line.idle}
 
 
-def _add(line: ServoLine, joint: ArbotixJoint, report: Report) -> None:
+def _add(line: ArbotixDriver, joint: ArbotixJoint, report: Report) -> None:
     other = next((item for item in line.joints.values() if item.id == joint.id), None)
     if other is not None:
         words = (
@@ -665,7 +638,7 @@ class ArbotixManifest:
             yield from _base(base)
 
 
-def _bus(name: str, line: ServoLine) -> Iterator[out.Row]:
+def _bus(name: str, line: ArbotixDriver) -> Iterator[out.Row]:
     yield out.row(1, f"{name}:")
     yield out.row(2, "type: dynamixel")
     port = line.port

@@ -47,8 +47,8 @@ class ServoMotor:
 
     is_ideal = False
 
-    def __init__(self, position: float, per_tick: float, traits: MotorTraits | None = None) -> None:
-        self.traits = traits or MotorTraits()
+    def __init__(self, position: float, per_tick: float) -> None:
+        self.traits = MotorTraits()
         self.position = self._aim = position  # the profile is at `_aim`, and moves at `_speed`
         self.velocity = self._speed = 0.0
         self.effort = 0.0
@@ -309,10 +309,6 @@ class FakeServo:
 
     def _si(self, item: str) -> float:
         return self.model.to_si(item, self.get(item)) if item in self.model.items else 0.0
-
-    def heat_to(self, temperature: float) -> None:
-        """Set its temperature [degC]."""
-        self.motor.temperature = temperature
 
     def move_to(self, raw: int) -> None:
         """Turn it by hand [ticks]."""
