@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import Any
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.console.json_messages import WrongMessageError
 from rbxcompose.msgs import packages, registry
 from rbxcompose.msgs.definitions import KINDS, FieldShape, FieldType, parse_type
@@ -15,40 +16,23 @@ _HOST = "localhost"
 _VERSION = {"version": 2, "distro": "jazzy"}  # the release whose types and wire format the bus has
 
 
-class GraphView(Protocol):
-    """What is on the bus now; all names are absolute."""
+@dataclass(frozen=True, slots=True)
+class BusView:
+    """What is on the bus at a moment; all names are absolute, and topics, services and actions have their types."""
 
-    def topics(self) -> Mapping[str, str]:
-        """Return the types of the topics."""
-        ...
-
-    def services(self) -> Mapping[str, str]:
-        """Return the types of the services."""
-        ...
-
-    def actions(self) -> Mapping[str, str]:
-        """Return the types of the actions that somebody serves."""
-        ...
-
-    def nodes(self) -> Sequence[str]:
-        """Return the names of the nodes."""
-        ...
-
-    def publishers(self, topic: str) -> Sequence[str]:
-        """Return the names of the nodes that publish on a topic."""
-        ...
-
-    def subscribers(self, topic: str) -> Sequence[str]:
-        """Return the names of the nodes that subscribe to a topic."""
-        ...
-
-    def servers(self, service: str) -> Sequence[str]:
-        """Return the names of the nodes that serve a service."""
-        ...
-
-    def is_latched(self, topic: str) -> bool:
-        """Return whether the last message of a topic is kept for late subscribers."""
-        ...
+    topics: Mapping[str, str]
+    services: Mapping[str, str]
+    """Of those that somebody serves, as for actions."""
+    actions: Mapping[str, str]
+    nodes: Sequence[str]
+    publishers: Mapping[str, Sequence[str]]
+    """The names of the nodes that publish, by topic."""
+    subscribers: Mapping[str, Sequence[str]]
+    """The names of the nodes that subscribe, by topic."""
+    servers: Mapping[str, Sequence[str]]
+    """The names of the nodes that serve, by service."""
+    latched: Collection[str]
+    """Topics whose last message is kept for late subscribers."""
 
 
 ARGUMENTS: Mapping[str, tuple[str, ...]] = {
@@ -82,7 +66,7 @@ _PARTS = {
 }
 
 
-def answer(name: str, given: Mapping[str, Any], graph: GraphView, stamp: int) -> dict[str, Any]:
+def answer(name: str, given: Mapping[str, Any], graph: BusView, stamp: int) -> dict[str, Any]:
     """Return the answer of `/rosapi/NAME`.
 
     Args:
@@ -107,47 +91,43 @@ def answer(name: str, given: Mapping[str, Any], graph: GraphView, stamp: int) ->
     return _ANSWERS[name](graph, *values)
 
 
-def _topics_and_raw_types(graph: GraphView) -> dict[str, Any]:
-    types = list(graph.topics().values())
-    return {
-        "topics": list(graph.topics()),
-        "types": types,
-        "typedefs_full_text": [_definition(type_) for type_ in types],
-    }
+def _topics_and_raw_types(graph: BusView) -> dict[str, Any]:
+    types = list(graph.topics.values())
+    return {"topics": list(graph.topics), "types": types, "typedefs_full_text": [_definition(type_) for type_ in types]}
 
 
-def _services(graph: GraphView) -> dict[str, str]:
+def _services(graph: BusView) -> dict[str, str]:
     """Return the types of the services that clients find: those of the bus, and of rosapi."""
-    return {**graph.services(), **TYPES}
+    return {**graph.services, **TYPES}
 
 
-def _node_details(graph: GraphView, node: str) -> dict[str, Any]:
+def _node_details(graph: BusView, node: str) -> dict[str, Any]:
     wanted = absolute(node)
     return {
-        "publishing": [topic for topic in graph.topics() if wanted in graph.publishers(topic)],
-        "subscribing": [topic for topic in graph.topics() if wanted in graph.subscribers(topic)],
-        "services": [service for service in graph.services() if wanted in graph.servers(service)],
+        "publishing": [topic for topic in graph.topics if wanted in graph.publishers.get(topic, ())],
+        "subscribing": [topic for topic in graph.topics if wanted in graph.subscribers.get(topic, ())],
+        "services": [service for service in graph.services if wanted in graph.servers.get(service, ())],
     }
 
 
 _ANSWERS: Mapping[str, Callable[..., dict[str, Any]]] = {
-    "topics": lambda graph: {"topics": list(graph.topics()), "types": list(graph.topics().values())},
+    "topics": lambda graph: {"topics": list(graph.topics), "types": list(graph.topics.values())},
     "topics_and_raw_types": _topics_and_raw_types,
     "interfaces": lambda graph: {"interfaces": sorted(name for kind in KINDS for name in registry.names(kind))},
     "services": lambda graph: {"services": sorted(_services(graph))},
-    "action_servers": lambda graph: {"action_servers": sorted(graph.actions())},
-    "action_type": lambda graph, action: {"type": graph.actions().get(absolute(action), "")},
-    "nodes": lambda graph: {"nodes": list(graph.nodes())},
+    "action_servers": lambda graph: {"action_servers": sorted(graph.actions)},
+    "action_type": lambda graph, action: {"type": graph.actions.get(absolute(action), "")},
+    "nodes": lambda graph: {"nodes": list(graph.nodes)},
     "node_details": _node_details,
-    "topic_type": lambda graph, topic: {"type": graph.topics().get(absolute(topic), "")},
+    "topic_type": lambda graph, topic: {"type": graph.topics.get(absolute(topic), "")},
     "service_type": lambda graph, service: {"type": _services(graph).get(absolute(service), "")},
-    "service_node": lambda graph, service: {"node": next(iter(graph.servers(absolute(service))), "")},
+    "service_node": lambda graph, service: {"node": next(iter(graph.servers.get(absolute(service), ())), "")},
     "service_host": lambda graph, service: {"host": _HOST if absolute(service) in _services(graph) else ""},
     "service_providers": lambda graph, type_: {"providers": _of_type(_services(graph), type_, "srv")},
-    "topics_for_type": lambda graph, type_: {"topics": _of_type(graph.topics(), type_, "msg")},
+    "topics_for_type": lambda graph, type_: {"topics": _of_type(graph.topics, type_, "msg")},
     "services_for_type": lambda graph, type_: {"services": _of_type(_services(graph), type_, "srv")},
-    "publishers": lambda graph, topic: {"publishers": list(graph.publishers(absolute(topic)))},
-    "subscribers": lambda graph, topic: {"subscribers": list(graph.subscribers(absolute(topic)))},
+    "publishers": lambda graph, topic: {"publishers": list(graph.publishers.get(absolute(topic), ()))},
+    "subscribers": lambda graph, topic: {"subscribers": list(graph.subscribers.get(absolute(topic), ()))},
     "get_ros_version": lambda graph: dict(_VERSION),
 }
 
