@@ -13,9 +13,8 @@ from rbxcompose.bus.zenoh_session import open_router
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
 from rbxcompose.domains.programs.bridge import link
-from rbxcompose.domains.programs.bridge.ends import BridgedEnd
-from rbxcompose.domains.programs.bridge.installation import RosInstallation
-from rbxcompose.domains.programs.bridge.ros_bridge import RosBridge
+from rbxcompose.domains.programs.bridge.ros_bridge import BridgedEnd, RosBridge
+from rbxcompose.domains.programs.sections.ros2 import RosInstallation
 from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.sdk.bound import Reply
 from rbxcompose.sdk.component import BusAddress

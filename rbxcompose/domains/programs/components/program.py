@@ -34,18 +34,8 @@ from rbxcompose.bus.zenoh_session import as_file, guest_settings
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
-from rbxcompose.domains.programs.child import (
-    Child,
-    Deaf,
-    LeftBehind,
-    NotStarted,
-    ProgramEnd,
-    ProgramStarted,
-    StartOrder,
-    WrittenLine,
-)
+from rbxcompose.domains.programs.child import Child, Event, OutputLog, StartOrder
 from rbxcompose.domains.programs.declaration import DeclaredPorts, port_name, published
-from rbxcompose.domains.programs.output import OutputLog
 from rbxcompose.domains.programs.watch import DeclaredKey, EndKind, KeyOnBus, ProgramWatch
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalStatusArray
 from rbxcompose.runtime.folder import RobotFolder
@@ -62,18 +52,18 @@ _LISTENS, _AGAIN = 10.0, 60.0  # [s] for which all that it publishes is heard at
 _LINKS = 2.0  # [s] for it to be linked with the robot's processes
 _STRANGER = 0.5  # [s] after which it does not seem to use the configuration that it was given
 _PAUSE = 0.05  # [s] between two looks at a program that is not ready yet
-_TOKENS = {
-    EndKind.PUBLISHER: EntityKind.PUBLISHER,
-    EndKind.SUBSCRIBER: EntityKind.SUBSCRIPTION,
-    EndKind.QUERYABLE: EntityKind.SERVER,
-    EndKind.QUERIER: EntityKind.CLIENT,
+_TOKENS: Mapping[EndKind, EntityKind] = {
+    "publishes": EntityKind.PUBLISHER,
+    "subscribes": EntityKind.SUBSCRIPTION,
+    "serves": EntityKind.SERVER,
+    "calls": EntityKind.CLIENT,
 }
 _OF_TOKENS = {token: kind for kind, token in _TOKENS.items()}
 _ACTIONS = ServesAction, CallsAction
-_KINDS = {Out: EndKind.PUBLISHER, In: EndKind.SUBSCRIBER, Serves: EndKind.QUERYABLE, Calls: EndKind.QUERIER}
+_KINDS: Mapping[type[Port[Any]], EndKind] = {Out: "publishes", In: "subscribes", Serves: "serves", Calls: "calls"}
 # Of the five ends of an action, in the order of their names:
-_SERVED = *(EndKind.QUERYABLE,) * 3, *(EndKind.PUBLISHER,) * 2
-_CALLED = *(EndKind.QUERIER,) * 3, *(EndKind.SUBSCRIBER,) * 2
+_SERVED: Sequence[EndKind] = ("serves", "serves", "serves", "publishes", "publishes")
+_CALLED: Sequence[EndKind] = ("calls", "calls", "calls", "subscribes", "subscribes")
 _MEGABYTE = 1_000_000
 
 
@@ -326,7 +316,7 @@ class Runner(Component[R]):
         self.is_over = False
         order = self.order({**os.environ, **self.joining})
         if self.joins_bus and order is not None:
-            subscribed, served = self._keys_of(EndKind.SUBSCRIBER), self._keys_of(EndKind.QUERYABLE)
+            subscribed, served = self._keys_of("subscribes"), self._keys_of("serves")
             self.link = SessionLink(self.endpoint, self.session, subscribed, served)
             self.linked = self.real_time.now()
         self.connect()
@@ -430,7 +420,7 @@ class Runner(Component[R]):
                 yield f"{name}_{part}", name, key
 
     def _keys_of(self, kind: EndKind) -> list[str]:
-        return [key.text(self.context.address.domain) for _, _, key in self._keys() if key.kind is kind]
+        return [key.text(self.context.address.domain) for _, _, key in self._keys() if key.kind == kind]
 
     def _elsewhere(self) -> Iterator[tuple[str, Port[Any]]]:
         return ((name, port) for name, port in self.ports(self.config).items() if port.is_elsewhere)
@@ -494,11 +484,11 @@ class Runner(Component[R]):
         lines, ready = list[str](), self.config.ready
         for event in self.child.events():
             match event:
-                case WrittenLine(text):
+                case "line", text:
                     lines.append(text)
                     if self.marks_ready is not None and self.marks_ready.search(text):
                         self.is_ready = True
-                case ProgramStarted():
+                case "started", _:
                     self.is_ready = self.is_ready or ready is None
                     self.state = TaskStatus(Level.OK, "runs")
                 case _:
@@ -509,20 +499,20 @@ class Runner(Component[R]):
         if self.child is not None and self.child.is_over and not self.is_over:
             self._ended("was killed, since its keeper was")
 
-    def _happened(self, event: object) -> None:
+    def _happened(self, event: Event) -> None:
         match event:
-            case NotStarted(why):
+            case "failed", why:
                 self._ended(f"cannot be started: {why}")
-            case Deaf():
+            case "deaf", _:
                 within, name = self.config.stop.within, self.config.stop.signal
                 self.warn(f"did not end within {within:g} s of {name}, and was killed")
-            case LeftBehind(number):
+            case "left", number:
                 left = "one process, which was" if number == 1 else f"{number} processes, which were"
                 self.warn(f"left behind {left} killed: what it starts must end with it")
-            case ProgramEnd(status) if self.config.ready is not None and self.config.ready.ended and not status:
+            case "ended", status if self.config.ready is not None and self.config.ready.ended and not status:
                 self.is_over = self.is_ready = True
                 self.state = TaskStatus(Level.OK, "has ended, as it should")
-            case ProgramEnd(status):
+            case "ended", status:
                 self._ended(self.described(status))
 
     def _ended(self, how: str) -> None:
@@ -540,8 +530,8 @@ class Runner(Component[R]):
         while self.child is not None and not is_over:
             is_over = self.child.is_over  # before what may be the last look
             for event in self.child.events():
-                if isinstance(event, WrittenLine):
-                    self._log([event.text])
+                if event[0] == "line":
+                    self._log([event[1]])
                 else:
                     self._happened(event)
             if not is_over:
@@ -604,8 +594,8 @@ class Runner(Component[R]):
         link.listen(f"{domain}/**" if since < _LISTENS or since % _AGAIN < 2 * LOOKS else None)
         declared = {key.text(domain): key for _, _, key in self._keys()}
         found = {declared[text] for text in link.matching()}
-        found |= {key for text in link.heard() if (key := KeyOnBus.of(EndKind.PUBLISHER, text, domain)) is not None}
-        return found | {key for key in declared.values() if found and key.kind is EndKind.PUBLISHER}
+        found |= {key for text in link.heard() if (key := KeyOnBus.of("publishes", text, domain)) is not None}
+        return found | {key for key in declared.values() if found and key.kind == "publishes"}
 
     def _announce(self, guest: Guest, found: set[KeyOnBus]) -> None:
         """Declare tokens for its ends, so that tools and clients find them as those of ROS 2."""

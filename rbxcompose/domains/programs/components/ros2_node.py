@@ -24,8 +24,7 @@ from rbxcompose.base.files import replace_file
 from rbxcompose.base.requests import OutsideError
 from rbxcompose.bus.names import resolve
 from rbxcompose.domains.programs.bridge import ros_bridge
-from rbxcompose.domains.programs.bridge.ends import BridgedEnd, ends_of, parameters_of
-from rbxcompose.domains.programs.bridge.installation import RosInstallation, RosModel, installation_of
+from rbxcompose.domains.programs.bridge.ros_bridge import BridgedEnd, ends_of, parameters_of
 from rbxcompose.domains.programs.child import StartOrder
 from rbxcompose.domains.programs.components.program import (
     CommandWords,
@@ -35,7 +34,7 @@ from rbxcompose.domains.programs.components.program import (
     bundle_command,
     order_of,
 )
-from rbxcompose.domains.programs.sections.ros2 import ros2
+from rbxcompose.domains.programs.sections.ros2 import RosInstallation, RosModel, installation_of, ros2
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.reader import read_source
 from rbxcompose.runtime.folder import RobotFolder
