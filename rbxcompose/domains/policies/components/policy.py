@@ -1,22 +1,26 @@
-"""A network of the user that commands joints or the base."""
+"""A network of the user that commands joints or the base: what it observes, and which of its answers are sent."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import field
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
 from rbxcompose import sdk
-from rbxcompose.base.config import LocalFiles
+from rbxcompose.base.config import JointName, LocalFiles
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.policies.core import AnswerLimits, PolicyCore
 from rbxcompose.domains.policies.network import PolicyNetwork, PolicyNetworkError
-from rbxcompose.domains.policies.observation import JOINT_STATE, NothingObservedError, ObservationConfig, observed
-from rbxcompose.manifest.fields import TopicName
+from rbxcompose.manifest.fields import FieldPath, TopicName
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.arrays import filled
+from rbxcompose.msgs.fields import NoFieldError, field_type
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.stamps import to_duration
 from rbxcompose.msgs.std_msgs import Float64MultiArray
@@ -25,10 +29,7 @@ from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoin
 from rbxcompose.msgs.types import Message
 from rbxcompose.sdk.ports import BULK
 
-JOINTS, NUMBERS, VELOCITY = JointTrajectory.TYPE, Float64MultiArray.TYPE, Twist.TYPE
-MESSAGES: Mapping[str, type[Message]] = {JOINTS: JointTrajectory, NUMBERS: Float64MultiArray, VELOCITY: Twist}
-AXES = tuple(f"{kind}.{axis}" for kind in ("linear", "angular") for axis in "xyz")
-PERIODS = 2.0  # of the rate, in which joints arrive if nothing else is said
+ROUNDING = 1e-6  # of a limit, by which a number of 32 bits may be beyond it
 
 
 class PolicyOutputConfig(sdk.Config):
@@ -47,6 +48,161 @@ class PolicyOutputConfig(sdk.Config):
         if "least" in info.data and most < info.data["least"]:
             raise ValueError(f"it is below 'least', {info.data['least']:g}")
         return most
+
+
+@dataclass(slots=True)
+class PolicyCore:
+    """Judges answers, and says when what is commanded must rest."""
+
+    limits: Mapping[str, PolicyOutputConfig]
+    """By the name of each number of an answer, in its order."""
+    deadline: float
+    """[s] from an observation to its command, and from the last command until rest."""
+    counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(("sent", "late", "refused", "unseen"), 0))
+    """What became of answers since the policy was configured; `unseen` are times with nothing to observe."""
+    last: tuple[float, ...] | None = None
+    """What is sent; None at first, and after a rest."""
+    sent_at: float = -math.inf
+
+    def judge(self, answer: Sequence[float], start: Sequence[float], began: float, ended: float) -> str:
+        """Return why an answer must not be sent, or nothing: then `last` is to be sent.
+
+        `start` is where the first answer begins; times [s] are those of the observation and of the answer.
+        """
+        took = ended - began
+        if took > self.deadline:
+            self.counts["late"] += 1
+            return f"an answer took {took * 1e3:.0f} ms, and is late after {self.deadline * 1e3:.0f} ms"
+        if problem := self._problem(answer, start if self.last is None else self.last):
+            self.counts["refused"] += 1
+            return problem
+        pairs = zip(self.limits.values(), answer, strict=True)
+        self.last, self.sent_at = tuple(min(max(value, limits.least), limits.most) for limits, value in pairs), ended
+        self.counts["sent"] += 1
+        return ""
+
+    def _problem(self, answer: Sequence[float], before: Sequence[float]) -> str:
+        if len(answer) != len(self.limits):
+            return f"an answer has {len(answer)} numbers, and not {len(self.limits)}"
+        for (name, limits), value, old in zip(self.limits.items(), answer, before, strict=True):
+            if not math.isfinite(value):
+                return f"'{name}' is not finite"
+            if not limits.least - _slack(limits.least) <= value <= limits.most + _slack(limits.most):
+                return f"'{name}' is {value:.4g}, beyond {limits.least:g} to {limits.most:g}"
+            if abs(value - old) > limits.jump + _slack(limits.jump, value):
+                return f"'{name}' jumps from {old:.4g} to {value:.4g}, by more than {limits.jump:g}"
+        return ""
+
+    def must_rest(self, now: float) -> bool:
+        """Return whether what is commanded must rest now: its last command was good too long ago; once."""
+        if self.last is None or now - self.sent_at <= self.deadline:
+            return False
+        self.last = None
+        return True
+
+    def forget(self) -> bool:
+        """Start again with the next answer; return whether something is commanded that must rest."""
+        is_moving, self.last = self.last is not None, None
+        return is_moving
+
+
+def _slack(*values: float) -> float:
+    return ROUNDING * max(map(abs, values))
+
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+OF_JOINTS = ("position", "velocity", "effort")
+MOST_NUMBERS = 10_000  # of one field
+
+
+class NothingObservedError(Exception):
+    """Raised when a message does not have the numbers that are observed."""
+
+
+class ObservationConfig(sdk.Config):
+    """Numbers of one topic."""
+
+    topic: TopicName
+    """Where they come from."""
+    message: sdk.MessageName = JOINT_STATE
+    """The type of the topic."""
+    joints: list[JointName] = []
+    """The joints, in their order; only of joint states."""
+    size: int = Field(1, ge=1, le=MOST_NUMBERS)
+    """How many numbers each field has, if it is a list and not of joints."""
+    fields: list[FieldPath] = Field(["position"], min_length=1, validate_default=True)
+    """The fields in their order, such as `twist.twist.linear.x`: of joints each field of all joints, then the next."""
+    timeout: sdk.Time = Field(0.5, gt=0)
+    """A message that is older counts for nothing, and the policy gives no answer."""
+
+    @field_validator("joints")
+    @classmethod
+    def _of_joint_states(cls, joints: list[str], info: ValidationInfo) -> list[str]:
+        if joints and info.data.get("message", JOINT_STATE) != JOINT_STATE:
+            raise ValueError(f"only {JOINT_STATE} has joints")
+        if len(set(joints)) < len(joints):
+            raise ValueError("a joint is there twice")
+        return joints
+
+    @field_validator("fields")
+    @classmethod
+    def _are_numbers(cls, fields: list[str], info: ValidationInfo) -> list[str]:
+        message = info.data.get("message")
+        for path in fields if message else ():
+            if info.data.get("joints") and path not in OF_JOINTS:
+                context = {"name": path, "valid": OF_JOINTS, "what": "fields of joints"}
+                raise PydanticCustomError("field", "a joint has no field '{name}'", context)
+            _require_numbers(str(message), path)
+        return fields
+
+    @property
+    def length(self) -> int:
+        """Return how many numbers it is."""
+        return len(self.fields) * (len(self.joints) or self.size)
+
+
+def _require_numbers(message: str, path: str) -> None:
+    try:
+        found = field_type(message, path)
+    except NoFieldError as error:
+        context = {"name": error.name, "valid": tuple(error.fields), "what": f"'message' is {message}, with the fields"}
+        raise PydanticCustomError("field", f"{error.message} has no field '{{name}}'", context) from None
+    if found.is_message or found.base in ("string", "wstring"):
+        raise PydanticCustomError("field", "'{path}' is a {type}, not numbers", {"path": path, "type": str(found)})
+
+
+def observed(config: ObservationConfig, message: Any) -> list[float]:
+    """Return the numbers of a message.
+
+    Raises:
+        NothingObservedError: if it does not have them.
+    """
+    return list(_of_joints(config, message) if config.joints else _of_fields(config, message))
+
+
+def _of_joints(config: ObservationConfig, message: Any) -> Iterator[float]:
+    places = {name: place for place, name in enumerate(message.name)}
+    for path in config.fields:
+        values: Sequence[float] = getattr(message, path)
+        for joint in config.joints:
+            if (place := places.get(joint)) is None or place >= len(values):
+                raise NothingObservedError(f"'{config.topic}' has no {path} of '{joint}'")
+            yield float(values[place])
+
+
+def _of_fields(config: ObservationConfig, message: Any) -> Iterator[float]:
+    for path in config.fields:
+        found = attrgetter(path)(message)
+        values = [found] if isinstance(found, int | float) else list(found)
+        if len(values) != config.size:
+            raise NothingObservedError(f"'{path}' of '{config.topic}' has {len(values)} numbers, and not {config.size}")
+        yield from map(float, values)
+
+
+JOINTS, NUMBERS, VELOCITY = JointTrajectory.TYPE, Float64MultiArray.TYPE, Twist.TYPE
+MESSAGES: Mapping[str, type[Message]] = {JOINTS: JointTrajectory, NUMBERS: Float64MultiArray, VELOCITY: Twist}
+AXES = tuple(f"{kind}.{axis}" for kind in ("linear", "angular") for axis in "xyz")
+PERIODS = 2.0  # of the rate, in which joints arrive if nothing else is said
 
 
 class PolicyCommandsConfig(sdk.Config):
@@ -175,11 +331,7 @@ class Policy(sdk.Component[PolicyConfig]):
     def configure(self) -> None:
         """Load the network; if it is none, that is reported."""
         config = self.config
-        limits = {
-            name: AnswerLimits(output.least, output.most, output.jump)
-            for name, output in config.commands.outputs.items()
-        }
-        self.core = PolicyCore(limits, config.deadline)
+        self.core = PolicyCore(config.commands.outputs, config.deadline)
         self.observations = _observed(config)
         self.newest: dict[str, tuple[float, Any]] = {}
         self.is_on, self.problem = False, ""
@@ -220,8 +372,7 @@ class Policy(sdk.Component[PolicyConfig]):
         words = problem or ("sends" if self.is_on else "is off")
         is_silent = bool(problem) and self.core.last is None
         level = Level.ERROR if is_silent else Level.WARN if problem else Level.OK
-        counts = self.core.counts
-        self.status(level, words, sent=counts.sent, late=counts.late, refused=counts.refused, unseen=counts.unseen)
+        self.status(level, words, **self.core.counts)
 
     def ask(self, network: PolicyNetwork) -> str:
         """Send the answer to what is observed now; return why not, or nothing."""
@@ -229,12 +380,12 @@ class Policy(sdk.Component[PolicyConfig]):
         try:
             parts = self.observe(began)
         except NothingObservedError as error:
-            self.core.counts.unseen += 1
+            self.core.counts["unseen"] += 1
             return str(error)
         try:
             answer = network.answer([number for part in parts for number in part])
         except PolicyNetworkError as error:
-            self.core.counts.refused += 1
+            self.core.counts["refused"] += 1
             return str(error)
         if self.context.is_stopped:
             return "the robot is stopped"
