@@ -14,6 +14,7 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.domains.console.rosapi import definition
 from rbxcompose.msgs import packages, registry
 from rbxcompose.msgs.cdr import CdrError, decode, encode
 from rbxcompose.msgs.rcl_interfaces import (
@@ -120,7 +121,7 @@ class FoxgloveServer:
             del self._types[topic]
             self._channels.pop(topic).close()
         for topic, type_ in topics.items():
-            if topic not in self._types and (text := _definition(type_)) is not None:
+            if topic not in self._types and (text := definition(type_)) is not None:
                 self._types[topic] = type_
                 schema = foxglove.Schema(name=type_, encoding=ROS, data=text.encode())
                 self._channels[topic] = foxglove.Channel(
@@ -304,14 +305,6 @@ class FoxgloveServer:
         from foxglove import StatusLevel
 
         self._server.publish_status(text, StatusLevel.Warning)
-
-
-def _definition(type_name: str) -> str | None:
-    """Return the text of a message with all that it has in it; None if it is not known here."""
-    try:
-        return packages.whole_text(registry.message(type_name).TYPE)
-    except (KeyError, OSError):
-        return None
 
 
 def _shown(node: str, values: Iterable[tuple[str, ParameterValue]]) -> list[foxglove.Parameter]:

@@ -90,11 +90,6 @@ def checksum(body: bytes) -> int:
     return found
 
 
-def framed(body: str) -> bytes:
-    """Return a whole sentence."""
-    return f"${body}*{checksum(body.encode('ascii')):02X}\r\n".encode("ascii")
-
-
 def _hexadecimal(text: bytes) -> int:
     try:
         return int(text, 16) if text.isalnum() else -1

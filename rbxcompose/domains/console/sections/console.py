@@ -69,19 +69,14 @@ class ConsoleModel(Config):
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     if (read := contents.of(console)) is None:
         return
-    name, about = (_text(contents.root, key) for key in _HEAD)
+    name, about = (_text(contents.root, key) for key in ("name", "about"))
     components: Mapping[str, RobotComponent] = wiring.components
     namespace = contents.of(bus).namespace or ""
     config = {
         "robot": name,
         "about": about,
-        "port": read.port,
-        "listen": read.listen,
-        "origins": read.origins,
+        **{key: getattr(read, key) for key in ("port", "listen", "origins", "guard", "pages", "first_page")},
         "foxglove": FOXGLOVE_PORT if read.foxglove is True else int(read.foxglove),
-        "guard": read.guard,
-        "pages": read.pages,
-        "first_page": read.first_page,
         **_drive(read.drive, components, namespace),
         "camera": _camera(read.drive.camera, components, namespace),
         "values": _values(contents, components, namespace),
@@ -89,9 +84,6 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         **_body(contents),
     }
     yield WantedComponent(GATEWAY, GATEWAY, config, ("console",))
-
-
-_HEAD = ("name", "about")
 
 
 def _text(node: TreeNode | None, key: str) -> str:
