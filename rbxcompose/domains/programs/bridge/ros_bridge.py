@@ -1,4 +1,4 @@
-"""Our side of the bridge: what passes it, a session on the robot's bus, and the process in ROS's own Python."""
+"""Our side of the bridge: a session on the robot's bus, and the process in ROS's own Python."""
 
 from __future__ import annotations
 
@@ -13,116 +13,37 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any
 
-from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import OutsideError
-from rbxcompose.bus.names import ActionNames, Attachment, data_key, dds_type
-from rbxcompose.bus.tokens import EntityKind, NodeToken, gid
+from rbxcompose.bus.names import Attachment, data_key, dds_type
+from rbxcompose.bus.tokens import NodeToken, gid
 from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, Closable, Question, RemotePublisher, TransportReply
 from rbxcompose.bus.wire import SERVICE_QOS, WireProfile, ros_qos
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
 from rbxcompose.domains.programs.bridge import link
+from rbxcompose.domains.programs.bridge.ends import TOKENS, ProgramEnd
 from rbxcompose.domains.programs.child import Child, StartOrder
 from rbxcompose.domains.programs.sections.ros2 import RosInstallation
-from rbxcompose.msgs import rcl_interfaces
-from rbxcompose.msgs.action_msgs import CancelGoal, GoalStatusArray
 from rbxcompose.msgs.cdr import CdrError, decode, encode
 from rbxcompose.runtime.processes import describe_exit
 from rbxcompose.sdk.component import BusAddress
-from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Qos, Serves, ServesAction
-
-BridgeWay = Literal["from_ros", "to_ros"]
-PARAMETERS: Mapping[str, Any] = {
-    "get_parameters": rcl_interfaces.GetParameters,
-    "set_parameters": rcl_interfaces.SetParameters,
-    "set_parameters_atomically": rcl_interfaces.SetParametersAtomically,
-    "list_parameters": rcl_interfaces.ListParameters,
-    "describe_parameters": rcl_interfaces.DescribeParameters,
-    "get_parameter_types": rcl_interfaces.GetParameterTypes,
-}
-"""The services of the parameters of a node."""
-
-
-@dataclass(frozen=True, slots=True)
-class BridgedEnd:
-    """A topic or a service that passes; a service of ROS is asked `to_ros`, one of ours is asked `from_ros`."""
-
-    name: str
-    kind: Literal["topic", "service"]
-    way: BridgeWay
-    interface: Any
-    qos: Qos = Qos.EVENT
-    port: str = ""
-
-    def for_ros(self, channel: int) -> dict[str, object]:
-        """Return what the other side needs to know."""
-        return {
-            "channel": channel,
-            "name": self.name,
-            "kind": self.kind,
-            "way": self.way,
-            "type": self.interface.TYPE,
-            "hash": self.interface.HASH,
-            "depth": min(self.qos.depth, _DEEPEST),
-            "latched": self.qos is Qos.LATCHED,
-        }
-
-
-_DEEPEST = 1000
-
-
-def ends_of(port: Port[Any], name: str) -> Iterator[BridgedEnd]:
-    """Yield what passes for a port of a ROS node, whose topic, service or action has this absolute name."""
-    interface = cast(Any, port.interface)
-    match port:
-        case Out():
-            yield BridgedEnd(name, "topic", "from_ros", interface, port.qos, port.name)
-        case In():
-            yield BridgedEnd(name, "topic", "to_ros", interface, port.qos, port.name)
-        case Serves():
-            yield BridgedEnd(name, "service", "to_ros", interface, port=port.name)
-        case Calls():
-            yield BridgedEnd(name, "service", "from_ros", interface, port=port.name)
-        case ServesAction() | CallsAction():
-            yield from _action(interface, ActionNames.of(name), serves=isinstance(port, ServesAction), port=port.name)
-
-
-def _action(interface: Any, names: ActionNames, *, serves: bool, port: str) -> Iterator[BridgedEnd]:
-    asks: BridgeWay = "to_ros" if serves else "from_ros"
-    tells: BridgeWay = "from_ros" if serves else "to_ros"
-    yield BridgedEnd(names.send_goal, "service", asks, interface.SendGoal, port=port)
-    yield BridgedEnd(names.get_result, "service", asks, interface.GetResult, port=port)
-    yield BridgedEnd(names.cancel_goal, "service", asks, CancelGoal, port=port)
-    yield BridgedEnd(names.feedback, "topic", tells, interface.FeedbackMessage, Qos.EVENT, port)
-    yield BridgedEnd(names.status, "topic", tells, GoalStatusArray, Qos.LATCHED, port)
-
-
-def parameters_of(node: str, way: BridgeWay) -> Iterator[BridgedEnd]:
-    """Yield the services of the parameters of a node with this absolute name."""
-    for bare, service in PARAMETERS.items():
-        yield BridgedEnd(f"{node}/{bare}", "service", way, service)
-
+from rbxcompose.sdk.ports import Qos
 
 ROS_SIDE = Path(__file__).with_name("ros_side.py")
 STARTS_WITHIN = 20.0  # [s] until ROS is there
 _MADE_WITHIN = 5.0  # [s] until ROS has what is to pass
 _LAST_WORDS = 1.0  # [s] for its process to end, which says more than a closed socket
+_DEEPEST = 1000  # messages that wait at ROS's side
 _ANSWER_WITHIN = 30.0  # [s] for a service; results of goals take as long as they take
-_TOKENS = {
-    ("topic", "from_ros"): EntityKind.PUBLISHER,
-    ("topic", "to_ros"): EntityKind.SUBSCRIPTION,
-    ("service", "to_ros"): EntityKind.SERVER,
-    ("service", "from_ros"): EntityKind.CLIENT,
-}
 
 
 class _Lane:
     """One end on our bus."""
 
-    def __init__(self, channel: int, end: BridgedEnd, key: str, own_gid: bytes) -> None:
+    def __init__(self, channel: int, end: ProgramEnd, key: str, own_gid: bytes) -> None:
         self.channel, self.end, self.key, self.gid = channel, end, key, own_gid
         self.sequence = count(1)
         self.publisher: RemotePublisher | None = None
@@ -172,7 +93,7 @@ class RosBridge:
             self.close()
             raise OutsideError(f"ROS 2 does not start ({installation.python}): {self.end or said}")
 
-    def add(self, component: str, ends: Iterable[BridgedEnd]) -> list[int]:
+    def add(self, component: str, ends: Iterable[ProgramEnd]) -> list[int]:
         """Let ends pass, in the name of a component; return their channels once ROS has them."""
         added: list[int] = []
         orders: list[dict[str, object]] = []
@@ -182,7 +103,7 @@ class RosBridge:
                 self._problems[channel] = deque(maxlen=20)
                 self._lanes[channel] = self._open(channel, component, end)
                 added.append(channel)
-                orders.append(end.for_ros(channel))
+                orders.append(_order(channel, end))
         self._link.event(add=orders)
         if not self._until(lambda: {*added} <= self._done, _MADE_WITHIN):
             for channel in added:
@@ -237,24 +158,22 @@ class RosBridge:
 
     # The bus
 
-    def _open(self, channel: int, component: str, end: BridgedEnd) -> _Lane:
+    def _open(self, channel: int, component: str, end: ProgramEnd) -> _Lane:
         transport, domain, address = self._guest.transport, self._address.domain, self._address
         type_hash = self._wire.hash_of(end.interface)
         key = data_key(domain, end.name, end.interface.TYPE, type_hash)
         space = f"/{address.namespace.strip('/')}" if address.namespace else ""
         node = NodeToken(domain, transport.session, 0, component, space)
-        qos = ros_qos(end.qos) if end.kind == "topic" else SERVICE_QOS
+        qos = ros_qos(end.qos) if end.is_topic else SERVICE_QOS
         words = self._wire.qos_text(qos)
-        token = node.endpoint_key(
-            _TOKENS[(end.kind, end.way)], channel, end.name, dds_type(end.interface.TYPE), type_hash, words
-        )
+        token = node.endpoint_key(TOKENS[end.kind], channel, end.name, dds_type(end.interface.TYPE), type_hash, words)
         lane = _Lane(channel, end, key, gid(token))
-        if end.kind == "topic" and end.way == "from_ros":
+        if end.kind == "publishes":
             lane.publisher = transport.publisher(key, end.qos)
             lane.declared.append(lane.publisher)
-        elif end.kind == "topic":
+        elif end.kind == "subscribes":
             lane.declared.append(transport.subscribe(key, end.qos, partial(self._arrived, lane)))
-        elif end.way == "to_ros":
+        elif end.kind == "serves":
             lane.declared.append(transport.serve(key, partial(self._asked, lane)))
         lane.declared += [transport.announce(token)]
         return lane
@@ -318,6 +237,20 @@ class RosBridge:
             case {"problem": str(text), "channel": int(channel)}:
                 if (waiting := self._problems.get(channel)) is not None:
                     waiting.append(text)
+
+
+def _order(channel: int, end: ProgramEnd) -> dict[str, object]:
+    """Return what the other side needs to know of an end: a service of ROS is asked `to_ros`."""
+    return {
+        "channel": channel,
+        "name": end.name,
+        "kind": "topic" if end.is_topic else "service",
+        "way": "from_ros" if end.kind in ("publishes", "calls") else "to_ros",
+        "type": end.interface.TYPE,
+        "hash": end.interface.HASH,
+        "depth": min(end.qos.depth, _DEEPEST),
+        "latched": end.qos is Qos.LATCHED,
+    }
 
 
 def _exact(message: Any, payload: bytes) -> bytes:

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from string import ascii_letters, digits
-from typing import Annotated, Any, Literal, TypeVar, cast
+from typing import Annotated, Any, Literal, TypeVar
 from uuid import uuid4
 from zlib import crc32
 
@@ -27,22 +27,23 @@ from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import OutsideError
 from rbxcompose.bus.names import ActionNames, dds_type
 from rbxcompose.bus.session_link import SessionLink
-from rbxcompose.bus.tokens import SPACE, EndpointToken, EntityKind, NodeToken, parse_token
+from rbxcompose.bus.tokens import SPACE, EndpointToken, NodeToken, parse_token
 from rbxcompose.bus.transport import Closable
 from rbxcompose.bus.wire import WireProfile, ros_qos
 from rbxcompose.bus.zenoh_session import as_file, guest_settings
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
+from rbxcompose.domains.programs.bridge.ends import TOKENS, ends_of
 from rbxcompose.domains.programs.child import Child, Event, OutputLog, StartOrder
 from rbxcompose.domains.programs.declaration import DeclaredPorts, port_name, published
 from rbxcompose.domains.programs.watch import DeclaredKey, EndKind, KeyOnBus, ProgramWatch
-from rbxcompose.msgs.action_msgs import CancelGoal, GoalStatusArray
+from rbxcompose.msgs.action_msgs import CancelGoal
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.processes import Process, describe_exit
 from rbxcompose.sdk import Capability, Component, ComponentNoted, component
 from rbxcompose.sdk.capabilities import RunsProgram, Setting
-from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Qos, Serves, ServesAction
+from rbxcompose.sdk.ports import CallsAction, In, Out, Port, Qos, ServesAction
 from rbxcompose.sdk.updater import FrequencyTask, TaskStatus
 
 LOOKS = 1.0  # [s] between two looks at what its session declares, and at its memory
@@ -52,18 +53,8 @@ _LISTENS, _AGAIN = 10.0, 60.0  # [s] for which all that it publishes is heard at
 _LINKS = 2.0  # [s] for it to be linked with the robot's processes
 _STRANGER = 0.5  # [s] after which it does not seem to use the configuration that it was given
 _PAUSE = 0.05  # [s] between two looks at a program that is not ready yet
-_TOKENS: Mapping[EndKind, EntityKind] = {
-    "publishes": EntityKind.PUBLISHER,
-    "subscribes": EntityKind.SUBSCRIPTION,
-    "serves": EntityKind.SERVER,
-    "calls": EntityKind.CLIENT,
-}
-_OF_TOKENS = {token: kind for kind, token in _TOKENS.items()}
+_OF_TOKENS = {token: kind for kind, token in TOKENS.items()}
 _ACTIONS = ServesAction, CallsAction
-_KINDS: Mapping[type[Port[Any]], EndKind] = {Out: "publishes", In: "subscribes", Serves: "serves", Calls: "calls"}
-# Of the five ends of an action, in the order of their names:
-_SERVED: Sequence[EndKind] = ("serves", "serves", "serves", "publishes", "publishes")
-_CALLED: Sequence[EndKind] = ("calls", "calls", "calls", "subscribes", "subscribes")
 _MEGABYTE = 1_000_000
 
 
@@ -390,7 +381,8 @@ class Runner(Component[R]):
         settings, self.endpoint = guest_settings(address.router, self.session)
         file = RobotFolder.of(address.robot).path / f"{self.name}.zenoh.json5"
         replace_file(file, as_file(settings).encode())
-        keys = {f"RBXCOMPOSE_KEY_{name.upper()}": key.text(address.domain) for name, _, key in self._keys()}
+        names = ((f"{name}_{part}" if part else name, key) for name, part, key in self._keys())
+        keys = {f"RBXCOMPOSE_KEY_{name.upper()}": key.text(address.domain) for name, key in names}
         return {
             "ZENOH_CONFIG": str(file),
             "ZENOH_SESSION_CONFIG_URI": str(file),
@@ -406,18 +398,12 @@ class Runner(Component[R]):
         }
 
     def _keys(self) -> Iterator[tuple[str, str, KeyOnBus]]:
-        """Yield the name of each end, that of its port, and its key; an action has five."""
+        """Yield the name of each port, which part of an action it is of which there are five, and the key of that."""
         wire = WireProfile(self.context.address.wire)
         for name, port in self._elsewhere():
-            full, interface = str(self.bound[name]), cast(Any, port.interface)
-            if not isinstance(port, _ACTIONS):
-                yield name, name, KeyOnBus(_KINDS[type(port)], full, dds_type(interface.TYPE), wire.hash_of(interface))
-                continue
-            kinds = _SERVED if isinstance(port, ServesAction) else _CALLED
-            parts = interface.SendGoal, interface.GetResult, CancelGoal, interface.FeedbackMessage, GoalStatusArray
-            for kind, part, of_part in zip(kinds, ActionNames.__slots__, parts, strict=True):
-                key = KeyOnBus(kind, getattr(ActionNames.of(full), part), dds_type(of_part.TYPE), wire.hash_of(of_part))
-                yield f"{name}_{part}", name, key
+            for end in ends_of(port, str(self.bound[name])):
+                key = KeyOnBus(end.kind, end.name, dds_type(end.interface.TYPE), wire.hash_of(end.interface))
+                yield name, end.part, key
 
     def _keys_of(self, kind: EndKind) -> list[str]:
         return [key.text(self.context.address.domain) for _, _, key in self._keys() if key.kind == kind]
@@ -427,11 +413,9 @@ class Runner(Component[R]):
 
     def _declared(self) -> Iterator[DeclaredKey]:
         ports = dict(self._elsewhere())
-        for end, name, key in self._keys():
+        for name, part, key in self._keys():
             port = ports[name]
-            if isinstance(port, ServesAction) and end.endswith("_send_goal"):  # one of its ends stands for all
-                yield DeclaredKey(name, key)
-            elif not isinstance(port, _ACTIONS):
+            if not part or (isinstance(port, ServesAction) and part == "send_goal"):  # which stands for all parts
                 yield DeclaredKey(name, key, port.rate if isinstance(port, Out) else None)
 
     def _listen(self, guest: Guest) -> None:
@@ -606,7 +590,7 @@ class Runner(Component[R]):
         wanted = {node.key} if found else set[str]()
         for key in found:
             words, number = wire.qos_text(ros_qos(qos.get(key.name, Qos.EVENT))), crc32(str(key).encode())
-            wanted.add(node.endpoint_key(_TOKENS[key.kind], number, key.name, key.type, key.hash, words))
+            wanted.add(node.endpoint_key(TOKENS[key.kind], number, key.name, key.type, key.hash, words))
         for text in wanted - self.tokens.keys():
             self.tokens[text] = guest.transport.announce(text)
         for text in self.tokens.keys() - wanted:
