@@ -685,8 +685,7 @@ class Bridge:
 
     def _tell(self, goal: _Goal, op: str, **fields: object) -> None:
         if (client := self._clients.get(goal.client)) is not None:
-            identified = {} if goal.id is None else {"id": goal.id}
-            self._send(client, {"op": op, **identified, "action": goal.name, **fields})
+            self._send(client, {"op": op, **_identified(goal.id), "action": goal.name, **fields})
 
     def robot_answered(self, number: int, answer: object, refusal: str = "") -> None:
         """Pass on what the robot answered to a request, or why it refused."""
@@ -1362,23 +1361,16 @@ class Bridge:
 
     def _status(self, client: _Client, level: str, text: str, identity: object = None) -> None:
         if LEVELS.index(level) >= client.level:
-            identified = {} if not isinstance(identity, str | int | float) else {"id": identity}
-            self._send(client, {"op": "status", "level": level, "msg": text, **identified})
+            known = identity if isinstance(identity, str | int | float) else None
+            self._send(client, {"op": "status", "level": level, "msg": text, **_identified(known)})
 
     def _respond(self, number: int, values: object, *, is_good: bool) -> None:
         if (waiting := self._calls.pop(number, None)) is None:
             return  # its client is gone
         client = self._clients[waiting.client]
         client.open_calls -= 1
-        identified = {} if waiting.id is None else {"id": waiting.id}
-        frame = {
-            "op": "service_response",
-            **identified,
-            "service": waiting.service,
-            "values": values,
-            "result": is_good,
-        }
-        self._send(client, frame, waiting.piece)
+        frame = {"service": waiting.service, "values": values, "result": is_good}
+        self._send(client, {"op": "service_response", **_identified(waiting.id), **frame}, waiting.piece)
 
     def _send(self, client: _Client, frame: Mapping[str, object], piece: int = 0) -> None:
         client.frames.append((json.dumps(_finite(frame), separators=(",", ":")), piece))
@@ -1580,6 +1572,11 @@ def _named(given: object, names: Sequence[str]) -> dict[str, Any]:
     if not isinstance(given, dict | None):
         raise WrongMessageError("'args' is a map or a list")
     return given or {}
+
+
+def _identified(identity: object) -> dict[str, object]:
+    """Return the id of a frame, if its client has given one."""
+    return {} if identity is None else {"id": identity}
 
 
 def _short(value: object) -> str:

@@ -680,9 +680,7 @@ class GatewaySession:
     def _subscribe_to_images(
         self, topic: str, message: type[Message], then: Callable[[Any], None]
     ) -> Callable[[], None]:
-        end = self._bus.subscribe(
-            NAME, topic, message, Qos.BULK, then, max_rate=math.inf, limits=BULK, may_be_silent=True
-        )
+        end = self._subscription(topic, message, Qos.BULK, then)
         self._pump()
         return partial(self._withdraw, end)
 
@@ -883,18 +881,15 @@ class GatewaySession:
                 self._stop_watching(window)
 
     def _subscribe(self, topic: str, message: type[Message]) -> None:
-        end = self._bus.subscribe(
-            NAME,
-            topic,
-            message,
-            Qos.LATCHED if topic in self._graph.view.latched else Qos.STATE,
-            lambda arrived: self._bridge.arrived(topic, arrived, self._now, self._stamp),
-            max_rate=math.inf,
-            limits=BULK,
-            may_be_silent=True,
+        qos = Qos.LATCHED if topic in self._graph.view.latched else Qos.STATE
+        end = self._subscription(
+            topic, message, qos, lambda arrived: self._bridge.arrived(topic, arrived, self._now, self._stamp)
         )
         end.is_wanted = lambda: self._bridge.wants(topic, self._now)  # what comes too early is not decoded
         self._ends[protocol.Subscribe, topic] = end
+
+    def _subscription(self, topic: str, message: type[Message], qos: Qos, then: Callable[[Any], None]) -> Any:
+        return self._bus.subscribe(NAME, topic, message, qos, then, max_rate=math.inf, limits=BULK, may_be_silent=True)
 
     def _carry_out_further(self) -> None:
         """Do what something from the bus made necessary."""

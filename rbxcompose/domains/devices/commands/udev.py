@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group = argument("--group", type=_group, default=udev.GROUP, metavar="NAME", help=words)
     yes = argument("-y", "--yes", action="store_true", help="do not ask")
     install = "show the rules that would be written below /etc/udev/rules.d, ask, and write them"
-    table: tuple[tuple[str, str, Do, tuple[Declare, ...]], ...] = (
+    rows: tuple[tuple[str, str, Do, tuple[Declare, ...]], ...] = (
         ("scan", "list the serial ports that are plugged in, and write entries for new ones", _scan, ()),
         ("generate", "print the rules of udev for the devices of a robot", _generate, (group,)),
         ("check", "report whether the devices of a robot are plugged in, named and open to you", _check, (group,)),
@@ -60,7 +60,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_actions(
         parser,
-        (Subcommand(name, item, do, (*shared, *own), f"{item[0].upper()}{item[1:]}.") for name, item, do, own in table),
+        (
+            Subcommand(name, item, do, (*shared, *own), f"{item[0].upper()}{item[1:]}.")
+            for name, item, do, own in rows
+        ),
     )
 
 
@@ -195,11 +198,7 @@ def _data(port: SerialPort, ports: Sequence[SerialPort], named: Sequence[UsbDevi
     return {
         "path": port.path,
         "links": list(port.names),
-        "vendor": own.vendor,
-        "product": own.product,
-        "serial": own.serial,
-        "usb_port": own.usb_port,
-        "interface": own.interface,
+        **{key: getattr(own, key) for key in ("vendor", "product", "serial", "usb_port", "interface")},
         "driver": port.driver,
         "about": port.about,
         "devices": udev.names_of(port, named),
