@@ -8,6 +8,7 @@ import select
 import termios
 from typing import TYPE_CHECKING
 
+from rbxcompose.base.findings import FindingKind
 from rbxcompose.domains.devices import serial_ports
 
 if TYPE_CHECKING:
@@ -15,14 +16,14 @@ if TYPE_CHECKING:
 
 _CHUNK = 4096  # [B] of one read
 _STUCK = 0.2  # [s] after which a port that takes no bytes is given up
-_ERRORS: dict[int | None, tuple[type[serial_ports.PortError], str]] = {
-    errno.ENOENT: (serial_ports.NoPortError, "does not exist"),
-    errno.ENXIO: (serial_ports.NoPortError, "has no device"),
-    errno.ENODEV: (serial_ports.NoPortError, "has no device"),
-    errno.EACCES: (serial_ports.ForbiddenPortError, "may not be opened by this user"),
-    errno.EPERM: (serial_ports.ForbiddenPortError, "may not be opened by this user"),
-    errno.EBUSY: (serial_ports.BusyPortError, "is used by another program"),
-    errno.EAGAIN: (serial_ports.BusyPortError, "is used by another program"),
+_ERRORS: dict[int | None, tuple[FindingKind, str]] = {
+    errno.ENOENT: (serial_ports.NO_PORT, "does not exist"),
+    errno.ENXIO: (serial_ports.NO_PORT, "has no device"),
+    errno.ENODEV: (serial_ports.NO_PORT, "has no device"),
+    errno.EACCES: (serial_ports.FORBIDDEN, "may not be opened by this user"),
+    errno.EPERM: (serial_ports.FORBIDDEN, "may not be opened by this user"),
+    errno.EBUSY: (serial_ports.BUSY, "is used by another program"),
+    errno.EAGAIN: (serial_ports.BUSY, "is used by another program"),
 }
 
 
@@ -38,8 +39,8 @@ def opened(path: str, baud: int) -> serial.Serial:
         return serial.Serial(path, baud, timeout=0, exclusive=True)
     except (OSError, termios.error, ValueError, OverflowError) as error:
         number = getattr(error, "errno", None)
-        cause, words = _ERRORS.get(number, (serial_ports.UnfitPortError, f"cannot be a serial port at {baud} bit/s"))
-        raise cause(path, words) from error
+        kind, words = _ERRORS.get(number, (serial_ports.UNFIT, f"cannot be a serial port at {baud} bit/s"))
+        raise serial_ports.PortError(kind, path, words) from error
 
 
 class SerialLine:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path, PurePath
-from typing import ClassVar, Self
+from typing import Self
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
@@ -110,67 +110,33 @@ _MOST = 4096  # entries of a folder that are looked at
 _ATTRIBUTE = 4096  # [B], the longest that the kernel shows
 
 
+_HELP = {
+    NO_PORT: "plug the adapter in, or look for it below /dev/serial/by-id",
+    FORBIDDEN: "sudo usermod -aG dialout $USER, then log in again; or a udev rule with MODE and GROUP",
+    BUSY: "end the other program: 'rbxcompose ps' shows robots that run",
+    UNFIT: "name a serial port, and a baud rate of its adapter",
+    LOST: "plug the adapter in again",
+}
+
+
 class PortError(Exception):
-    """Raised when a serial port cannot be used; each cause has its own class, kind of finding and help."""
+    """Raised when a serial port cannot be used; `kind` is the cause."""
 
-    kind: ClassVar[FindingKind]
-    help: str = ""
-
-    def __init__(self, path: str, problem: str, help: str = "") -> None:
+    def __init__(self, kind: FindingKind, path: str, problem: str, help: str = "") -> None:
         super().__init__(f"{path} {problem}")
-        self.path, self.problem = path, problem
-        self.help = help or self.help
+        self.kind, self.path, self.problem = kind, path, problem
+        self.help = help or _HELP[kind]
 
     def finding(self, span: Span | None = None) -> Finding:
         """Return the message for people."""
         return self.kind.at(span, f"{plain(self.path)} {plain(self.problem)}", help=self.help)
 
 
-class NoPortError(PortError):
-    """Raised when nothing has the name of the port."""
-
-    kind = NO_PORT
-    help = "plug the adapter in, or look for it below /dev/serial/by-id"
-
-
-class ForbiddenPortError(PortError):
-    """Raised when the user may not open the port."""
-
-    kind = FORBIDDEN
-    help = "sudo usermod -aG dialout $USER, then log in again; or a udev rule with MODE and GROUP"
-
-
-class BusyPortError(PortError):
-    """Raised when another program has locked the port."""
-
-    kind = BUSY
-    help = "end the other program: 'rbxcompose ps' shows robots that run"
-
-
-class UnfitPortError(PortError):
-    """Raised when the file is no serial port, or does not have the baud rate."""
-
-    kind = UNFIT
-    help = "name a serial port, and a baud rate of its adapter"
-
-
-class NoDeviceError(PortError):
-    """Raised when the USB device of a port is not connected."""
-
-    kind = NO_USB_DEVICE
-
-
-class DeviceNotUniqueError(PortError):
-    """Raised when more than one port belongs to a USB device as it is named."""
-
-    kind = TWO_USB_DEVICES
-
-
 class LostPortError(PortError):
     """Raised when an open port has gone."""
 
-    kind = LOST
-    help = "plug the adapter in again"
+    def __init__(self, path: str, problem: str) -> None:
+        super().__init__(LOST, path, problem)
 
 
 def slow_adapter(path: str, latency: float | None, span: Span | None = None) -> Finding | None:
@@ -288,8 +254,7 @@ def port_path(name: str, root: Path = ROOT) -> str:
     """Return the path of a port by its name, as it is now.
 
     Raises:
-        NoDeviceError: if it names a device that is not connected.
-        DeviceNotUniqueError: if more than one such device is connected.
+        PortError: if it names a device that is not connected, or more than one such device is.
     """
     wanted = UsbDevice.of(name)
     return name if wanted is None else port_of(wanted, serial_ports(root)).path
@@ -308,9 +273,11 @@ def port_of(wanted: UsbDevice, ports: Iterable[SerialPort]) -> SerialPort:
     if len(matching) != 1:
         matching = [port for port in linked if port in matching or not (matching or port.device)] or matching
     if not matching:
-        raise NoDeviceError(wanted.called, "is not connected", connected(usb, "USB serial port"))
+        raise PortError(NO_USB_DEVICE, wanted.called, "is not connected", connected(usb, "USB serial port"))
     if len(matching) > 1:
-        raise DeviceNotUniqueError(wanted.called, f"has {len(matching)} ports", connected(matching, "USB serial port"))
+        raise PortError(
+            TWO_USB_DEVICES, wanted.called, f"has {len(matching)} ports", connected(matching, "USB serial port")
+        )
     return matching[0]
 
 

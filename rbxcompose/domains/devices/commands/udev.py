@@ -60,10 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_actions(
         parser,
-        (
-            Subcommand(name, item, do, (*shared, *own), f"{item[0].upper()}{item[1:]}.")
-            for name, item, do, own in rows
-        ),
+        (Subcommand(name, item, do, (*shared, *own), f"{item[0].upper()}{item[1:]}.") for name, item, do, own in rows),
     )
 
 
