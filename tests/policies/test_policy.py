@@ -21,10 +21,11 @@ from rbxcompose.domains.policies.components.policy import (
     ObservationConfig,
     PolicyConfig,
     PolicyCore,
+    PolicyNetwork,
+    PolicyNetworkError,
     PolicyOutputConfig,
     observed,
 )
-from rbxcompose.domains.policies.network import PolicyNetwork, PolicyNetworkError
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.sensor_msgs import JointState

@@ -22,6 +22,9 @@ _COMPRESSED = ("JPEG", "PNG", "TIFF", "WEBP", "BMP")  # what cameras send; Pillo
 _FORMS = {"mjpeg": "jpeg", "jpeg": "jpeg", "png": "png", "ros_compressed": "jpeg"}
 _QUALITY = {"jpeg": 95, "png": 3}
 _QUALITIES = {"jpeg": (1, 100), "png": (0, 9)}
+MOST_STREAMS = 32  # pictures that differ
+FIRST = 10.0  # [s] for the first picture of a topic
+BOUNDARY = "boundarydonotcross"  # as web_video_server has it, which some viewers expect
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,11 +140,6 @@ def encoded(message: Image | CompressedImage, want: Picture) -> bytes:
 def _refuse_large(what: str, width: int, height: int) -> None:
     if width * height > _MOST_PIXELS:
         raise WrongPictureError(f"{what} {width} x {height} pixels; {_MOST_PIXELS} are the most")
-
-
-MOST_STREAMS = 32  # pictures that differ
-FIRST = 10.0  # [s] for the first picture of a topic
-BOUNDARY = "boundarydonotcross"  # as web_video_server has it, which some viewers expect
 
 
 class _Stream:

@@ -1,18 +1,24 @@
-"""The serial ports of this machine with their USB devices, and what can be wrong with one."""
+"""The serial ports of this machine with their USB devices, what can be wrong with one, and ports that are open."""
 
 from __future__ import annotations
 
+import errno
 import os
 import re
+import select
+import termios
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path, PurePath
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import Finding, FindingKind, Severity, Span, kind
 from rbxcompose.base.printable import plain
+
+if TYPE_CHECKING:
+    import serial
 
 USB_PORT = r"[0-9]+-[0-9]+(?:\.[0-9]+)*"
 _NAMED = re.compile(
@@ -22,6 +28,41 @@ _NAMED = re.compile(
 )
 _SPACES = re.compile(r"\s+")
 _REPLACED = re.compile(r"[^0-9A-Za-z#+.:=@_\x80-\U0010ffff-]")
+_RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
+SLOW = 0.001  # [s] of an adapter's latency timer above which it delays every reply
+NO_PORT = kind("RBX2201")
+FORBIDDEN = kind("RBX2202")
+BUSY = kind("RBX2203")
+UNFIT = kind("RBX2204")
+LOST = kind("RBX2205")
+NO_USB_DEVICE = kind("RBX2251")
+TWO_USB_DEVICES = kind("RBX2252")
+SLOW_ADAPTER = kind("RBX2206", Severity.WARNING)
+ROOT = Path("/")
+_TTYS = ("*:*/tty/tty*", "*:*/*/tty/tty*")  # below a device: of a modem (ttyACM), of a converter (ttyUSB)
+_LONGEST = 300  # characters of a port as it is shown
+_ONBOARD = ("ttyAMA", "ttyTHS", "ttymxc")
+_LINKS = ("dev/serial/by-id", "dev/serial/by-path", "dev")
+_MOST = 4096  # entries of a folder that are looked at
+_ATTRIBUTE = 4096  # [B], the longest that the kernel shows
+_HELP = {
+    NO_PORT: "plug the adapter in, or look for it below /dev/serial/by-id",
+    FORBIDDEN: "sudo usermod -aG dialout $USER, then log in again; or a udev rule with MODE and GROUP",
+    BUSY: "end the other program: 'rbxcompose ps' shows robots that run",
+    UNFIT: "name a serial port, and a baud rate of its adapter",
+    LOST: "plug the adapter in again",
+}
+_CHUNK = 4096  # [B] of one read
+_STUCK = 0.2  # [s] after which a port that takes no bytes is given up
+_ERRORS: dict[int | None, tuple[FindingKind, str]] = {
+    errno.ENOENT: (NO_PORT, "does not exist"),
+    errno.ENXIO: (NO_PORT, "has no device"),
+    errno.ENODEV: (NO_PORT, "has no device"),
+    errno.EACCES: (FORBIDDEN, "may not be opened by this user"),
+    errno.EPERM: (FORBIDDEN, "may not be opened by this user"),
+    errno.EBUSY: (BUSY, "is used by another program"),
+    errno.EAGAIN: (BUSY, "is used by another program"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,35 +129,6 @@ class UsbDevice:
 def as_udev_writes(serial: str) -> str:
     """Return a serial number as `udevadm info` shows it: `_` for spaces and for most signs."""
     return _REPLACED.sub("_", _SPACES.sub("_", serial.strip()))
-
-
-_RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
-SLOW = 0.001  # [s] of an adapter's latency timer above which it delays every reply
-
-NO_PORT = kind("RBX2201")
-FORBIDDEN = kind("RBX2202")
-BUSY = kind("RBX2203")
-UNFIT = kind("RBX2204")
-LOST = kind("RBX2205")
-NO_USB_DEVICE = kind("RBX2251")
-TWO_USB_DEVICES = kind("RBX2252")
-SLOW_ADAPTER = kind("RBX2206", Severity.WARNING)
-ROOT = Path("/")
-_TTYS = ("*:*/tty/tty*", "*:*/*/tty/tty*")  # below a device: of a modem (ttyACM), of a converter (ttyUSB)
-_LONGEST = 300  # characters of a port as it is shown
-_ONBOARD = ("ttyAMA", "ttyTHS", "ttymxc")
-_LINKS = ("dev/serial/by-id", "dev/serial/by-path", "dev")
-_MOST = 4096  # entries of a folder that are looked at
-_ATTRIBUTE = 4096  # [B], the longest that the kernel shows
-
-
-_HELP = {
-    NO_PORT: "plug the adapter in, or look for it below /dev/serial/by-id",
-    FORBIDDEN: "sudo usermod -aG dialout $USER, then log in again; or a udev rule with MODE and GROUP",
-    BUSY: "end the other program: 'rbxcompose ps' shows robots that run",
-    UNFIT: "name a serial port, and a baud rate of its adapter",
-    LOST: "plug the adapter in again",
-}
 
 
 class PortError(Exception):
@@ -306,3 +318,95 @@ def latency_of(path: str, root: Path = ROOT) -> float | None:
         except (OSError, ValueError):
             continue
     return None
+
+
+def opened(path: str, baud: int) -> serial.Serial:
+    """Open a serial port at any rate [bit/s] that its adapter has, for this program alone.
+
+    Raises:
+        PortError: if that cannot be done, with the reason.
+    """
+    import serial
+
+    try:
+        return serial.Serial(path, baud, timeout=0, exclusive=True)
+    except (OSError, termios.error, ValueError, OverflowError) as error:
+        number = getattr(error, "errno", None)
+        kind, words = _ERRORS.get(number, (UNFIT, f"cannot be a serial port at {baud} bit/s"))
+        raise PortError(kind, path, words) from error
+
+
+class SerialLine:
+    """A serial port by its name, which may be that of a device, at `baud` [bit/s]. It begins closed."""
+
+    def __init__(self, name: str, baud: int) -> None:
+        self.name, self.baud = name, baud
+        self._port: serial.Serial | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Return whether it is open."""
+        return self._port is not None
+
+    def open(self) -> None:
+        """Open it, and forget what came before.
+
+        Raises:
+            PortError: if that cannot be done, with the reason.
+        """
+        self._port = opened(port_path(self.name), self.baud)
+        try:
+            termios.tcflush(self._port.fileno(), termios.TCIFLUSH)
+        except termios.error as error:
+            raise self._lost() from error
+
+    def read(self, patience: float) -> bytes:
+        """Return what has come, waiting for at most `patience` [s] for the first byte.
+
+        Raises:
+            LostPortError: if the port has gone.
+        """
+        try:
+            descriptor = self._descriptor()
+            if not select.select([descriptor], [], [], patience)[0]:
+                return b""
+            data = os.read(descriptor, _CHUNK)
+        except (OSError, ValueError) as error:
+            raise self._lost() from error
+        if not data:
+            raise self._lost()
+        return data
+
+    def write(self, data: bytes) -> bool:
+        """Send bytes; return whether all were taken.
+
+        Raises:
+            LostPortError: if the port has gone.
+        """
+        sent = 0
+        try:
+            descriptor = self._descriptor()
+            while sent < len(data):
+                if not select.select([], [descriptor], [], _STUCK)[1]:
+                    return False
+                sent += os.write(descriptor, data[sent:])
+        except BlockingIOError:
+            return False
+        except (OSError, ValueError) as error:
+            raise self._lost() from error
+        return True
+
+    def close(self) -> None:
+        """Close it."""
+        if self._port is not None:
+            port, self._port = self._port, None
+            port.close()
+
+    def _descriptor(self) -> int:
+        if self._port is None:
+            raise OSError("it is closed")
+        return int(self._port.fileno())
+
+    def _lost(self) -> LostPortError:
+        self.close()
+        return LostPortError(self.name, "has gone")

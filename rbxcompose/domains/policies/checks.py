@@ -23,7 +23,7 @@ def unusable_policy(robot: Robot) -> Iterator[Finding]:
 
 def _examined(robot: Robot, made: RobotComponent) -> Iterator[Finding]:
     # Few robots have one.
-    from rbxcompose.domains.policies.network import PolicyNetwork, PolicyNetworkError, read_network
+    from rbxcompose.domains.policies.components.policy import PolicyNetwork, PolicyNetworkError, read_network
 
     config: Any = made.config
     path = Path(config.model)

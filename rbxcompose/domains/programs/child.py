@@ -28,6 +28,16 @@ _CLEANS_UP = 5.0  # [s] for what ends something elsewhere
 _LOOKS = 3  # in a row that find nothing: a process that is just starting another program has no environment
 _PAUSE = 0.005  # [s] between two looks for what is left
 _MARK = "RBXCOMPOSE_RUN"  # in the environment of all that belongs to one run of a program
+Event = tuple[str, Any]
+"""What happened, with a value: `line` (its text; to which output it was written does not matter), `started` (the
+process), `failed` (why it could not be started), `deaf` (it did not end within its time after the signal, and was
+killed), `ended` (the wait status), `left` (how many processes it had left in the background, which were killed)."""
+LONGEST = 500  # characters of a line in the log
+AT_ONCE, PER_SECOND = 200, 20  # lines that are logged at once, and for a long time
+TELLS = 10.0  # [s] between two records of how many were left out
+_COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+_USUAL = {Level.ERROR: r"\b(ERROR|FATAL|CRITICAL|Error|Traceback)\b", Level.WARN: r"\b(WARN|WARNING|Warning)\b"}
+"""How loggers mark their lines: those of ROS 2, Python, and most others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +57,6 @@ class StartOrder:
     """Open files that it inherits."""
     cleanup: Sequence[str] = ()
     """Run when it has ended, also if nobody is left: it ends what runs elsewhere on its behalf."""
-
-
-Event = tuple[str, Any]
-"""What happened, with a value: `line` (its text; to which output it was written does not matter), `started` (the
-process), `failed` (why it could not be started), `deaf` (it did not end within its time after the signal, and was
-killed), `ended` (the wait status), `left` (how many processes it had left in the background, which were killed)."""
 
 
 class Child:
@@ -206,14 +210,6 @@ def _children_of(pid: int) -> list[int]:
         files = [Path(f"/proc/{pid}/task/{task}/children") for task in tasks]
         return [int(text) for file in files for text in file.read_text(encoding="ascii").split()]
     return []
-
-
-LONGEST = 500  # characters of a line in the log
-AT_ONCE, PER_SECOND = 200, 20  # lines that are logged at once, and for a long time
-TELLS = 10.0  # [s] between two records of how many were left out
-_COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
-_USUAL = {Level.ERROR: r"\b(ERROR|FATAL|CRITICAL|Error|Traceback)\b", Level.WARN: r"\b(WARN|WARNING|Warning)\b"}
-"""How loggers mark their lines: those of ROS 2, Python, and most others."""
 
 
 class OutputLog:

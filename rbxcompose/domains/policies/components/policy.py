@@ -1,4 +1,4 @@
-"""A network of the user that commands joints or the base: what it observes, and which of its answers are sent."""
+"""A network of the user that commands joints or the base: its file in ONNX, what it observes, what it may answer."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from pydantic_core import PydanticCustomError
 from rbxcompose import sdk
 from rbxcompose.base.config import JointName, LocalFiles
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import NotRegularError, TooLargeError, read_regular
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.policies.network import PolicyNetwork, PolicyNetworkError
 from rbxcompose.manifest.fields import FieldPath, TopicName
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.arrays import filled
@@ -29,7 +29,95 @@ from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoin
 from rbxcompose.msgs.types import Message
 from rbxcompose.sdk.ports import BULK
 
+LARGEST = 512 * 1024 * 1024  # [B] of a network
 ROUNDING = 1e-6  # of a limit, by which a number of 32 bits may be beyond it
+JOINT_STATE = "sensor_msgs/msg/JointState"
+OF_JOINTS = ("position", "velocity", "effort")
+MOST_NUMBERS = 10_000  # of one field
+JOINTS, NUMBERS, VELOCITY = JointTrajectory.TYPE, Float64MultiArray.TYPE, Twist.TYPE
+MESSAGES: Mapping[str, type[Message]] = {JOINTS: JointTrajectory, NUMBERS: Float64MultiArray, VELOCITY: Twist}
+AXES = tuple(f"{kind}.{axis}" for kind in ("linear", "angular") for axis in "xyz")
+PERIODS = 2.0  # of the rate, in which joints arrive if nothing else is said
+
+
+class PolicyNetworkError(ValueError):
+    """Raised for a file that is no network of a policy, and for one that fails."""
+
+
+class PolicyNetwork:
+    """A network with one vector as its input, and one as its first output: both of the shape N or 1xN, of floats."""
+
+    def __init__(self, path: Path) -> None:
+        """Load it.
+
+        Raises:
+            PolicyNetworkError: if the file is no such network.
+        """
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.log_severity_level = 4  # what goes wrong is raised
+        data = read_network(path)
+        try:
+            self._session: Any = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+        except Exception as error:  # its errors have no common class
+            raise PolicyNetworkError(f"'{path.name}' is no network in ONNX: {_first_line(error)}") from error
+        inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
+        if len(inputs) != 1:
+            raise PolicyNetworkError(f"it has {len(inputs)} inputs, and not one vector")
+        self._input, self._output = inputs[0].name, outputs[0].name
+        self._is_batch = len(inputs[0].shape) == 2
+        self.takes = _length(inputs[0], "input")
+        """How many numbers it takes; None if it does not say."""
+        self.gives = _length(outputs[0], "output")
+        """How many numbers it gives; None if it does not say."""
+
+    def answer(self, vector: Sequence[float]) -> list[float]:
+        """Return its answer to an observation.
+
+        Raises:
+            PolicyNetworkError: if it cannot be computed.
+        """
+        import numpy as np
+
+        given = np.asarray([vector] if self._is_batch else vector, np.float32)
+        try:
+            found = self._session.run([self._output], {self._input: given})[0]
+        except Exception as error:  # its errors have no common class
+            raise PolicyNetworkError(f"the network fails: {_first_line(error)}") from error
+        return [float(value) for value in np.ravel(found)]
+
+
+def read_network(path: Path) -> bytes:
+    """Return the contents of a file.
+
+    Raises:
+        PolicyNetworkError: if there is none, or it cannot be read.
+    """
+    try:
+        return read_regular(path, LARGEST)
+    except FileNotFoundError:
+        raise PolicyNetworkError(f"there is no file '{path}'") from None
+    except (NotRegularError, TooLargeError) as error:
+        raise PolicyNetworkError(f"'{path.name}' cannot be used: {error}") from None
+    except OSError as error:
+        raise PolicyNetworkError(f"'{path.name}' cannot be read: {error.strerror}") from None
+
+
+def _length(end: Any, what: str) -> int | None:
+    shape = end.shape
+    is_vector = len(shape) == 1 or (len(shape) == 2 and (shape[0] == 1 or not isinstance(shape[0], int)))
+    if end.type != "tensor(float)" or not is_vector:
+        written = "x".join(map(str, shape)) or "nothing"
+        raise PolicyNetworkError(
+            f"its {what} '{end.name}' is {end.type} of the shape {written}, and not floats N or 1xN"
+        )
+    return shape[-1] if isinstance(shape[-1], int) else None
+
+
+def _first_line(error: Exception) -> str:
+    return next(iter(str(error).splitlines()), type(error).__name__)[:120]
 
 
 class PolicyOutputConfig(sdk.Config):
@@ -108,11 +196,6 @@ class PolicyCore:
 
 def _slack(*values: float) -> float:
     return ROUNDING * max(map(abs, values))
-
-
-JOINT_STATE = "sensor_msgs/msg/JointState"
-OF_JOINTS = ("position", "velocity", "effort")
-MOST_NUMBERS = 10_000  # of one field
 
 
 class NothingObservedError(Exception):
@@ -197,12 +280,6 @@ def _of_fields(config: ObservationConfig, message: Any) -> Iterator[float]:
         if len(values) != config.size:
             raise NothingObservedError(f"'{path}' of '{config.topic}' has {len(values)} numbers, and not {config.size}")
         yield from map(float, values)
-
-
-JOINTS, NUMBERS, VELOCITY = JointTrajectory.TYPE, Float64MultiArray.TYPE, Twist.TYPE
-MESSAGES: Mapping[str, type[Message]] = {JOINTS: JointTrajectory, NUMBERS: Float64MultiArray, VELOCITY: Twist}
-AXES = tuple(f"{kind}.{axis}" for kind in ("linear", "angular") for axis in "xyz")
-PERIODS = 2.0  # of the rate, in which joints arrive if nothing else is said
 
 
 class PolicyCommandsConfig(sdk.Config):

@@ -37,6 +37,10 @@ NO_ROS = kind("RBX9051")
 NO_NODE = kind("RBX9052")
 _LOOKS = 6.0  # [s] at most for discovery
 _MORE = 30.0  # [s] for ROS to start
+run = options.run_action
+_SEND_GOAL = "/_action/send_goal"
+KINDS = ("publishes", "subscribes", "serves", "calls", "serves_actions", "calls_actions")
+"""The keys of a component, in the order in which they are written."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,9 +63,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             ),
         ),
     )
-
-
-run = options.run_action
 
 
 def _scan(arguments: argparse.Namespace) -> int:
@@ -151,11 +152,6 @@ def _nodes(arguments: argparse.Namespace, compiled: Compilation | None) -> list[
         )
         raise NotDoneError(NO_ROS.at(None, f"ROS 2 does not start ({installation.python}): {last}", help=help_text))
     return [RosNode.of(name, found) for name, found in sorted(json.loads(ran.stdout).items())]
-
-
-_SEND_GOAL = "/_action/send_goal"
-KINDS = ("publishes", "subscribes", "serves", "calls", "serves_actions", "calls_actions")
-"""The keys of a component, in the order in which they are written."""
 
 
 @dataclass(frozen=True, slots=True)

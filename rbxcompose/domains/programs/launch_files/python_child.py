@@ -41,6 +41,33 @@ Data = dict[str, Any]
 FILE = "__launch_file__"  # a global name of a launch file, by which its frames are known
 LET = "let"
 _OF_PACKAGE = re.compile(r"\$\(find-pkg-(share|prefix) [A-Za-z][\w-]*\)", re.ASCII)
+_NAMES = {
+    "default_value": "default",
+    "package": "pkg",
+    "executable": "exec",
+    "node_name": "name",
+    "node_namespace": "namespace",
+    "node_executable": "exec",
+    "node_plugin": "plugin",
+    "prefix": "launch-prefix",
+    "src": "from",
+    "dst": "to",
+    "msg": "message",
+    "target_container": "target",
+}
+"""Names of arguments in Python, and what XML and YAML call them."""
+Part = Callable[[Any], Iterable[Data]]
+_OFFERED = (
+    "argparse", "ast", "collections", "collections.abc", "contextlib", "copy", "dataclasses", "datetime", "enum",
+    "errno", "functools", "getpass", "glob", "inspect", "io", "itertools", "json", "logging", "math", "multiprocessing",
+    "operator", "os", "os.path", "pathlib", "platform", "pprint", "random", "re", "shlex", "shutil", "signal", "socket",
+    "string", "subprocess", "sys", "tempfile", "textwrap", "threading", "time", "traceback", "types", "typing", "uuid",
+    "warnings", "xml", "xml.dom", "xml.dom.minidom", "xml.etree", "xml.etree.ElementTree", "yaml", "__future__",
+)  # fmt: skip
+"""Modules that a file may import: much of what they do is refused, but not their names."""
+_REMOVED = ("rbxcompose", "ctypes", "_ctypes", "resource", "gc")
+Errors = list[tuple[str, int]]
+_HARMLESS = ("sys._getframe", "os.putenv", "os.unsetenv")
 
 
 def line_here() -> int:
@@ -156,10 +183,10 @@ class ParameterFile:
         self.entity = entity("param", {"from": param_file, "allow_substs": allow_substs or None})
 
 
-def entity(kind: str, given: Mapping[str, Any], children: Iterable[Data] = (), line: int = 0) -> Data:
+def entity(kind: str, given: Mapping[str, Any], children: Iterable[Data] = ()) -> Data:
     """Return an entity as plain data; attributes that are None are not given."""
     attributes = {name: text_of(value) for name, value in given.items() if value is not None}
-    return {"kind": kind, "line": line or line_here(), "attributes": attributes, "children": [*children]}
+    return {"kind": kind, "line": line_here(), "attributes": attributes, "children": [*children]}
 
 
 def _is_list(value: Any) -> bool:
@@ -192,24 +219,6 @@ def _parameters(parameters: Any) -> Iterator[Data]:
             yield each.entity
         else:
             yield entity("param", {"from": each})
-
-
-_NAMES = {
-    "default_value": "default",
-    "package": "pkg",
-    "executable": "exec",
-    "node_name": "name",
-    "node_namespace": "namespace",
-    "node_executable": "exec",
-    "node_plugin": "plugin",
-    "prefix": "launch-prefix",
-    "src": "from",
-    "dst": "to",
-    "msg": "message",
-    "target_container": "target",
-}
-"""Names of arguments in Python, and what XML and YAML call them."""
-Part = Callable[[Any], Iterable[Data]]
 
 
 def _pairs(kind: str, first: str, second: str) -> Part:
@@ -421,19 +430,6 @@ def _unknown(name: str) -> Any:
     if name.startswith("_"):
         raise AttributeError(name)
     return type(name, (UnknownStandIn,), {})
-
-
-_OFFERED = (
-    "argparse", "ast", "collections", "collections.abc", "contextlib", "copy", "dataclasses", "datetime", "enum",
-    "errno", "functools", "getpass", "glob", "inspect", "io", "itertools", "json", "logging", "math", "multiprocessing",
-    "operator", "os", "os.path", "pathlib", "platform", "pprint", "random", "re", "shlex", "shutil", "signal", "socket",
-    "string", "subprocess", "sys", "tempfile", "textwrap", "threading", "time", "traceback", "types", "typing", "uuid",
-    "warnings", "xml", "xml.dom", "xml.dom.minidom", "xml.etree", "xml.etree.ElementTree", "yaml", "__future__",
-)  # fmt: skip
-"""Modules that a file may import: much of what they do is refused, but not their names."""
-_REMOVED = ("rbxcompose", "ctypes", "_ctypes", "resource", "gc")
-Errors = list[tuple[str, int]]
-_HARMLESS = ("sys._getframe", "os.putenv", "os.unsetenv")
 
 
 def main() -> None:
