@@ -18,19 +18,8 @@ from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.printable import plain
-from rbxcompose.domains.console import old_actions, rosapi
+from rbxcompose.domains.console import encodings, old_actions, rosapi
 from rbxcompose.domains.console.access import EDITS, OperationTarget, Role, needed
-from rbxcompose.domains.console.encodings import (
-    COMPRESSIONS,
-    SMALLEST_PIECE,
-    Pieces,
-    WrongEncodingError,
-    as_cbor,
-    as_png,
-    as_raw_cbor,
-    from_png,
-    pieces,
-)
 from rbxcompose.domains.console.json_messages import WrongMessageError, arguments, encoded, from_json, to_json
 from rbxcompose.domains.console.lease import LATEST, DriveLease, DriveLimits, Lateness, limited, moves
 from rbxcompose.domains.console.rosapi import BusView, absolute
@@ -292,11 +281,11 @@ class _Shared:
         key = f"{compression} {topic}"
         if key not in self._encoded:
             if self._message is None or compression == "png":
-                self._encoded[key] = as_png(f"{head}{self.text}}}")
+                self._encoded[key] = encodings.as_png(f"{head}{self.text}}}")
             elif compression == "cbor":
-                self._encoded[key] = as_cbor(topic, self._message)
+                self._encoded[key] = encodings.as_cbor(topic, self._message)
             else:
-                self._encoded[key] = as_raw_cbor(topic, self._message, self._stamp)
+                self._encoded[key] = encodings.as_raw_cbor(topic, self._message, self._stamp)
         return self._encoded[key]
 
 
@@ -383,7 +372,7 @@ class _Client:
         self.frames: deque[tuple[str, int]] = deque()  # each with the characters of a piece; 0: it is sent as a whole
         self.sent_pieces: deque[str] = deque()  # of the frame that is being sent
         self.pieces_so_far = 0
-        self.pieces = Pieces(LARGEST)  # that came
+        self.pieces = encodings.Pieces(LARGEST)  # that came
         self.streams: dict[str, _Stream] = {}  # by the name that it uses; the next to be served is the first
         self.advertised: dict[str, type[Message]] = {}
         self.advertised_as: dict[str, set[object]] = {}  # the ids with which it advertised a topic
@@ -526,7 +515,7 @@ class Bridge:
             data = _parsed(frame)
             identity = data.get("id")
             self._carry_out(client, data)
-        except (BadFrameError, WrongEncodingError, WrongMessageError) as error:
+        except (BadFrameError, encodings.WrongEncodingError, WrongMessageError) as error:
             self._status(client, "error", str(error), identity)
         return self.take_requests()
 
@@ -555,7 +544,7 @@ class Bridge:
         frame, size = self._whole_frame(client, now)
         if isinstance(frame, str) and 0 < size < len(frame):
             client.pieces_so_far += 1
-            client.sent_pieces.extend(pieces(frame, size, f"fragment:{client.pieces_so_far}"))
+            client.sent_pieces.extend(encodings.pieces(frame, size, f"fragment:{client.pieces_so_far}"))
             return client.sent_pieces.popleft()
         return frame
 
@@ -784,7 +773,7 @@ class Bridge:
             self._carry_out(client, _within(frame))
 
     def _png(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
-        self._carry_out(client, _within(from_png(data.get("data"), LARGEST)))
+        self._carry_out(client, _within(encodings.from_png(data.get("data"), LARGEST)))
 
     def _auth(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         """Give a client the role of its token, which is the `mac` of rosbridge's `auth`."""
@@ -796,8 +785,10 @@ class Bridge:
 
     def _subscribe(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         name, topic = target.written, target.name
-        if (compression := data.get("compression") or "none") not in COMPRESSIONS:
-            raise BadFrameError(f"a compression is one of {', '.join(COMPRESSIONS)}, not '{_short(compression)}'")
+        if (compression := data.get("compression") or "none") not in encodings.COMPRESSIONS:
+            raise BadFrameError(
+                f"a compression is one of {', '.join(encodings.COMPRESSIONS)}, not '{_short(compression)}'"
+            )
         throttle = _count(data, "throttle_rate", math.inf) / 1000
         wish = _Wish(throttle, min(_count(data, "queue_length"), LONGEST_QUEUE), compression, _piece(data))
         is_window = topic.startswith(WINDOWS)
@@ -1554,7 +1545,7 @@ def _count(data: Mapping[str, Any], key: str, most: float = 2**31) -> int:
 
 def _piece(data: Mapping[str, Any]) -> int:
     """Return how many characters a piece of a frame shall have; 0 if it shall be sent as a whole."""
-    return max(SMALLEST_PIECE, size) if (size := _count(data, "fragment_size")) else 0
+    return max(encodings.SMALLEST_PIECE, size) if (size := _count(data, "fragment_size")) else 0
 
 
 def _named(given: object, names: Sequence[str]) -> dict[str, Any]:

@@ -69,6 +69,8 @@ if TYPE_CHECKING:
     from starlette.responses import Response
     from starlette.websockets import WebSocket
 
+    Answering = Callable[[Request], Awaitable[Response]]
+
 STATIC = Path(__file__).parents[1] / "static"  # the built page
 MOST_CLIENTS = 64
 MOST_CONNECTIONS = 256  # at once: descriptors for all else, such as a stop, are left
@@ -412,6 +414,18 @@ def _address(request: HTTPConnection) -> str:
     return request.client.host if request.client else "?"
 
 
+def _file(request: Request, file: ServedFile | None) -> Response:
+    """Return a file of the robot's body, unless the browser has it already."""
+    from starlette.responses import JSONResponse, Response
+
+    if file is None:
+        return JSONResponse({"message": "the robot's body has no such file"}, 404)
+    headers = {"etag": file.tag, "cache-control": "no-cache"}
+    if file.tag in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    return Response(file.content, media_type=file.kind, headers=headers)
+
+
 class GatewaySession:
     """The web application, the bridge and the bus, all in one event loop."""
 
@@ -560,10 +574,8 @@ class GatewaySession:
         from starlette.staticfiles import StaticFiles
 
         async def config(request: Request) -> Response:
-            role = self._role(request)
-            if role < Role.VIEW:
-                return JSONResponse(_LOCKED, 401)
-            return JSONResponse(self._shown_config() | {"role": role.word}, headers={"cache-control": "no-store"})
+            role = self._role(request).word
+            return JSONResponse(self._shown_config() | {"role": role}, headers={"cache-control": "no-store"})
 
         async def log_in(request: Request) -> Response:
             if int(request.headers.get("content-length") or _LONGEST_LOGIN + 1) > _LONGEST_LOGIN:
@@ -584,7 +596,7 @@ class GatewaySession:
         is_built = (STATIC / "index.html").exists()
         page: BaseRoute = Mount("/", StaticFiles(directory=STATIC, html=True)) if is_built else Route("/", not_built)
         sockets = [WebSocketRoute(path, self._talk) for path in SOCKETS]
-        own = [Route("/console/config", config), Route("/console/login", log_in, methods=["POST"])]
+        own = [Route("/console/config", self._for_viewers(config)), Route("/console/login", log_in, methods=["POST"])]
         return Starlette(routes=[*sockets, *own, *self._video(), *self._model(), page])
 
     def _model(self) -> list[Any]:
@@ -594,40 +606,33 @@ class GatewaySession:
         model = ServedModel(self.config.urdf, self.config.meshes)
 
         async def urdf(request: Request) -> Response:
-            return self._file(request, model.urdf)
+            return _file(request, model.urdf)
 
         async def mesh(request: Request) -> Response:
-            if self._role(request) < Role.VIEW:
-                return self._file(request, None)
             address = request.path_params["address"]
             found = await asyncio.to_thread(model.mesh, address)
-            return self._file(request, found or await asyncio.to_thread(self._candidates.mesh, address))
+            return _file(request, found or await asyncio.to_thread(self._candidates.mesh, address))
 
-        return [Route("/console/model.urdf", urdf), Route(f"{MESHES}{{address:path}}", mesh)]
+        routes = {"/console/model.urdf": urdf, f"{MESHES}{{address:path}}": mesh}
+        return [Route(path, self._for_viewers(answer)) for path, answer in routes.items()]
 
-    def _file(self, request: Request, file: ServedFile | None) -> Response:
-        """Return a file of the robot's body to who may see it, unless the browser has it already."""
-        from starlette.responses import JSONResponse, Response
+    def _for_viewers(self, answer: Answering) -> Answering:
+        """Return what answers only who may look."""
+        from starlette.responses import JSONResponse
 
-        if self._role(request) < Role.VIEW:
-            return JSONResponse(_LOCKED, 401)
-        if file is None:
-            return JSONResponse({"message": "the robot's body has no such file"}, 404)
-        headers = {"etag": file.tag, "cache-control": "no-cache"}
-        if file.tag in request.headers.get("if-none-match", ""):
-            return Response(status_code=304, headers=headers)
-        return Response(file.content, media_type=file.kind, headers=headers)
+        async def guarded(request: Request) -> Response:
+            return JSONResponse(_LOCKED, 401) if self._role(request) < Role.VIEW else await answer(request)
+
+        return guarded
 
     def _video(self) -> list[Any]:
         """Return the pages of pictures, at the addresses of web_video_server."""
-        from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, StreamingResponse
+        from starlette.responses import HTMLResponse, PlainTextResponse, StreamingResponse
         from starlette.responses import Response as Answer
         from starlette.routing import Route
 
-        def shown(show: Callable[[Request, Picture], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
+        def shown(show: Callable[[Request, Picture], Awaitable[Response]]) -> Answering:
             async def answer(request: Request) -> Response:
-                if self._role(request) < Role.VIEW:
-                    return JSONResponse(_LOCKED, 401)
                 try:
                     return await show(request, wanted(request.query_params))
                 except WrongPictureError as error:
@@ -667,15 +672,11 @@ class GatewaySession:
             return HTMLResponse(viewer_page(request.url.query))
 
         async def listed(request: Request) -> Response:
-            if self._role(request) < Role.VIEW:
-                return JSONResponse(_LOCKED, 401)
-            return HTMLResponse(list_page(self._image_topics()))
+            return HTMLResponse(list_page(topic for topic, type_ in self._graph.view.topics.items() if type_ in IMAGES))
 
-        routes = {"/stream": stream, "/snapshot": snapshot, "/stream_viewer": viewer}
-        return [Route("/streams", listed), *(Route(path, shown(show)) for path, show in routes.items())]
-
-    def _image_topics(self) -> list[str]:
-        return [topic for topic, type_ in self._graph.view.topics.items() if type_ in IMAGES]
+        pictures = {"/stream": stream, "/snapshot": snapshot, "/stream_viewer": viewer}
+        routes = {"/streams": listed, **{path: shown(show) for path, show in pictures.items()}}
+        return [Route(path, self._for_viewers(answer)) for path, answer in routes.items()]
 
     def _subscribe_to_images(
         self, topic: str, message: type[Message], then: Callable[[Any], None]
@@ -1010,14 +1011,17 @@ class GatewaySession:
             self._bridge.answered(request.number, reply.response, reply.error)
             self._carry_out_further()
 
-        def attempt() -> None:
-            left = deadline - self._now
-            if caller.is_available or left <= 0:
-                caller(request.request, then or answered, timeout=max(_PAUSE, left))
-            else:
-                self._guest.scheduler.at(self._now + _PAUSE / 10, NAME, attempt)
+        def call() -> None:
+            caller(request.request, then or answered, timeout=max(_PAUSE, deadline - self._now))
 
-        attempt()
+        self._once(lambda: caller.is_available or self._now >= deadline, call)
+
+    def _once(self, is_ready: Callable[[], bool], do: Callable[[], None]) -> None:
+        """Do something as soon as it can be done."""
+        if is_ready():
+            do()
+        else:
+            self._guest.scheduler.at(self._now + _PAUSE / 10, NAME, partial(self._once, is_ready, do))
 
     def _serve(self, service: str, type_: type[Service[Any, Any]]) -> None:
         def requested(asked: ServedRequest[Any, Any]) -> None:
@@ -1061,18 +1065,16 @@ class GatewaySession:
             del self._goals[number]
             self._bridge.ended(number, end)
 
-        def attempt() -> None:
+        def send() -> None:
             if unsent.is_cancelled:
                 ended(Ended(Outcome.CANCELED, message="canceled before it was sent"))
             elif caller.is_available:
                 feedback = partial(self._bridge.fed_back, number) if request.wants_feedback else None
                 self._goals[number] = caller(request.goal, ended, feedback)
-            elif self._now > deadline:
-                ended(Ended(Outcome.LOST, message=f"the server of '{request.action}' does not answer"))
             else:
-                self._guest.scheduler.at(self._now + _PAUSE / 10, NAME, attempt)
+                ended(Ended(Outcome.LOST, message=f"the server of '{request.action}' does not answer"))
 
-        attempt()
+        self._once(lambda: unsent.is_cancelled or caller.is_available or self._now > deadline, send)
 
     async def _pass_on(self, number: int, ask: Callable[[Any], Awaitable[tuple[Any, str]]], request: object) -> None:
         """Pass the answer to a request to the bridge, or the reason why there is none."""
