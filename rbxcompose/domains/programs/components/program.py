@@ -274,7 +274,8 @@ class Runner(Component[R]):
         self.heard: dict[str, Closable] = {}
         self.session = self.endpoint = ""
         self.joining: dict[str, str] = {}
-        self.output = OutputLog({level: text for level, text in self._levels() if text})
+        levels = {Level.ERROR: self.config.levels.error, Level.WARN: self.config.levels.warn}
+        self.output = OutputLog({level: text for level, text in levels.items() if text})
         ready = self.config.ready
         self.marks_ready = re.compile(ready.output) if ready is not None and ready.output is not None else None
         self.is_inert = type(self.context.clock) is SteppedClock
@@ -526,10 +527,6 @@ class Runner(Component[R]):
     def _log(self, lines: Iterable[str]) -> None:
         for level, text in self.output.take(lines, self.now):
             self.context.log(Level.OK if self.is_ending else level, text)  # its end is wanted, however loud
-
-    def _levels(self) -> Iterator[tuple[Level, str | None]]:
-        yield Level.ERROR, self.config.levels.error
-        yield Level.WARN, self.config.levels.warn
 
     def _mind_memory(self, child: Child) -> None:
         most = self.most_memory
