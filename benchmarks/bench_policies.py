@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks.measuring import COMMAND, Row, processor_time, program, timed
-from rbxcompose.domains.policies.network import PolicyNetwork
+from rbxcompose.domains.policies.components.policy import PolicyNetwork
 from rbxcompose.runtime.processes import titled
 from tests.policies.networks import network
 

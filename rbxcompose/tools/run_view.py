@@ -12,7 +12,7 @@ from rbxcompose.commands.story import StoryWriter, summary
 from rbxcompose.commands.targets import missing_extras
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan, extent
-from rbxcompose.domains.console.links import show_link
+from rbxcompose.domains.console.commands.console import show_link
 from rbxcompose.domains.devices.serial_ports import serial_ports
 from rbxcompose.domains.devices.udev import look_at, port_findings
 from rbxcompose.domains.programs.runnable import ask_for_real, program_findings

@@ -12,16 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.domains.devices.serial_ports import (
-    BusyPortError,
-    ForbiddenPortError,
-    LostPortError,
-    NoPortError,
-    PortError,
-    UnfitPortError,
-    latency_of,
-    slow_adapter,
-)
+from rbxcompose.domains.devices.serial_ports import LostPortError, PortError, latency_of, slow_adapter
 from rbxcompose.domains.servos.dynamixel_port import BlockingPort
 
 
@@ -134,15 +125,13 @@ def test_an_unplugged_port_is_told_at_any_use(line: Line) -> None:
 
 
 def test_a_second_program_is_refused(line: Line) -> None:
-    with pytest.raises(BusyPortError, match="used by another program"):
+    with pytest.raises(PortError, match="used by another program"):
         BlockingPort(line.path, 1_000_000)
 
 
-@pytest.mark.parametrize(
-    ("path", "error", "code"), [("/dev/nothing-here", NoPortError, "RBX2201"), ("/dev/null", UnfitPortError, "RBX2204")]
-)
-def test_what_cannot_be_opened_is_told_with_its_cause(path: str, error: type[PortError], code: str) -> None:
-    with pytest.raises(error) as caught:
+@pytest.mark.parametrize(("path", "code"), [("/dev/nothing-here", "RBX2201"), ("/dev/null", "RBX2204")])
+def test_what_cannot_be_opened_is_told_with_its_cause(path: str, code: str) -> None:
+    with pytest.raises(PortError) as caught:
         BlockingPort(path, 1_000_000)
     finding = caught.value.finding()
     assert (finding.code, path in finding.message, bool(finding.help)) == (code, True, True)
@@ -153,7 +142,7 @@ def test_a_forbidden_port_names_the_group(monkeypatch: pytest.MonkeyPatch, line:
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(os, "open", forbidden)
-    with pytest.raises(ForbiddenPortError) as caught:
+    with pytest.raises(PortError, match="may not be opened") as caught:
         BlockingPort(line.path, 1_000_000)
     assert "dialout" in caught.value.finding().help
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from typing import Any
 
 from rbxcompose.domains.console.access import Role
 from rbxcompose.domains.console.lease import DriveLimits
 from rbxcompose.domains.console.protocol import Bridge, BusRequest
+from rbxcompose.domains.console.rosapi import BusView
 from rbxcompose.msgs.types import Message
 
 TELEOP = "/cmd_vel/teleop"
@@ -26,29 +26,10 @@ class Graph:
         self.acted = {"/go_to": "nav2_msgs/action/NavigateToPose"}
         self.latched: set[str] = set()
 
-    def topics(self) -> dict[str, str]:
-        return self.known
-
-    def services(self) -> dict[str, str]:
-        return self.served
-
-    def actions(self) -> dict[str, str]:
-        return self.acted
-
-    def servers(self, service: str) -> Sequence[str]:
-        return ["/base"] if service in self.served else []
-
-    def nodes(self) -> Sequence[str]:
-        return ["/base"]
-
-    def publishers(self, topic: str) -> Sequence[str]:
-        return ["/base"] if topic == "/odom" else []
-
-    def subscribers(self, topic: str) -> Sequence[str]:
-        return []
-
-    def is_latched(self, topic: str) -> bool:
-        return topic in self.latched
+    def view(self) -> BusView:
+        servers = {service: ["/base"] for service in self.served}
+        publishers = {"/odom": ["/base"]}
+        return BusView(self.known, self.served, self.acted, ["/base"], publishers, {}, servers, self.latched)
 
 
 class Room:
@@ -56,7 +37,7 @@ class Room:
 
     def __init__(self, drive: DriveLimits | None = LIMITS, **access: Any) -> None:
         self.graph, self.now = Graph(), 0.0
-        self.bridge = Bridge(self.graph, drive, **access)
+        self.bridge = Bridge(self.graph.view, drive, **access)
         self.requests: list[BusRequest] = []
 
     def client(self, role: Role = Role.CONFIGURE, who: str = "") -> Client:

@@ -22,7 +22,7 @@ from rbxcompose.domains.console.access import (
     secret_path,
     token_of,
 )
-from rbxcompose.domains.console.links import network_address
+from rbxcompose.domains.console.commands.console import network_address
 from rbxcompose.msgs.types import Service
 from rbxcompose.runtime.process_group.parameters import INTERFACES
 from tests.loops import for_all

@@ -19,8 +19,7 @@ from rbxcompose.domains.console.protocol import (
     ServeAction,
     ServiceAnswer,
     ServiceCall,
-    Unserve,
-    UnserveAction,
+    Withdraw,
 )
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.rcl_interfaces import (
@@ -238,7 +237,7 @@ def test_a_client_serves_and_fails_what_it_leaves_open() -> None:
     (status,) = client.does("service_response", service="bell", id=first["id"], values={})
     assert "no open request" in status["msg"]
     client.leaves()
-    assert room.asked() == [ServiceAnswer(3, None, "the client that served it has left"), Unserve("/bell")]
+    assert room.asked() == [ServiceAnswer(3, None, "the client that served it has left"), Withdraw(Serve, "/bell")]
     assert third["id"] == "request:3"
 
 
@@ -344,7 +343,7 @@ def test_a_goal_is_unwanted_when_canceled_or_replaced() -> None:
     (status,) = client.does("action_result", action="greet", id=first["id"])
     assert "no open goal" in status["msg"]
     client.leaves()
-    assert room.asked() == [UnserveAction("/greet")]
+    assert room.asked() == [Withdraw(ServeAction, "/greet")]
 
 
 def test_only_its_server_answers_for_an_action_and_an_end_has_a_status_of_ros() -> None:
@@ -359,7 +358,7 @@ def test_only_its_server_answers_for_an_action_and_an_end_has_a_status_of_ros() 
     for action, type_ in (("greet", NAVIGATE), ("go_to", NAVIGATE), ("x", "no/Such"), ("x", 3)):
         assert len(other.does("advertise_action", action=action, type=type_)) == 1
     assert client.does("unadvertise_action", action="greet") == []
-    assert room.asked() == [UnserveAction("/greet")]
+    assert room.asked() == [Withdraw(ServeAction, "/greet")]
 
 
 # Parameters and types

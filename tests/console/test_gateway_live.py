@@ -34,8 +34,8 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from rbxcompose.commands.guest import Guest
 from rbxcompose.domains.console.components.gateway import MOST_CONNECTIONS
-from rbxcompose.domains.console.streams import MOST_STREAMS
 from rbxcompose.domains.console.topic_rates import SHORTEST
+from rbxcompose.domains.console.video import MOST_STREAMS
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.sdk.ports import Qos
 from tests.cli.live_robot import PATIENCE, Robot

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.console.lease import LEASE, DriveLimits
-from rbxcompose.domains.console.protocol import MOST_SUBSCRIPTIONS, Publish, Unadvertise
+from rbxcompose.domains.console.protocol import MOST_SUBSCRIPTIONS, Advertise, Publish, Withdraw
 from rbxcompose.msgs.geometry_msgs import Twist, TwistStamped, Vector3
 from tests.console.clients import LIMITS, TELEOP, TWIST, Client, Room
 
@@ -90,7 +90,7 @@ def test_who_withdraws_its_publisher_lets_go() -> None:
     drives(anna)
     room.asked()
     assert anna.does("unadvertise", topic=TELEOP) == []
-    assert room.asked() == [REST, Unadvertise(TELEOP)]
+    assert room.asked() == [REST, Withdraw(Advertise, TELEOP)]
     assert room.bridge.lease.holder == ""
     room.wait(2.0)
     assert room.asked() == []

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.domains.console.access import OperationTarget, Role, needed
+from rbxcompose.domains.console.access import EDITS, OperationTarget, Role, needed
 from rbxcompose.domains.console.editor_process import MOST_WAITING, EditorProcess
-from rbxcompose.domains.console.protocol import MISSION_TEXTS, ROBOT_TEXTS, EditMission
+from rbxcompose.domains.console.protocol import EditMission
 from rbxcompose.tools.mission_editor.editor import REQUESTS
 from rbxcompose.tools.robot_editor.editor import LIVE_REQUESTS, ROBOT_REQUESTS
 from tests.console.clients import Room
@@ -35,7 +35,7 @@ def test_a_request_about_a_text_is_passed_on_and_its_answer_comes_back() -> None
 
 
 def test_the_gateway_passes_on_all_that_the_editor_answers_each_with_a_role_of_its_own() -> None:
-    assert set(MISSION_TEXTS) == set(REQUESTS)
+    assert {name for name in EDITS if name.startswith("mission/")} == {f"mission/{name}" for name in REQUESTS}
     roles = {name: needed(OperationTarget("call_service", f"/console/mission/{name}"), {}) for name in REQUESTS}
     assert {name for name, role in roles.items() if role is Role.CONFIGURE} == {"new", "save", "test_new"}
     assert {name for name, role in roles.items() if role is Role.OPERATE} == {"test", "try"}
@@ -55,11 +55,11 @@ def test_who_saved_what_is_in_the_log() -> None:
     client = room.client(who="10.0.0.7")
     for args, refusal in (({**SAVE, "dry_run": True}, ""), (SAVE, "it was changed meanwhile")):
         client.does("call_service", service="/console/mission/save", args=args)
-        room.bridge.robot_answered(room.asked()[-1].number, None, refusal)  # type: ignore[union-attr]
+        room.bridge.robot_answered(room.asked()[-1].number, None, refusal)  # type: ignore[attr-defined]
         assert not any("saves" in note for note in room.bridge.notes)
     client.does("call_service", service="/console/mission/save", args=SAVE)
     client.leaves()
-    room.bridge.robot_answered(room.asked()[-1].number, {})  # type: ignore[union-attr]
+    room.bridge.robot_answered(room.asked()[-1].number, {})  # type: ignore[attr-defined]
     assert room.bridge.notes[-1] == "10.0.0.7 (configure): saves the mission patrol"
 
 
@@ -67,7 +67,7 @@ def test_who_makes_a_mission_is_in_the_log_whatever_else_is_asked() -> None:
     room = Room()
     args = {"mission": "patrol", "template": "empty", "dry_run": True}
     room.client(who="10.0.0.7").does("call_service", service="/console/mission/new", args=args)
-    room.bridge.robot_answered(room.asked()[-1].number, {})  # type: ignore[union-attr]
+    room.bridge.robot_answered(room.asked()[-1].number, {})  # type: ignore[attr-defined]
     assert room.bridge.notes[-1] == "10.0.0.7 (configure): makes the mission patrol"
 
 
@@ -122,7 +122,8 @@ MOVED = {"subject": "places", "changes": [{"op": "remove", "path": ["places", "d
 def test_what_the_robot_is_is_edited_by_the_same_process() -> None:
     room = Room()
     client = room.client(who="10.0.0.7")
-    assert {f"robot/{name}" for name in ROBOT_TEXTS} == {*LIVE_REQUESTS, *(f"robot/{name}" for name in ROBOT_REQUESTS)}
+    known = {*LIVE_REQUESTS, *(f"robot/{name}" for name in ROBOT_REQUESTS)}
+    assert {name for name in EDITS if name.startswith("robot/")} == known
     assert client.does("call_service", service="/console/robot/look", args=MOVED) == []
     (asked,) = room.asked()
     assert isinstance(asked, EditMission)
@@ -130,7 +131,7 @@ def test_what_the_robot_is_is_edited_by_the_same_process() -> None:
     client.does("call_service", service="/console/robot/save", args={**MOVED, "dry_run": True})
     assert not any("saves" in note for note in room.bridge.notes)
     client.does("call_service", service="/console/robot/save", args=MOVED)
-    room.bridge.robot_answered(room.asked()[-1].number, {})  # type: ignore[union-attr]
+    room.bridge.robot_answered(room.asked()[-1].number, {})  # type: ignore[attr-defined]
     assert room.bridge.notes[-1] == "10.0.0.7 (configure): saves places of the robot"
 
 
@@ -144,7 +145,7 @@ def test_the_robot_that_runs_is_changed_by_who_configures_and_that_is_noted() ->
         )
         for refusal in ("the robot has changed meanwhile", ""):
             client.does("call_service", service=f"/console/robot/{name}", args={"generation": 0})
-            room.bridge.robot_answered(room.requests[-1].number, {}, refusal)  # type: ignore[union-attr]
+            room.bridge.robot_answered(room.requests[-1].number, {}, refusal)  # type: ignore[attr-defined]
             assert (note in room.bridge.notes[-1]) == (not refusal)
     asked = [one.request["do"] for one in room.asked() if isinstance(one, EditMission)]
     assert asked == ["robot/compare", *["robot/apply"] * 2, *["robot/revert"] * 2]

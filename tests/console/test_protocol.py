@@ -38,10 +38,9 @@ from rbxcompose.domains.console.protocol import (
     ServiceCall,
     Subscribe,
     TailLog,
-    Unadvertise,
-    Unsubscribe,
     Unwatch,
     Watch,
+    Withdraw,
 )
 from rbxcompose.msgs.action_msgs import GoalStatusArray
 from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist, Vector3
@@ -69,7 +68,7 @@ def test_a_topic_is_on_the_bus_only_while_a_client_wants_it() -> None:
     one.does("unsubscribe", topic="/level")
     assert room.asked() == []
     two.leaves()
-    assert room.asked() == [Unsubscribe("/level")]
+    assert room.asked() == [Withdraw(Subscribe, "/level")]
 
 
 def test_a_message_is_encoded_once_for_all_and_only_for_who_takes_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,7 +124,7 @@ def test_the_lowest_throttle_and_the_longest_queue_of_several_subscriptions_coun
     assert [frame["msg"]["data"] for frame in client.gets()] == [9.0]
     room.asked()
     client.does("unsubscribe", topic="/level", id="slow")
-    assert room.asked() == [Unsubscribe("/level")]
+    assert room.asked() == [Withdraw(Subscribe, "/level")]
 
 
 def test_clients_that_came_at_different_times_get_the_same_messages() -> None:
@@ -178,7 +177,7 @@ def test_messages_are_published_with_defaults_and_a_stamp() -> None:
     assert (made.pose.position.x, made.pose.orientation.w) == (1.0, 1.0)
     assert (made.header.stamp.sec, made.header.stamp.nanosec) == divmod(STAMP, 10**9)
     client.does("unadvertise", topic="goal")
-    assert room.asked() == [Unadvertise("/goal")]
+    assert room.asked() == [Withdraw(Advertise, "/goal")]
 
 
 def test_a_topic_is_advertised_until_the_last_that_did_so_in_a_client_does_no_longer() -> None:
@@ -190,10 +189,10 @@ def test_a_topic_is_advertised_until_the_last_that_did_so_in_a_client_does_no_lo
     assert client.does("unadvertise", topic="/goal", id="second") == []
     assert room.asked() == []
     assert client.does("unadvertise", topic="/goal", id="first") == []
-    assert room.asked() == [Unadvertise("/goal")]
+    assert room.asked() == [Withdraw(Advertise, "/goal")]
     client.does("advertise", topic="/goal", type="geometry_msgs/PoseStamped", id="first")
     assert client.does("unadvertise", topic="/goal") == []  # all of them
-    assert room.asked() == [Advertise("/goal", PoseStamped), Unadvertise("/goal")]
+    assert room.asked() == [Advertise("/goal", PoseStamped), Withdraw(Advertise, "/goal")]
 
 
 def test_the_status_of_an_action_needs_no_type() -> None:
@@ -208,7 +207,7 @@ def test_a_topic_that_exists_needs_no_type_and_no_advertisement() -> None:
     assert client.does("publish", topic="level", msg={"data": 3}) == []
     assert room.asked() == [Advertise("/level", Float32), Publish("/level", level(3.0))]
     client.leaves()
-    assert room.asked() == [Unadvertise("/level")]
+    assert room.asked() == [Withdraw(Advertise, "/level")]
 
 
 def test_services_are_called_with_maps_and_lists() -> None:
@@ -566,13 +565,11 @@ def test_no_frame_raises_and_whatever_is_sent_is_json(frames: list[tuple[int, An
             case Subscribe(topic):
                 assert topic not in subscribed
                 subscribed.add(topic)
-            case Unsubscribe(topic):
-                subscribed.remove(topic)
             case Advertise(topic):
                 assert topic not in advertised
                 advertised.add(topic)
-            case Unadvertise(topic):
-                advertised.remove(topic)
+            case Withdraw(kind, topic):
+                (subscribed if kind is Subscribe else advertised).remove(topic)
             case Publish(topic):
                 assert topic in advertised
     assert (subscribed, advertised) == (set(), set())  # nothing is left on the bus
@@ -715,7 +712,9 @@ def needed_by(request: BusRequest, guards: dict[str, Role]) -> Role:
             least = Role.CONFIGURE if writes else Role.OPERATE if asked["do"] in ("test", "try") else Role.VIEW
         case AskRobot(request=asked):
             least = Role.OPERATE if asked is RELEASE else Role.VIEW
-        case Subscribe() | Unsubscribe() | Watch() | TailLog() | ReadTested():
+        case Withdraw(kind) if kind is Subscribe:
+            return Role.VIEW
+        case Subscribe() | Watch() | TailLog() | ReadTested():
             return Role.VIEW
     names += [name.partition("/_action/")[0] for name in names]
     return max([least, *(guards[name] for name in names if name in guards)])

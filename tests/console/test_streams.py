@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.domains.console import streams as module
-from rbxcompose.domains.console.streams import Streams
-from rbxcompose.domains.console.video import Picture
+from rbxcompose.domains.console import video as module
+from rbxcompose.domains.console.video import Picture, Streams
 from rbxcompose.msgs.images import WrongPictureError
 from rbxcompose.msgs.sensor_msgs import Image
 

@@ -22,13 +22,19 @@ from rbxcompose.domains.devices.nmea import (
     SatelliteReceiver,
     Sentence,
     SentenceReader,
-    framed,
+    checksum,
 )
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 from rbxcompose.msgs.geometry_msgs import TwistStamped
 from rbxcompose.msgs.sensor_msgs import Imu, NavSatFix, NavSatStatus
 from rbxcompose.testing import Bench, instance
 from tests.devices.plugged import PluggedDevice, plugged_in
+
+
+def framed(body: str) -> bytes:
+    """Return a whole sentence."""
+    return f"${body}*{checksum(body.encode('ascii')):02X}\r\n".encode("ascii")
+
 
 GGA = b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n"  # as in the manuals
 RMC = b"$GPRMC,123519,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W*6A\r\n"

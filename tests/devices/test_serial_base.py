@@ -28,7 +28,7 @@ from rbxcompose.domains.bases.wheel_board import (
     frame,
 )
 from rbxcompose.domains.bases.wheels import WheelSpeeds
-from rbxcompose.domains.devices.serial_line import SerialLine
+from rbxcompose.domains.devices.serial_ports import SerialLine
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry

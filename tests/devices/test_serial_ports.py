@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.domains.devices.serial_ports import (
-    DeviceNotUniqueError,
-    NoDeviceError,
+    PortError,
     SerialPort,
     UsbDevice,
     latency_timers,
@@ -62,11 +61,11 @@ def test_a_port_is_found_by_its_device_wherever_it_is_now(tmp_path: Path) -> Non
 
 
 def test_a_device_that_is_not_connected_is_told_with_those_that_are(tmp_path: Path) -> None:
-    with pytest.raises(NoDeviceError) as error:
+    with pytest.raises(PortError, match="is not connected") as error:
         port_path("usb:0403:6001:A7", tmp_path)
     assert error.value.finding().help == "no USB serial port is connected: plug the adapter in"
     port = MachineTree(tmp_path).plug("ttyUSB0")
-    with pytest.raises(NoDeviceError, match="the USB device 0403:6001 A7 is not connected") as error:
+    with pytest.raises(PortError, match="the USB device 0403:6001 A7 is not connected") as error:
         port_path("usb:0403:6001:A7", tmp_path)
     assert error.value.finding().help == f"connected: {port} (0403:6014 at USB port 1-1)"
 
@@ -75,7 +74,7 @@ def test_a_device_that_is_there_twice_is_not_chosen(tmp_path: Path) -> None:
     tree = MachineTree(tmp_path)
     tree.plug("ttyUSB0", serial="A")
     tree.plug("ttyUSB1", serial="B")
-    with pytest.raises(DeviceNotUniqueError, match="has 2 ports"):
+    with pytest.raises(PortError, match="has 2 ports"):
         port_path("usb:0403:6014", tmp_path)
 
 
@@ -86,7 +85,7 @@ def test_devices_without_serial_numbers_are_told_apart_by_their_sockets(tmp_path
     )
     assert port_path("usb@1-1.4:1a86:7523", tmp_path) == str(left)
     assert port_path("usb@1-1.2", tmp_path) == str(right)
-    with pytest.raises(NoDeviceError, match="1a86:7523 at USB port 1-1 is not"):
+    with pytest.raises(PortError, match="1a86:7523 at USB port 1-1 is not"):
         port_path("usb@1-1:1a86:7523", tmp_path)
 
 
@@ -113,7 +112,7 @@ def test_the_link_of_a_rule_decides_among_those_that_are_meant(tmp_path: Path) -
     other = tree.plug("ttyUSB2", serial="FT4")
     assert port_path("dev:arm=usb:0403:6014:FT4", tmp_path) == str(other), "the link is of an old rule"
     link.unlink()
-    with pytest.raises(DeviceNotUniqueError, match=r"the device 'arm' \(0403:6014\) has 3 ports"):
+    with pytest.raises(PortError, match=r"the device 'arm' \(0403:6014\) has 3 ports"):
         port_path("dev:arm=usb:0403:6014", tmp_path)
 
 
@@ -121,7 +120,7 @@ def test_the_link_counts_where_the_kernel_tells_nothing(tmp_path: Path) -> None:
     tree = MachineTree(tmp_path)
     tree.link("arm", "/dev/pts/ptmx")
     assert port_path("dev:arm=usb:0403:6014", tmp_path) == "/dev/pts/ptmx"
-    with pytest.raises(NoDeviceError):
+    with pytest.raises(PortError, match="is not connected"):
         port_path("dev:leg=usb:0403:6014", tmp_path)
 
 

@@ -104,7 +104,7 @@ def test_xml_and_yaml_say_the_same(tmp_path: Path, actions: list[Any]) -> None:
 
 
 KINDS = st.sampled_from([*_KNOWN, "composable_node", "item", "word", "choice", "log", "strange"])
-GIVEN = st.sampled_from(sorted({name for names in _KNOWN.values() for name in names} - {"file"}))
+GIVEN = st.sampled_from(sorted({name for kind in _KNOWN.values() for name in kind.attributes} - {"file"}))
 PIECES = ("$(var a)", "$(var b c)", "$(eval 1 + 1)", "$(eval '", "$(env HOME)", "$(not true)", "$(", ")", "[1, x]",
           "{a: ", "true", "/a/b", "3.5", "-1", "'", "*a", "!!python/none", "2020-01-01", "\u202e", " ")  # fmt: skip
 WRITTEN = st.lists(st.sampled_from(PIECES), max_size=3).map("".join)

@@ -16,10 +16,16 @@ from pydantic import ValidationError
 from rbxcompose.base.findings import Finding
 from rbxcompose.base.levels import Level
 from rbxcompose.compiler.compile import compile_robot
-from rbxcompose.domains.policies.components.policy import PolicyConfig
-from rbxcompose.domains.policies.core import AnswerLimits, PolicyCore
-from rbxcompose.domains.policies.network import PolicyNetwork, PolicyNetworkError
-from rbxcompose.domains.policies.observation import NothingObservedError, ObservationConfig, observed
+from rbxcompose.domains.policies.components.policy import (
+    NothingObservedError,
+    ObservationConfig,
+    PolicyConfig,
+    PolicyCore,
+    PolicyNetwork,
+    PolicyNetworkError,
+    PolicyOutputConfig,
+    observed,
+)
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.sensor_msgs import JointState
@@ -29,7 +35,7 @@ from rbxcompose.msgs.trajectory_msgs import JointTrajectory
 from rbxcompose.testing import Bench, instance
 from tests.policies.networks import network
 
-LIMITS = {"a": AnswerLimits(-1.0, 1.0, 0.2), "b": AnswerLimits(-1.0, 1.0, 0.2)}
+LIMITS = dict.fromkeys("ab", PolicyOutputConfig(least=-1.0, most=1.0, jump=0.2))
 NAN, INF = math.nan, math.inf
 
 
@@ -50,13 +56,13 @@ def judged(core: PolicyCore, answer: Sequence[float], began: float = 0.0, took: 
 def test_what_is_wrong_is_refused_and_counted(answer: tuple[float, ...], said: str) -> None:
     core = PolicyCore(LIMITS, 0.1)
     assert judged(core, answer) == said
-    assert (core.counts.refused, core.counts.sent, core.last) == (1, 0, None)
+    assert (core.counts["refused"], core.counts["sent"], core.last) == (1, 0, None)
 
 
 def test_what_is_late_is_not_sent() -> None:
     core = PolicyCore(LIMITS, 0.1)
     assert judged(core, (0.0, 0.0), took=0.15) == "an answer took 150 ms, and is late after 100 ms"
-    assert (core.counts.late, core.counts.sent) == (1, 0)
+    assert (core.counts["late"], core.counts["sent"]) == (1, 0)
 
 
 def test_rest_is_told_once_when_the_last_good_answer_is_old_and_the_next_one_begins_anew() -> None:
@@ -76,7 +82,7 @@ def test_nothing_that_is_sent_is_beyond_limits_or_far_from_what_was_sent(answers
             assert all(-1 <= value <= 1 for value in core.last)
             assert all(abs(value - old) <= 0.2 + 2e-6 for value, old in zip(core.last, before, strict=True))
             before = (core.last[0], core.last[1])
-    assert core.counts.sent + core.counts.refused == len(answers)
+    assert core.counts["sent"] + core.counts["refused"] == len(answers)
 
 
 def test_numbers_are_observed_in_the_order_in_which_they_are_written() -> None:
@@ -226,10 +232,10 @@ def test_an_answer_that_takes_too_long_is_late(tmp_path: Path, monkeypatch: pyte
     now = clock.now
     monkeypatch.setattr(policy.network, "answer", slow)
     policy.on_switch(SetBool.Request(data=True))
-    before = policy.core.counts.sent
+    before = policy.core.counts["sent"]
     policy.step(0.1)
     monkeypatch.undo()
-    assert (policy.core.counts.late, policy.core.counts.sent) == (1, before)
+    assert (policy.core.counts["late"], policy.core.counts["sent"]) == (1, before)
 
 
 def test_it_is_off_until_it_is_switched_on_and_after_a_stop(tmp_path: Path) -> None:

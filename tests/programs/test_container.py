@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.domains.programs.child import Child, Deaf, ProgramEnd, WrittenLine
+from rbxcompose.domains.programs.child import Child, Event
 from rbxcompose.domains.programs.components.container import Container, ContainerConfig, order_of, removal
 from rbxcompose.domains.programs.runnable import NoEngineError, ask_for_real, engine_of, program_findings
 from rbxcompose.testing.manifests import check_text
@@ -120,8 +120,8 @@ def started(engine: Path, script: str, **changes: Any) -> Child:
     return Child(replace(order, **changes))
 
 
-def until(child: Child, holds: Callable[[list[object]], bool]) -> list[object]:
-    events, deadline = list[object](), time.monotonic() + MOST
+def until(child: Child, holds: Callable[[list[Event]], bool]) -> list[Event]:
+    events, deadline = list[Event](), time.monotonic() + MOST
     while not holds(events):
         assert time.monotonic() < deadline, events
         child.wait(0.05)
@@ -133,18 +133,18 @@ def test_a_container_is_heard_gets_its_environment_and_ends_with_its_exit_code(e
     child = started(engine, "echo $TOKEN; exit 3")
     events = until(child, lambda events: child.is_over)
     child.close()
-    assert WrittenLine("secret") in events
-    assert ProgramEnd(3 << 8) in events
+    assert ("line", "secret") in events
+    assert ("ended", 3 << 8) in events
     assert "secret" not in (engine / "words").read_text()
 
 
 def test_a_container_is_stopped_by_the_signal(engine: Path) -> None:
     child = started(engine, "trap 'echo in order; exit 0' TERM; echo ready; while :; do sleep 0.02; done")
-    until(child, lambda events: WrittenLine("ready") in events)
+    until(child, lambda events: ("line", "ready") in events)
     child.ask_to_end()
     events = until(child, lambda events: child.is_over)
     child.close()
-    assert {WrittenLine("in order"), ProgramEnd(0)} <= set(events)
+    assert {("line", "in order"), ("ended", 0)} <= set(events)
 
 
 DEAF = "trap '' TERM; echo ready; while :; do sleep 0.02; done"
@@ -153,11 +153,11 @@ DEAF = "trap '' TERM; echo ready; while :; do sleep 0.02; done"
 @pytest.mark.soak  # as one whose component is killed
 def test_a_container_that_ignores_the_signal_is_removed_although_its_client_was_killed(engine: Path) -> None:
     child = started(engine, DEAF, patience=0.2)
-    until(child, lambda events: WrittenLine("ready") in events)
+    until(child, lambda events: ("line", "ready") in events)
     child.ask_to_end()
     events = until(child, lambda events: child.is_over)
     child.close()
-    assert {Deaf(), ProgramEnd(int(signal.SIGKILL))} <= set(events)
+    assert {("deaf", None), ("ended", int(signal.SIGKILL))} <= set(events)
     assert containers(engine) == []
 
 
@@ -182,7 +182,7 @@ def test_a_container_is_removed_when_the_process_of_its_component_is_killed(engi
 
 def test_what_a_dead_predecessor_has_left_is_removed(engine: Path) -> None:
     child = started(engine, DEAF, cleanup=())
-    until(child, lambda events: WrittenLine("ready") in events)
+    until(child, lambda events: ("line", "ready") in events)
     child.close()
     assert len(containers(engine)) == 1
     ask_for_real(removal(str(engine / "docker"), NAME))
@@ -235,7 +235,7 @@ def test_a_real_engine_runs_and_stops_a_container() -> None:
     config = ContainerConfig(image="busybox", arguments=("sh", "-c", "echo ready; sleep 100"))
     name = f"rbxcompose-test-{os.getpid()}"
     child = Child(order_of(config, engine, name, os.environ, {}))
-    until(child, lambda events: WrittenLine("ready") in events)
+    until(child, lambda events: ("line", "ready") in events)
     child.ask_to_end()
     until(child, lambda events: child.is_over)
     child.close()

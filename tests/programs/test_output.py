@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.programs.output import AT_ONCE, LONGEST, PER_SECOND, TELLS, OutputLog
+from rbxcompose.domains.programs.child import AT_ONCE, LONGEST, PER_SECOND, TELLS, OutputLog
 
 LEFT_OUT = re.compile(r"(one|\d+) lines? w(?:as|ere) left out: it writes too many")
 Bursts = st.lists(st.tuples(st.floats(0.0, 30.0), st.integers(0, 500)), max_size=20)

@@ -13,9 +13,9 @@ from rbxcompose.bus.zenoh_session import open_router
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
 from rbxcompose.domains.programs.bridge import link
-from rbxcompose.domains.programs.bridge.ends import BridgedEnd
-from rbxcompose.domains.programs.bridge.installation import RosInstallation
+from rbxcompose.domains.programs.bridge.ends import ProgramEnd
 from rbxcompose.domains.programs.bridge.ros_bridge import RosBridge
+from rbxcompose.domains.programs.sections.ros2 import RosInstallation
 from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.sdk.bound import Reply
 from rbxcompose.sdk.component import BusAddress
@@ -66,7 +66,7 @@ def reply_of(service: str, address: BusAddress) -> Reply[Trigger.Response]:
 def test_a_response_that_cannot_be_read_fails_that_request_and_the_bridge_goes_on(
     bridge: RosBridge, address: BusAddress
 ) -> None:
-    channels = bridge.add("somebody", [BridgedEnd("/beep", "service", "to_ros", Trigger)])
+    channels = bridge.add("somebody", [ProgramEnd("serves", "/beep", Trigger)])
     for _ in range(2):
         assert "no little-endian CDR header" in str(reply_of("/beep", address))
         assert any("CDR" in text for text in bridge.problems(channels))

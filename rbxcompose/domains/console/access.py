@@ -51,32 +51,37 @@ _ROLES = {
     "advertise_service": Role.CONFIGURE,  # others would believe its answers
     "advertise_action": Role.CONFIGURE,
 }
+EDITS: Mapping[str, tuple[Role, tuple[str, ...]]] = {
+    "mission/aloud": (Role.VIEW, ("mission", "text")),
+    "mission/check": (Role.VIEW, ("mission", "text")),
+    "mission/edit": (Role.VIEW, ("mission", "text", "operation")),
+    "mission/form": (Role.VIEW, ("mission", "text", "path")),
+    "mission/look": (Role.VIEW, ("mission", "text")),
+    "mission/new": (Role.CONFIGURE, ("mission", "template")),
+    "mission/palette": (Role.VIEW, ("mission",)),
+    "mission/read": (Role.VIEW, ("mission",)),
+    "mission/save": (Role.CONFIGURE, ("mission", "text", "hash")),
+    "mission/templates": (Role.VIEW, ("mission",)),
+    "mission/test": (Role.OPERATE, ("mission", "text")),
+    "mission/test_new": (Role.CONFIGURE, ("mission",)),
+    "mission/try": (Role.OPERATE, ("mission", "text")),
+    "robot/apply": (Role.CONFIGURE, ("generation",)),
+    "robot/compare": (Role.VIEW, ()),
+    "robot/look": (Role.VIEW, ("subject", "changes", "hashes")),
+    "robot/palette": (Role.VIEW, ()),
+    "robot/revert": (Role.CONFIGURE, ("generation",)),
+    "robot/save": (Role.CONFIGURE, ("subject", "changes", "hashes")),
+}
+"""What can be asked about a mission, and about what the robot is, as services below `/console`: the role that it needs,
+and its arguments. Of texts and changes that nobody else sees, all who look may ask."""
 _SERVICES = {
     "/console/stop": Role.VIEW,  # whoever sees that something goes wrong
     "/console/ask": Role.VIEW,  # the request decides
     "/console/log": Role.VIEW,
     "/console/rates": Role.VIEW,
-    "/console/mission/aloud": Role.VIEW,  # of a text that nobody else sees
-    "/console/mission/check": Role.VIEW,
-    "/console/mission/edit": Role.VIEW,
-    "/console/mission/form": Role.VIEW,
-    "/console/mission/new": Role.CONFIGURE,
-    "/console/mission/palette": Role.VIEW,
-    "/console/mission/look": Role.VIEW,
-    "/console/mission/read": Role.VIEW,
-    "/console/mission/save": Role.CONFIGURE,
-    "/console/mission/templates": Role.VIEW,
-    "/console/mission/test": Role.OPERATE,
-    "/console/mission/test_new": Role.CONFIGURE,
-    "/console/mission/try": Role.OPERATE,
-    "/console/robot/look": Role.VIEW,  # of changes that nobody else sees
-    "/console/robot/palette": Role.VIEW,
-    "/console/robot/apply": Role.CONFIGURE,
-    "/console/robot/compare": Role.VIEW,
-    "/console/robot/revert": Role.CONFIGURE,
-    "/console/robot/save": Role.CONFIGURE,
     "/console/tested": Role.VIEW,
     "/console/save": Role.CONFIGURE,
+    **{f"/console/{name}": least for name, (least, _) in EDITS.items()},
     "/rosapi/set_param": Role.CONFIGURE,
     "/rosapi/delete_param": Role.CONFIGURE,
 }

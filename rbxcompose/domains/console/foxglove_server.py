@@ -14,16 +14,10 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.domains.console.rosapi import definition
 from rbxcompose.msgs import packages, registry
+from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.cdr import CdrError, decode, encode
-from rbxcompose.msgs.rcl_interfaces import (
-    GetParameters,
-    ListParameters,
-    Parameter,
-    ParameterEvent,
-    ParameterValue,
-    SetParameters,
-)
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.sdk import parameters
 
@@ -120,7 +114,7 @@ class FoxgloveServer:
             del self._types[topic]
             self._channels.pop(topic).close()
         for topic, type_ in topics.items():
-            if topic not in self._types and (text := _definition(type_)) is not None:
+            if topic not in self._types and (text := definition(type_)) is not None:
                 self._types[topic] = type_
                 schema = foxglove.Schema(name=type_, encoding=ROS, data=text.encode())
                 self._channels[topic] = foxglove.Channel(
@@ -134,7 +128,7 @@ class FoxgloveServer:
         if new:
             self._server.add_services([*new.values()])
             self._services |= {name: services[name] for name in new}
-        if self._end_events is None and topics.get(_EVENTS) == ParameterEvent.TYPE:
+        if self._end_events is None and topics.get(_EVENTS) == rcl.ParameterEvent.TYPE:
             self._end_events = self._robot.listen(_EVENTS, self._push_changes)
 
     # What the library calls
@@ -207,7 +201,7 @@ class FoxgloveServer:
             return self._values(param_names)
         names = []
         for service in [name for name in self._services if name.endswith("/list_parameters")]:
-            listed = self._answer(service, ListParameters, ListParameters.Request())
+            listed = self._answer(service, rcl.ListParameters, rcl.ListParameters.Request())
             node = service.removesuffix("/list_parameters")
             names += [f"{node}{_SEPARATOR}{name}" for name in listed.result.names] if listed is not None else []
         return self._values(names)
@@ -272,30 +266,34 @@ class FoxgloveServer:
         except (NoAnswerInTimeError, RuntimeError, ValueError):
             return None
 
+    def _got(self, node: str, names: list[str]) -> Any:
+        request = rcl.GetParameters.Request(names=tuple(names))
+        return self._answer(f"{node}/get_parameters", rcl.GetParameters, request)
+
     def _values(self, names: list[str]) -> list[foxglove.Parameter]:
         found: list[foxglove.Parameter] = []
         for node, wanted in _by_node(names).items():
-            got = self._answer(f"{node}/get_parameters", GetParameters, GetParameters.Request(names=tuple(wanted)))
+            got = self._got(node, wanted)
             found += _shown(node, zip(wanted, got.values if got is not None else (), strict=False))
         return found
 
     def _push_changes(self, data: bytes) -> None:
         """Push the parameters that have changed, whoever changed them, to the clients that want them."""
-        event = decode(ParameterEvent, data)
+        event = decode(rcl.ParameterEvent, data)
         changed = ((each.name, each.value) for each in (*event.new_parameters, *event.changed_parameters))
         self._server.publish_parameter_values(_shown(event.node, changed))
 
     def _set(self, wanted: foxglove.Parameter) -> None:
         value = wanted.get_value()
         ((node, (name,)),) = _by_node([wanted.name]).items()
-        now = self._answer(f"{node}/get_parameters", GetParameters, GetParameters.Request(names=(name,)))
+        now = self._got(node, [name])
         is_float = now is not None and isinstance(parameters.from_message(now.values[0]), float)
         message = parameters.to_message(float(value) if is_float and isinstance(value, int) else value)
         if now is None or message is None:
             self._complain(f"there is no parameter '{wanted.name}' that could be set to this")
             return
-        change = SetParameters.Request(parameters=(Parameter(name=name, value=message),))
-        done = self._answer(f"{node}/set_parameters", SetParameters, change)
+        change = rcl.SetParameters.Request(parameters=(rcl.Parameter(name=name, value=message),))
+        done = self._answer(f"{node}/set_parameters", rcl.SetParameters, change)
         if done is None or not done.results[0].successful:
             why = done.results[0].reason if done is not None else "it does not answer"
             self._complain(f"'{wanted.name}' was not set: {why}")
@@ -306,15 +304,7 @@ class FoxgloveServer:
         self._server.publish_status(text, StatusLevel.Warning)
 
 
-def _definition(type_name: str) -> str | None:
-    """Return the text of a message with all that it has in it; None if it is not known here."""
-    try:
-        return packages.whole_text(registry.message(type_name).TYPE)
-    except (KeyError, OSError):
-        return None
-
-
-def _shown(node: str, values: Iterable[tuple[str, ParameterValue]]) -> list[foxglove.Parameter]:
+def _shown(node: str, values: Iterable[tuple[str, rcl.ParameterValue]]) -> list[foxglove.Parameter]:
     """Return the parameters of a node for a client, without those that are not set or do not exist."""
     import foxglove
 

@@ -18,22 +18,11 @@ from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.printable import plain
-from rbxcompose.domains.console import old_actions, rosapi
-from rbxcompose.domains.console.access import OperationTarget, Role, needed
-from rbxcompose.domains.console.encodings import (
-    COMPRESSIONS,
-    SMALLEST_PIECE,
-    Pieces,
-    WrongEncodingError,
-    as_cbor,
-    as_png,
-    as_raw_cbor,
-    from_png,
-    pieces,
-)
+from rbxcompose.domains.console import encodings, old_actions, rosapi
+from rbxcompose.domains.console.access import EDITS, OperationTarget, Role, needed
 from rbxcompose.domains.console.json_messages import WrongMessageError, arguments, encoded, from_json, to_json
 from rbxcompose.domains.console.lease import LATEST, DriveLease, DriveLimits, Lateness, limited, moves
-from rbxcompose.domains.console.rosapi import GraphView, absolute
+from rbxcompose.domains.console.rosapi import BusView, absolute
 from rbxcompose.missions.sources import PAUSE
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.rcl_interfaces import GetParameters, ListParameters, SetParameters
@@ -85,8 +74,14 @@ _SHOWN = 60  # characters of what a client sent, in a status
 _TEXT = re.compile(r'"(?:[^"\\]++|\\.)*+"', re.DOTALL)  # in JSON
 
 
+class BusRequest:
+    """What the bus has to do, or whoever serves the clients."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, slots=True)
-class Subscribe:
+class Subscribe(BusRequest):
     """Pass the messages of a topic to `Bridge.arrived`."""
 
     topic: str
@@ -94,14 +89,7 @@ class Subscribe:
 
 
 @dataclass(frozen=True, slots=True)
-class Unsubscribe:
-    """No client wants this topic any more."""
-
-    topic: str
-
-
-@dataclass(frozen=True, slots=True)
-class Advertise:
+class Advertise(BusRequest):
     """Declare a publisher."""
 
     topic: str
@@ -110,14 +98,7 @@ class Advertise:
 
 
 @dataclass(frozen=True, slots=True)
-class Unadvertise:
-    """No client publishes on this topic any more."""
-
-    topic: str
-
-
-@dataclass(frozen=True, slots=True)
-class Publish:
+class Publish(BusRequest):
     """Publish on a topic that was advertised."""
 
     topic: str
@@ -125,7 +106,7 @@ class Publish:
 
 
 @dataclass(frozen=True, slots=True)
-class ServiceCall:
+class ServiceCall(BusRequest):
     """Call a service within `timeout` [s], and pass the reply to `Bridge.answered`."""
 
     number: int
@@ -136,7 +117,7 @@ class ServiceCall:
 
 
 @dataclass(frozen=True, slots=True)
-class Serve:
+class Serve(BusRequest):
     """Serve a service, and pass each request to `Bridge.requested`."""
 
     service: str
@@ -144,14 +125,7 @@ class Serve:
 
 
 @dataclass(frozen=True, slots=True)
-class Unserve:
-    """No client serves this any more."""
-
-    service: str
-
-
-@dataclass(frozen=True, slots=True)
-class ServiceAnswer:
+class ServiceAnswer(BusRequest):
     """Answer a request; without a response, by why there is none."""
 
     number: int
@@ -160,7 +134,7 @@ class ServiceAnswer:
 
 
 @dataclass(frozen=True, slots=True)
-class ServeAction:
+class ServeAction(BusRequest):
     """Serve an action, and pass each goal to `Bridge.goal_came`, and its cancelation to `Bridge.goal_unwanted`."""
 
     action: str
@@ -168,14 +142,15 @@ class ServeAction:
 
 
 @dataclass(frozen=True, slots=True)
-class UnserveAction:
-    """No client serves this any more."""
+class Withdraw(BusRequest):
+    """No client listens, publishes or serves under this name any more; `kind` is the request that began it."""
 
-    action: str
+    kind: type[Subscribe | Advertise | Serve | ServeAction]
+    name: str
 
 
 @dataclass(frozen=True, slots=True)
-class GoalFeedback:
+class GoalFeedback(BusRequest):
     """Feed back on a goal that a client carries out."""
 
     number: int
@@ -183,7 +158,7 @@ class GoalFeedback:
 
 
 @dataclass(frozen=True, slots=True)
-class GoalEnd:
+class GoalEnd(BusRequest):
     """End a goal that a client carries out; without a result, by a zero one."""
 
     number: int
@@ -193,7 +168,7 @@ class GoalEnd:
 
 
 @dataclass(frozen=True, slots=True)
-class SendGoal:
+class SendGoal(BusRequest):
     """Send a goal to an action; pass what comes back to `Bridge.fed_back`, and its end to `Bridge.ended`."""
 
     number: int
@@ -204,14 +179,14 @@ class SendGoal:
 
 
 @dataclass(frozen=True, slots=True)
-class CancelGoal:
+class CancelGoal(BusRequest):
     """Cancel a goal; its end still follows."""
 
     number: int
 
 
 @dataclass(frozen=True, slots=True)
-class AskRobot:
+class AskRobot(BusRequest):
     """Send a request to the robot itself, as `commands` do, and pass its answer to `Bridge.robot_answered`."""
 
     number: int
@@ -222,7 +197,7 @@ class AskRobot:
 
 
 @dataclass(frozen=True, slots=True)
-class SaveSettings:
+class SaveSettings(BusRequest):
     """Write parameters into the manifest, or with `is_trial` only find what would be; pass that to `robot_answered`."""
 
     number: int
@@ -233,7 +208,7 @@ class SaveSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class EditMission:
+class EditMission(BusRequest):
     """Pass a request to the editor of missions and of the robot, and its answer to `Bridge.robot_answered`."""
 
     number: int
@@ -241,14 +216,14 @@ class EditMission:
 
 
 @dataclass(frozen=True, slots=True)
-class CountMessages:
+class CountMessages(BusRequest):
     """Count the messages of all topics, and pass the rates since the last time [Hz] to `Bridge.robot_answered`."""
 
     number: int
 
 
 @dataclass(frozen=True, slots=True)
-class TailLog:
+class TailLog(BusRequest):
     """Read the robot's log behind a place, and pass it to `Bridge.robot_answered`."""
 
     number: int
@@ -256,7 +231,7 @@ class TailLog:
 
 
 @dataclass(frozen=True, slots=True)
-class ReadTested:
+class ReadTested(BusRequest):
     """Read what tests have tried of a mission, and pass it to `Bridge.robot_answered`."""
 
     number: int
@@ -264,7 +239,7 @@ class ReadTested:
 
 
 @dataclass(frozen=True, slots=True)
-class Watch:
+class Watch(BusRequest):
     """Repeat a query of the robot every `period` [s], in place of an earlier period; pass answers to `Bridge.seen`."""
 
     window: str
@@ -273,37 +248,10 @@ class Watch:
 
 
 @dataclass(frozen=True, slots=True)
-class Unwatch:
+class Unwatch(BusRequest):
     """No client looks through this window any more."""
 
     window: str
-
-
-BusRequest = (
-    Subscribe
-    | Unsubscribe
-    | Advertise
-    | Unadvertise
-    | Publish
-    | ServiceCall
-    | Serve
-    | Unserve
-    | ServiceAnswer
-    | ServeAction
-    | UnserveAction
-    | GoalFeedback
-    | GoalEnd
-    | SendGoal
-    | CancelGoal
-    | AskRobot
-    | SaveSettings
-    | EditMission
-    | CountMessages
-    | TailLog
-    | ReadTested
-    | Watch
-    | Unwatch
-)
 
 
 class BadFrameError(ValueError):
@@ -333,11 +281,11 @@ class _Shared:
         key = f"{compression} {topic}"
         if key not in self._encoded:
             if self._message is None or compression == "png":
-                self._encoded[key] = as_png(f"{head}{self.text}}}")
+                self._encoded[key] = encodings.as_png(f"{head}{self.text}}}")
             elif compression == "cbor":
-                self._encoded[key] = as_cbor(topic, self._message)
+                self._encoded[key] = encodings.as_cbor(topic, self._message)
             else:
-                self._encoded[key] = as_raw_cbor(topic, self._message, self._stamp)
+                self._encoded[key] = encodings.as_raw_cbor(topic, self._message, self._stamp)
         return self._encoded[key]
 
 
@@ -361,16 +309,16 @@ class _Stream:
         self._head = f'{{"op":"publish","topic":{json.dumps(name)},"msg":'
         self._waiting: deque[_Shared] = deque()
         self._due = -math.inf  # [s], when the next one may be sent
-        self._throttle, self._queue = 0.0, 0
+        self.throttle, self._queue = 0.0, 0  # least time between two messages [s]
 
     def follow_wishes(self, now: float) -> None:
         """Do what suits all subscriptions: the lowest throttle, the longest queue."""
-        self._throttle = min(wish.throttle for wish in self.wishes.values())
+        self.throttle = min(wish.throttle for wish in self.wishes.values())
         self._queue = max(wish.queue for wish in self.wishes.values())
         self.compression = [*self.wishes.values()][-1].compression
         self.piece = min((wish.piece for wish in self.wishes.values() if wish.piece), default=0)
         self._waiting = deque(self._waiting, maxlen=self._queue or DEPTH)
-        self._due = min(self._due, now + self._throttle)
+        self._due = min(self._due, now + self.throttle)
 
     def offer(self, message: _Shared, now: float) -> bool:
         """Take a message, unless it comes too early and nothing may wait; return whether its client has to look again.
@@ -379,7 +327,7 @@ class _Stream:
         """
         if not self.wants(now):
             return False
-        if self._throttle and not self._queue:
+        if self.throttle and not self._queue:
             self._pass(now)
         was_empty = not self._waiting
         self._waiting.append(message)
@@ -387,26 +335,21 @@ class _Stream:
 
     def wants(self, now: float) -> bool:
         """Return whether a message that comes now is not too early."""
-        return not self._throttle or self._queue > 0 or now >= self._due
+        return not self.throttle or self._queue > 0 or now >= self._due
 
     def take(self, now: float) -> str | bytes | None:
         """Return the next frame if it is due."""
         if not self._waiting or self.pause(now) > 0:
             return None
-        if self._throttle and self._queue:
+        if self.throttle and self._queue:
             self._pass(now)
         return self._waiting.popleft().frame(self._head, self._name, self.compression)
-
-    @property
-    def throttle(self) -> float:
-        """Return the least time between two messages [s]."""
-        return self._throttle
 
     def pause(self, now: float) -> float:
         """Return the time until the next frame is due [s], infinite if none waits."""
         if not self._waiting:
             return math.inf
-        return max(0.0, self._due - now) if self._throttle and self._queue else 0.0
+        return max(0.0, self._due - now) if self.throttle and self._queue else 0.0
 
     def _pass(self, now: float) -> None:
         """Let one message through.
@@ -414,9 +357,9 @@ class _Stream:
         The next instants form a grid, so that a rate is kept on average. It is the same one for all clients: what many
         want at one rate is decoded, encoded and sent for all of them together.
         """
-        grid = math.floor(now / self._throttle + ROUNDING) + 1
-        early = grid * self._throttle - now < self._throttle / 2
-        self._due = (grid + early) * self._throttle
+        grid = math.floor(now / self.throttle + ROUNDING) + 1
+        early = grid * self.throttle - now < self.throttle / 2
+        self._due = (grid + early) * self.throttle
 
 
 class _Client:
@@ -429,7 +372,7 @@ class _Client:
         self.frames: deque[tuple[str, int]] = deque()  # each with the characters of a piece; 0: it is sent as a whole
         self.sent_pieces: deque[str] = deque()  # of the frame that is being sent
         self.pieces_so_far = 0
-        self.pieces = Pieces(LARGEST)  # that came
+        self.pieces = encodings.Pieces(LARGEST)  # that came
         self.streams: dict[str, _Stream] = {}  # by the name that it uses; the next to be served is the first
         self.advertised: dict[str, type[Message]] = {}
         self.advertised_as: dict[str, set[object]] = {}  # the ids with which it advertised a topic
@@ -457,11 +400,6 @@ class _Client:
         self._complained = now
         return True
 
-    @property
-    def subscriptions(self) -> int:
-        """Return how many it has."""
-        return sum(len(stream.wishes) for stream in self.streams.values())
-
 
 @dataclass(frozen=True, slots=True)
 class _Waiting:
@@ -476,23 +414,14 @@ class _Waiting:
 
 
 @dataclass(slots=True)
-class _Served:
-    """A service that a client serves, and the requests that it has not answered."""
+class _Offer:
+    """A service or an action that a client serves."""
 
     client: int
     name: str  # by which the client knows it
-    type: type[Service[Any, Any]]
-    open: set[int] = field(default_factory=set)
-
-
-@dataclass(slots=True)
-class _ServedAction:
-    """An action that a client serves, and the number of the goal that it carries out."""
-
-    client: int
-    name: str  # by which the client knows it
-    type: type[Action[Any, Any, Any]]
-    goal: int | None = None
+    type: Any
+    open: set[int] = field(default_factory=set)  # requests that it has not answered
+    goal: int | None = None  # that it carries out
 
 
 @dataclass(slots=True)
@@ -517,20 +446,12 @@ class _Listened:
     period: float = math.inf  # [s] of a window
 
 
-@dataclass(slots=True)
-class _Advertised:
-    """A topic on which clients publish, and how many."""
-
-    message: type[Message]
-    clients: int = 0
-
-
 class Bridge:
     """All clients of one robot."""
 
     def __init__(
         self,
-        graph: GraphView,
+        graph: Callable[[], BusView],
         drive: DriveLimits | None = None,
         guarded: Mapping[str, Role] = MappingProxyType({}),
         admit: Callable[[str], Role] = lambda _: Role.NOBODY,
@@ -547,10 +468,9 @@ class Bridge:
         self._graph, self._drive = graph, drive
         self._clients: dict[int, _Client] = {}
         self._listened: dict[str, _Listened] = {}
-        self._advertised: dict[str, _Advertised] = {}
+        self._advertised: dict[str, type[Message]] = {}  # topics on which clients publish
         self._calls: dict[int, _Waiting] = {}
-        self._served: dict[str, _Served] = {}
-        self._served_actions: dict[str, _ServedAction] = {}
+        self._offers: dict[str, dict[str, _Offer]] = {"service": {}, "action": {}}
         self._goals: dict[int, _Goal] = {}
         self._pending_notes: dict[int, str] = {}  # notes of what calls will have changed
         self._old_statuses: dict[str, dict[object, tuple[int, str]]] = {}  # by name of an action, then of a goal
@@ -589,15 +509,15 @@ class Bridge:
         if not client.may_send(now):
             if client.may_complain(now):
                 self._status(client, "error", f"more than {MOST_PER_SECOND} frames a second: the rest is dropped")
-            return self._done()
+            return self.take_requests()
         identity: object = None
         try:
             data = _parsed(frame)
             identity = data.get("id")
             self._carry_out(client, data)
-        except (BadFrameError, WrongEncodingError, WrongMessageError) as error:
+        except (BadFrameError, encodings.WrongEncodingError, WrongMessageError) as error:
             self._status(client, "error", str(error), identity)
-        return self._done()
+        return self.take_requests()
 
     def close(self, number: int, now: float, stamp: int) -> list[BusRequest]:
         """Forget a client; what it had is withdrawn, and the robot that it drove stops."""
@@ -609,13 +529,12 @@ class Bridge:
         for topic in client.advertised:
             self._unadvertise(topic)
         self._calls = {call: waiting for call, waiting in self._calls.items() if waiting.client != number}
-        for service in [service for service, served in self._served.items() if served.client == number]:
-            self._end_serving(service)
-        for action in [action for action, offered in self._served_actions.items() if offered.client == number]:
-            self._end_serving_action(action)
+        for kind, offers in self._offers.items():
+            for name in [name for name, offer in offers.items() if offer.client == number]:
+                self._end_offer(kind, name)
         # Goals go on, as missions do: a phone that sleeps must not leave a robot where it is.
         self.woken.discard(number)
-        return self._done()
+        return self.take_requests()
 
     def next_frame(self, number: int, now: float) -> str | bytes | None:
         """Return what to send to a client now; None if nothing is due. Topics take turns."""
@@ -625,7 +544,7 @@ class Bridge:
         frame, size = self._whole_frame(client, now)
         if isinstance(frame, str) and 0 < size < len(frame):
             client.pieces_so_far += 1
-            client.sent_pieces.extend(pieces(frame, size, f"fragment:{client.pieces_so_far}"))
+            client.sent_pieces.extend(encodings.pieces(frame, size, f"fragment:{client.pieces_so_far}"))
             return client.sent_pieces.popleft()
         return frame
 
@@ -696,13 +615,9 @@ class Bridge:
             if values is not None:
                 self._respond(number, values, is_good=True)
 
-    def take_requests(self) -> list[BusRequest]:
-        """Return what an answer made necessary."""
-        return self._done()
-
     def requested(self, service: str, number: int, request: Message) -> None:
         """Pass a request to the client that serves it."""
-        served = self._served[service]
+        served = self._offers["service"][service]
         served.open.add(number)
         if len(served.open) > MOST_SUBSCRIPTIONS:
             served.open.discard(oldest := min(served.open))
@@ -713,17 +628,17 @@ class Bridge:
     def goal_came(self, action: str, number: int, goal: Message) -> None:
         """Pass a goal to the client that serves its action; it replaces an earlier one."""
         self.goal_unwanted(action)
-        served = self._served_actions[action]
+        served = self._offers["action"][action]
         served.goal = number
         self._ask_server(action, "send_action_goal", action_type=served.type.TYPE, args=to_json(goal), feedback=True)
 
     def goal_unwanted(self, action: str) -> None:
         """Ask the client that carries out a goal to cancel it."""
-        if self._served_actions[action].goal is not None:
+        if self._offers["action"][action].goal is not None:
             self._ask_server(action, "cancel_action_goal")
 
     def _ask_server(self, action: str, op: str, **fields: object) -> None:
-        served = self._served_actions[action]
+        served = self._offers["action"][action]
         frame = {"op": op, "id": f"goal:{served.goal}", "action": served.name, **fields}
         self._send(self._clients[served.client], frame)
 
@@ -759,8 +674,7 @@ class Bridge:
 
     def _tell(self, goal: _Goal, op: str, **fields: object) -> None:
         if (client := self._clients.get(goal.client)) is not None:
-            identified = {} if goal.id is None else {"id": goal.id}
-            self._send(client, {"op": op, **identified, "action": goal.name, **fields})
+            self._send(client, {"op": op, **_identified(goal.id), "action": goal.name, **fields})
 
     def robot_answered(self, number: int, answer: object, refusal: str = "") -> None:
         """Pass on what the robot answered to a request, or why it refused."""
@@ -773,13 +687,13 @@ class Bridge:
         """End a drive lease that was not renewed: the robot stops."""
         self._now, self._stamp = now, stamp
         self._halt_if(self.lease.expire(now))
-        return self._done()
+        return self.take_requests()
 
     def stop_driving(self, now: float, stamp: int) -> list[BusRequest]:
         """Take the drive lease from whoever has it, since the gateway ends."""
         self._now, self._stamp = now, stamp
         self._halt_if(self.lease.client is not None and self.lease.release(self.lease.client))
-        return self._done()
+        return self.take_requests()
 
     # Operations
 
@@ -817,8 +731,8 @@ class Bridge:
         return OperationTarget(op, done, name, (full, whole), old=old)
 
     def _service_target(self, op: str, service: str, written: str = "") -> OperationTarget:
-        actions, whole = self._graph.actions(), _whole(service)
-        type_ = "" if service in _OWN or service in rosapi.TYPES else self._graph.services().get(service, "")
+        actions, whole = self._graph().actions, _whole(service)
+        type_ = "" if service in _OWN or service in rosapi.TYPES else self._graph().services.get(service, "")
         if service == f"{whole}{_CANCELS}" and whole in actions:
             type_ = "action_msgs/srv/CancelGoal"  # hidden, as in ROS 2, but pages cancel goals that others sent
         if (paused := service.removesuffix(f"/{PAUSE}")) in actions:
@@ -859,7 +773,7 @@ class Bridge:
             self._carry_out(client, _within(frame))
 
     def _png(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
-        self._carry_out(client, _within(from_png(data.get("data"), LARGEST)))
+        self._carry_out(client, _within(encodings.from_png(data.get("data"), LARGEST)))
 
     def _auth(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         """Give a client the role of its token, which is the `mac` of rosbridge's `auth`."""
@@ -871,8 +785,10 @@ class Bridge:
 
     def _subscribe(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         name, topic = target.written, target.name
-        if (compression := data.get("compression") or "none") not in COMPRESSIONS:
-            raise BadFrameError(f"a compression is one of {', '.join(COMPRESSIONS)}, not '{_short(compression)}'")
+        if (compression := data.get("compression") or "none") not in encodings.COMPRESSIONS:
+            raise BadFrameError(
+                f"a compression is one of {', '.join(encodings.COMPRESSIONS)}, not '{_short(compression)}'"
+            )
         throttle = _count(data, "throttle_rate", math.inf) / 1000
         wish = _Wish(throttle, min(_count(data, "queue_length"), LONGEST_QUEUE), compression, _piece(data))
         is_window = topic.startswith(WINDOWS)
@@ -880,13 +796,13 @@ class Bridge:
         message = None if is_window or is_old else self._message_on(topic, data)
         if is_window and topic not in _OWN_WINDOWS and not _QUERY.fullmatch(topic.removeprefix(WINDOWS)):
             raise BadFrameError(f"after '{WINDOWS}' come a subject, a query, and its fields with their values")
-        if client.subscriptions >= MOST_SUBSCRIPTIONS:
+        if sum(len(stream.wishes) for stream in client.streams.values()) >= MOST_SUBSCRIPTIONS:
             raise BadFrameError(f"a client has at most {MOST_SUBSCRIPTIONS} subscriptions")
         if (listened := self._listened.get(topic)) is None:
-            listened = self._listened[topic] = _Listened(message, is_window or self._graph.is_latched(topic))
+            listened = self._listened[topic] = _Listened(message, is_window or topic in self._graph().latched)
             if message is not None:
                 self._requests.append(Subscribe(topic, message))
-                listened.last = deque(maxlen=max(1, len(self._graph.publishers(topic))))
+                listened.last = deque(maxlen=max(1, len(self._graph().publishers.get(topic, ()))))
             self._show_holder()
             if topic == CONFIG_WINDOW:
                 self.seen(topic, self._config, self._now)
@@ -1006,7 +922,7 @@ class Bridge:
             if api in _PARAMETERS:
                 values = _PARAMETERS[api](self, named, number)
             else:
-                values = rosapi.answer(api, named, self._graph, self._stamp)
+                values = rosapi.answer(api, named, self._graph(), self._stamp)
         else:
             self._call(number, target, given, data)
         if values is not None:
@@ -1021,33 +937,40 @@ class Bridge:
         patience = min(timeout, LONGEST_PATIENCE) if timeout is not None and timeout > 0 else PATIENCE
         self._requests.append(ServiceCall(number, target.name, type_, request, patience))
 
-    # Services of clients
+    # Services and actions of clients
 
-    def _advertise_service(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
-        service, type_ = target.name, data.get("type")
+    def _offer(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
+        name, type_, kind = target.name, data.get("type"), target.op.removeprefix("advertise_")
         if not isinstance(type_, str) or not _TYPE.fullmatch(type_):
-            raise BadFrameError("'type' is the name of a type of services")
-        if service in self._graph.services() or service in self._served or service in _OWN or service in rosapi.TYPES:
-            raise BadFrameError(f"'{service}' is served already")
-        if sum(served.client == client.number for served in self._served.values()) >= MOST_SUBSCRIPTIONS:
-            raise BadFrameError(f"a client serves at most {MOST_SUBSCRIPTIONS} services")
-        try:
-            known = registry.service(type_)
-        except KeyError as error:
-            raise BadFrameError(f"the type '{type_}' is not known here") from error
-        self._served[service] = _Served(client.number, target.written, known)
-        self._requests.append(Serve(service, known))
+            raise BadFrameError(f"'type' is the name of a type of {kind}s")
+        if kind == "service":
+            is_served, most = name in self._graph().services or name in _OWN or name in rosapi.TYPES, MOST_SUBSCRIPTIONS
+        else:
+            is_served, most = name in self._graph().actions, MOST_ACTIONS
+        if is_served or name in self._offers[kind]:
+            raise BadFrameError(f"'{name}' is served already")
+        if sum(offer.client == client.number for offer in self._offers[kind].values()) >= most:
+            raise BadFrameError(f"a client serves at most {most} {kind}s")
+        known = _class_of(kind, type_)
+        self._offers[kind][name] = _Offer(client.number, target.written, known)
+        self._requests.append((Serve if kind == "service" else ServeAction)(name, known))
 
-    def _unadvertise_service(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
-        service = target.name
-        if (served := self._served.get(service)) is None or served.client != client.number:
-            raise BadFrameError(f"'{service}' is not served by this client")
-        self._end_serving(service)
+    def _withdraw_offer(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
+        kind = target.op.removeprefix("unadvertise_")
+        if (offer := self._offers[kind].get(target.name)) is None or offer.client != client.number:
+            raise BadFrameError(f"'{target.name}' is not served by this client")
+        self._end_offer(kind, target.name)
+
+    def _end_offer(self, kind: str, name: str) -> None:
+        """Serve no more; a goal is lost, and its sender learns that."""
+        offer = self._offers[kind].pop(name)
+        self._requests += (ServiceAnswer(number, None, "the client that served it has left") for number in offer.open)
+        self._requests.append(Withdraw(Serve if kind == "service" else ServeAction, name))
 
     def _service_response(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         """Pass on what a client answers to a request."""
         service = target.name
-        served = self._served.get(service)
+        served = self._offers["service"].get(service)
         number = next((one for one in served.open if data.get("id") == f"request:{one}"), -1) if served else -1
         if served is None or served.client != client.number or number < 0:
             raise BadFrameError(f"there is no open request to '{service}' of this id")
@@ -1061,38 +984,6 @@ class Bridge:
             response = from_json(served.type.Response, values, self._stamp)
             self._requests.append(ServiceAnswer(number, response))
         served.open.discard(number)
-
-    def _end_serving(self, service: str) -> None:
-        served = self._served.pop(service)
-        self._requests += (ServiceAnswer(number, None, "the client that served it has left") for number in served.open)
-        self._requests.append(Unserve(service))
-
-    # Actions of clients
-
-    def _advertise_action(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
-        action, type_ = target.name, data.get("type")
-        if not isinstance(type_, str) or not _TYPE.fullmatch(type_):
-            raise BadFrameError("'type' is the name of a type of actions")
-        if action in self._graph.actions() or action in self._served_actions:
-            raise BadFrameError(f"'{action}' is served already")
-        if sum(served.client == client.number for served in self._served_actions.values()) >= MOST_ACTIONS:
-            raise BadFrameError(f"a client serves at most {MOST_ACTIONS} actions")
-        try:
-            known = registry.action(type_)
-        except KeyError as error:
-            raise BadFrameError(f"the type '{type_}' is not known here") from error
-        self._served_actions[action] = _ServedAction(client.number, target.written, known)
-        self._requests.append(ServeAction(action, known))
-
-    def _unadvertise_action(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
-        action = target.name
-        if (served := self._served_actions.get(action)) is None or served.client != client.number:
-            raise BadFrameError(f"'{action}' is not served by this client")
-        self._end_serving_action(action)
-
-    def _end_serving_action(self, action: str) -> None:
-        del self._served_actions[action]
-        self._requests.append(UnserveAction(action))  # its goal is lost, and its sender learns that
 
     def _action_feedback(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         served, number = self._carried_out(client, data, target.name)
@@ -1112,8 +1003,8 @@ class Bridge:
         self._requests.append(GoalEnd(number, outcome, result, reason))
         served.goal = None
 
-    def _carried_out(self, client: _Client, data: Mapping[str, Any], action: str) -> tuple[_ServedAction, int]:
-        served = self._served_actions.get(action)
+    def _carried_out(self, client: _Client, data: Mapping[str, Any], action: str) -> tuple[_Offer, int]:
+        served = self._offers["action"].get(action)
         is_own = served is not None and served.client == client.number and served.goal is not None
         if served is None or served.goal is None or not is_own or data.get("id") != f"goal:{served.goal}":
             raise BadFrameError(f"there is no open goal of '{action}' of this id")
@@ -1172,7 +1063,7 @@ class Bridge:
     def _get_param_names(self, given: Mapping[str, Any], number: int) -> dict[str, Any] | None:
         """List the parameters of all nodes, one after the other."""
         client, found = self._clients[self._calls[number].client], list[str]()
-        targets = (self._service_target("call_service", service) for service in self._graph.services())
+        targets = (self._service_target("call_service", service) for service in self._graph().services)
         left = [
             target.name.removesuffix("/list_parameters")
             for target in targets
@@ -1201,7 +1092,7 @@ class Bridge:
             raise WrongMessageError("'name' is a text")
         node, _, parameter = name.rpartition(":" if ":" in name else "/")
         node = absolute(node)
-        return (node if f"{node}/get_parameters" in self._graph.services() else ""), parameter
+        return (node if f"{node}/get_parameters" in self._graph().services else ""), parameter
 
     def _ask_node(
         self,
@@ -1237,7 +1128,7 @@ class Bridge:
         self._requests.append(SendGoal(self._calls_so_far, goal.action, type_, message, wants_feedback))
 
     def _action_type(self, action: str, wanted: object = None) -> type[Action[Any, Any, Any]]:
-        found: type[Action[Any, Any, Any]] = self._type_of(action, self._graph.actions().get(action), wanted, "action")
+        found: type[Action[Any, Any, Any]] = self._type_of(action, self._graph().actions.get(action), wanted, "action")
         return found
 
     def _type_of(self, name: str, known: str | None, wanted: object, kind: str) -> Any:
@@ -1250,10 +1141,7 @@ class Bridge:
             raise BadFrameError(f"there is no {kind} '{name}'")
         if wanted and (not isinstance(wanted, str) or registry.full_name(wanted, _KINDS[kind]) != known):
             raise BadFrameError(f"'{name}' is of the type '{known}', not '{_short(wanted)}'")
-        try:
-            return registry.service(known) if kind == "service" else registry.action(known)
-        except KeyError as error:
-            raise BadFrameError(f"the type '{known}' of '{name}' is not known here") from error
+        return _class_of(kind, known, f" of '{name}'")
 
     def _cancel_goal(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         """Cancel goals of the client to an action, by their id."""
@@ -1265,8 +1153,8 @@ class Bridge:
 
     def _old_parts(self, topic: str) -> tuple[str, str, str] | None:
         """Return what a topic is that an action has in ROS 1, unless there is a topic of that name."""
-        found = old_actions.parts_of(topic, self._graph.actions())
-        return None if found is None or topic in self._graph.topics() else found
+        found = old_actions.parts_of(topic, self._graph().actions)
+        return None if found is None or topic in self._graph().topics else found
 
     def _publish_old(self, client: _Client, name: str, action: str, part: str, message: object) -> None:
         """Take a goal, or cancel: that of an id, else all."""
@@ -1372,32 +1260,18 @@ class Bridge:
             raise WrongMessageError("'hash' is what a dry run told")
         self._requests.append(SaveSettings(number, tuple(names), given.get("dry_run") is True, seen))
 
-    def _mission_service(self, client: _Client, given: Mapping[str, Any], number: int, name: str) -> None:
-        request: dict[str, Any] = {"do": name}
-        for key in ("mission", *MISSION_TEXTS[name]):
-            value = given.get(key)
+    def _edit_service(self, client: _Client, given: Mapping[str, Any], number: int, name: str) -> None:
+        """Pass on what the editor is asked about a mission, or about the robot."""
+        request: dict[str, Any] = {"do": name.removeprefix("mission/")}
+        for key in EDITS[name][1]:
+            value = given.get(key, _OTHERWISE.get((name, key)))
             if not isinstance(value, _EDITED.get(key, str)):
                 raise WrongMessageError(f"'{key}' is missing, or of another type")
             request[key] = value
-        if name == "save" and given.get("dry_run") is True:
+        if name in ("mission/save", "robot/save") and given.get("dry_run") is True:
             request["dry_run"] = True
         elif name in _WRITES:
-            self._note_when_done(client, number, f"{_WRITES[name]} the mission {_short(request['mission'])}")
-        self._requests.append(EditMission(number, request))
-
-    def _robot_service(self, client: _Client, given: Mapping[str, Any], number: int, name: str) -> None:
-        request: dict[str, Any] = {"do": f"robot/{name}"}
-        for key, (kind, otherwise) in ROBOT_TEXTS[name].items():
-            value = given.get(key, otherwise)
-            if not isinstance(value, kind):
-                raise WrongMessageError(f"'{key}' is missing, or of another type")
-            request[key] = value
-        if name == "save" and given.get("dry_run") is True:
-            request["dry_run"] = True
-        elif name == "save":
-            self._note_when_done(client, number, f"saves {_short(request['subject'])} of the robot")
-        elif name in _CHANGES:
-            self._note_when_done(client, number, _CHANGES[name])
+            self._note_when_done(client, number, _WRITES[name].format(*map(_short, request.values())))
         self._requests.append(EditMission(number, request))
 
     # What they share
@@ -1413,21 +1287,18 @@ class Bridge:
             raise BadFrameError(f"there is no topic '{topic}' yet, so its type must be given")
         if known and wanted and known != wanted:
             raise BadFrameError(f"'{topic}' is of the type '{known}', not '{wanted}'")
-        try:
-            return registry.message(known or wanted)
-        except KeyError as error:
-            raise BadFrameError(f"the type '{known or wanted}' is not known here") from error
+        return _class_of("message", known or wanted)  # type: ignore[no-any-return]
 
     def _known_type(self, topic: str) -> str:
         if self._drive is not None and topic == self._drive.topic:
             return self._drive.type
-        ours = self._listened.get(topic) or self._advertised.get(topic)
-        if ours and ours.message:
-            return ours.message.TYPE
+        listened = self._listened.get(topic)
+        if (ours := listened.message if listened else self._advertised.get(topic)) is not None:
+            return ours.TYPE
         action, is_status, _ = topic.rpartition(_STATUS_OF_ACTION)
-        if is_status and action in self._graph.actions():  # hidden, as all topics of actions
+        if is_status and action in self._graph().actions:  # hidden, as all topics of actions
             return "action_msgs/msg/GoalStatusArray"
-        return self._graph.topics().get(topic, "")
+        return self._graph().topics.get(topic, "")
 
     def _declare(self, client: _Client, topic: str, message: type[Message], *, is_latched: bool = False) -> None:
         if topic in client.advertised:
@@ -1436,15 +1307,13 @@ class Bridge:
             raise BadFrameError(f"a client advertises at most {MOST_SUBSCRIPTIONS} topics")
         client.advertised[topic] = message
         if topic not in self._advertised:
-            self._advertised[topic] = _Advertised(message)
+            self._advertised[topic] = message
             self._requests.append(Advertise(topic, message, is_latched))
-        self._advertised[topic].clients += 1
 
     def _unadvertise(self, topic: str) -> None:
-        self._advertised[topic].clients -= 1
-        if not self._advertised[topic].clients:
+        if not any(topic in client.advertised for client in self._clients.values()):
             del self._advertised[topic]
-            self._requests.append(Unadvertise(topic))
+            self._requests.append(Withdraw(Advertise, topic))
 
     def _end_stream(self, client: _Client, name: str) -> None:
         stream = client.streams.pop(name)
@@ -1455,7 +1324,7 @@ class Bridge:
             return
         del self._listened[stream.topic]
         if listened.message is not None:
-            self._requests.append(Unsubscribe(stream.topic))
+            self._requests.append(Withdraw(Subscribe, stream.topic))
         elif stream.topic.startswith(WINDOWS):
             self._requests.append(Unwatch(stream.topic))
 
@@ -1483,29 +1352,23 @@ class Bridge:
 
     def _status(self, client: _Client, level: str, text: str, identity: object = None) -> None:
         if LEVELS.index(level) >= client.level:
-            identified = {} if not isinstance(identity, str | int | float) else {"id": identity}
-            self._send(client, {"op": "status", "level": level, "msg": text, **identified})
+            known = identity if isinstance(identity, str | int | float) else None
+            self._send(client, {"op": "status", "level": level, "msg": text, **_identified(known)})
 
     def _respond(self, number: int, values: object, *, is_good: bool) -> None:
         if (waiting := self._calls.pop(number, None)) is None:
             return  # its client is gone
         client = self._clients[waiting.client]
         client.open_calls -= 1
-        identified = {} if waiting.id is None else {"id": waiting.id}
-        frame = {
-            "op": "service_response",
-            **identified,
-            "service": waiting.service,
-            "values": values,
-            "result": is_good,
-        }
-        self._send(client, frame, waiting.piece)
+        frame = {"service": waiting.service, "values": values, "result": is_good}
+        self._send(client, {"op": "service_response", **_identified(waiting.id), **frame}, waiting.piece)
 
     def _send(self, client: _Client, frame: Mapping[str, object], piece: int = 0) -> None:
         client.frames.append((json.dumps(_finite(frame), separators=(",", ":")), piece))
         self.woken.add(client.number)
 
-    def _done(self) -> list[BusRequest]:
+    def take_requests(self) -> list[BusRequest]:
+        """Return what the bus has to do since the last time."""
         self._show_holder()
         requests, self._requests = self._requests, []
         return requests
@@ -1517,10 +1380,10 @@ _OPERATIONS: Mapping[str, tuple[Callable[[Bridge, _Client, Mapping[str, Any], Op
     "png": (Bridge._png, ""),
     "action_feedback": (Bridge._action_feedback, "action"),
     "action_result": (Bridge._action_result, "action"),
-    "advertise_action": (Bridge._advertise_action, "action"),
-    "advertise_service": (Bridge._advertise_service, "service"),
-    "unadvertise_action": (Bridge._unadvertise_action, "action"),
-    "unadvertise_service": (Bridge._unadvertise_service, "service"),
+    "advertise_action": (Bridge._offer, "action"),
+    "advertise_service": (Bridge._offer, "service"),
+    "unadvertise_action": (Bridge._withdraw_offer, "action"),
+    "unadvertise_service": (Bridge._withdraw_offer, "service"),
     "service_response": (Bridge._service_response, "service"),
     "cancel_action_goal": (Bridge._cancel_goal, "action"),
     "send_action_goal": (Bridge._send_goal, "action"),
@@ -1536,38 +1399,27 @@ _OPERATIONS: Mapping[str, tuple[Callable[[Bridge, _Client, Mapping[str, Any], Op
 """What carries out each operation, and the key that names what it is carried out on; no other key of a frame does."""
 _LISTENS = frozenset({"subscribe", "unsubscribe"})
 _KINDS = {"service": "srv", "action": "action"}
+_CLASSES: Mapping[str, Callable[[str], Any]] = {
+    "message": registry.message,
+    "service": registry.service,
+    "action": registry.action,
+}
 _ANSWERED = frozenset({"call_service", "send_action_goal"})  # operations whose refusal is an answer of their own
 
 
-MISSION_TEXTS: Mapping[str, tuple[str, ...]] = {
-    "aloud": ("text",),
-    "check": ("text",),
-    "edit": ("text", "operation"),
-    "form": ("text", "path"),
-    "look": ("text",),
-    "new": ("template",),
-    "palette": (),
-    "read": (),
-    "save": ("text", "hash"),
-    "templates": (),
-    "test": ("text",),
-    "test_new": (),
-    "try": ("text",),
+_EDITED: Mapping[str, type] = {"operation": dict, "path": list, "generation": int, "changes": list, "hashes": dict}
+"""The types of those arguments of `EDITS` that are no texts."""
+_OTHERWISE: Mapping[tuple[str, str], object] = {("robot/look", "hashes"): {}}
+"""What stands for such an argument if it is missing."""
+_WRITES = {
+    "mission/new": "makes the mission {1}",
+    "mission/save": "saves the mission {1}",
+    "mission/test_new": "makes a test of the mission {1}",
+    "robot/apply": "changes the robot to what its files say",
+    "robot/revert": "takes back a change of the robot",
+    "robot/save": "saves {1} of the robot",
 }
-"""What can be asked about the text of a mission, with its arguments besides `mission`."""
-_WRITES = {"new": "makes", "save": "saves", "test_new": "makes a test of"}
-_EDITED: Mapping[str, type] = {"operation": dict, "path": list}
-"""The types of those arguments that are no texts."""
-ROBOT_TEXTS: Mapping[str, Mapping[str, tuple[type, object]]] = {
-    "palette": {},
-    "compare": {},
-    "apply": {"generation": (int, None)},
-    "revert": {"generation": (int, None)},
-    "look": {"subject": (str, None), "changes": (list, None), "hashes": (dict, {})},
-    "save": {"subject": (str, None), "changes": (list, None), "hashes": (dict, None)},
-}
-"""What can be asked about what the robot is: the type of each argument, and what stands for it if it is missing."""
-_CHANGES = {"apply": "changes the robot to what its files say", "revert": "takes back a change of the robot"}
+"""What the log says of those of `EDITS` that change files or the robot; `{1}` is their first argument."""
 _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str, Any] | None]] = {
     "/console/ask": Bridge._ask_service,
     _DRIVES: Bridge._drive_service,
@@ -1577,8 +1429,7 @@ _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str,
     "/console/save": Bridge._save_service,
     "/console/stop": Bridge._stop_service,
     "/console/tested": Bridge._tested_service,
-    **{f"/console/mission/{name}": partial(Bridge._mission_service, name=name) for name in MISSION_TEXTS},
-    **{f"/console/robot/{name}": partial(Bridge._robot_service, name=name) for name in ROBOT_TEXTS},
+    **{f"/console/{name}": partial(Bridge._edit_service, name=name) for name in EDITS},
 }
 """Services of the gateway: what answers, or None if the answer comes later."""
 _PARAMETERS: Mapping[str, Callable[[Bridge, Mapping[str, Any], int], dict[str, Any] | None]] = {
@@ -1661,6 +1512,18 @@ def _whole(name: str) -> str:
     return name.partition("/_action/")[0] or name
 
 
+def _class_of(kind: str, type_: str, of: str = "") -> Any:
+    """Return the class of a type of messages, services or actions; `of` are words behind its name.
+
+    Raises:
+        BadFrameError: if it is not known here.
+    """
+    try:
+        return _CLASSES[kind](type_)
+    except KeyError as error:
+        raise BadFrameError(f"the type '{type_}'{of} is not known here") from error
+
+
 def _is_name(name: str) -> bool:
     return len(name) <= _LONGEST_ROS_NAME and _NAME.fullmatch(name) is not None
 
@@ -1682,7 +1545,7 @@ def _count(data: Mapping[str, Any], key: str, most: float = 2**31) -> int:
 
 def _piece(data: Mapping[str, Any]) -> int:
     """Return how many characters a piece of a frame shall have; 0 if it shall be sent as a whole."""
-    return max(SMALLEST_PIECE, size) if (size := _count(data, "fragment_size")) else 0
+    return max(encodings.SMALLEST_PIECE, size) if (size := _count(data, "fragment_size")) else 0
 
 
 def _named(given: object, names: Sequence[str]) -> dict[str, Any]:
@@ -1700,6 +1563,11 @@ def _named(given: object, names: Sequence[str]) -> dict[str, Any]:
     if not isinstance(given, dict | None):
         raise WrongMessageError("'args' is a map or a list")
     return given or {}
+
+
+def _identified(identity: object) -> dict[str, object]:
+    """Return the id of a frame, if its client has given one."""
+    return {} if identity is None else {"id": identity}
 
 
 def _short(value: object) -> str:

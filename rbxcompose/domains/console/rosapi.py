@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import Any
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.console.json_messages import WrongMessageError
 from rbxcompose.msgs import packages, registry
 from rbxcompose.msgs.definitions import KINDS, FieldShape, FieldType, parse_type
@@ -15,74 +16,26 @@ _HOST = "localhost"
 _VERSION = {"version": 2, "distro": "jazzy"}  # the release whose types and wire format the bus has
 
 
-class GraphView(Protocol):
-    """What is on the bus now; all names are absolute."""
+@dataclass(frozen=True, slots=True)
+class BusView:
+    """What is on the bus at a moment; all names are absolute, and topics, services and actions have their types."""
 
-    def topics(self) -> Mapping[str, str]:
-        """Return the types of the topics."""
-        ...
-
-    def services(self) -> Mapping[str, str]:
-        """Return the types of the services."""
-        ...
-
-    def actions(self) -> Mapping[str, str]:
-        """Return the types of the actions that somebody serves."""
-        ...
-
-    def nodes(self) -> Sequence[str]:
-        """Return the names of the nodes."""
-        ...
-
-    def publishers(self, topic: str) -> Sequence[str]:
-        """Return the names of the nodes that publish on a topic."""
-        ...
-
-    def subscribers(self, topic: str) -> Sequence[str]:
-        """Return the names of the nodes that subscribe to a topic."""
-        ...
-
-    def servers(self, service: str) -> Sequence[str]:
-        """Return the names of the nodes that serve a service."""
-        ...
-
-    def is_latched(self, topic: str) -> bool:
-        """Return whether the last message of a topic is kept for late subscribers."""
-        ...
+    topics: Mapping[str, str]
+    services: Mapping[str, str]
+    """Of those that somebody serves, as for actions."""
+    actions: Mapping[str, str]
+    nodes: Sequence[str]
+    publishers: Mapping[str, Sequence[str]]
+    """The names of the nodes that publish, by topic."""
+    subscribers: Mapping[str, Sequence[str]]
+    """The names of the nodes that subscribe, by topic."""
+    servers: Mapping[str, Sequence[str]]
+    """The names of the nodes that serve, by service."""
+    latched: Collection[str]
+    """Topics whose last message is kept for late subscribers."""
 
 
-ARGUMENTS: Mapping[str, tuple[str, ...]] = {
-    **dict.fromkeys(("action_servers", "get_ros_version", "get_time", "interfaces", "nodes", "services"), ()),
-    **dict.fromkeys(("topics", "topics_and_raw_types"), ()),
-    **dict.fromkeys(("publishers", "subscribers", "topic_type"), ("topic",)),
-    **dict.fromkeys(("services_for_type", "topics_for_type"), ("type",)),
-    **dict.fromkeys(("service_type", "service_node", "service_host"), ("service",)),
-    **dict.fromkeys(("message_details", "service_request_details", "service_response_details"), ("type",)),
-    **dict.fromkeys(("action_goal_details", "action_result_details", "action_feedback_details"), ("type",)),
-    "action_type": ("action",),
-    "service_providers": ("service",),
-    "node_details": ("node",),
-    "get_param": ("name", "default_value"),
-    "get_param_names": (),
-    "has_param": ("name",),
-    "set_param": ("name", "value"),
-}
-"""The services of rosapi, each with its arguments."""
-_TYPE_NAMES = {"action_servers": "GetActionServers", "get_ros_version": "GetROSVersion"}
-TYPES: Mapping[str, str] = {
-    f"/rosapi/{name}": f"rosapi_msgs/srv/{_TYPE_NAMES.get(name) or name.title().replace('_', '')}" for name in ARGUMENTS
-}
-"""Their types, by their names on the bus."""
-_PARTS = {
-    "service_request_details": ("srv", "Request"),
-    "service_response_details": ("srv", "Response"),
-    "action_goal_details": ("action", "Goal"),
-    "action_result_details": ("action", "Result"),
-    "action_feedback_details": ("action", "Feedback"),
-}
-
-
-def answer(name: str, given: Mapping[str, Any], graph: GraphView, stamp: int) -> dict[str, Any]:
+def answer(name: str, given: Mapping[str, Any], graph: BusView, stamp: int) -> dict[str, Any]:
     """Return the answer of `/rosapi/NAME`.
 
     Args:
@@ -98,58 +51,83 @@ def answer(name: str, given: Mapping[str, Any], graph: GraphView, stamp: int) ->
     if name == "get_time":
         seconds, rest = divmod(stamp, 1_000_000_000)
         return {"time": {"sec": seconds, "nanosec": rest, "secs": seconds, "nsecs": rest}}  # of ROS 2, and of ROS 1
-    if name == "message_details":
-        return {"typedefs": list(_typedefs(_known(registry.message, values[0])))}
-    if name in _PARTS:
-        kind, part = _PARTS[name]
-        interface = _known(registry.service if kind == "srv" else registry.action, values[0])
-        return {"typedefs": list(_typedefs(getattr(interface, part)))}
-    return _ANSWERS[name](graph, *values)
+    return _SERVICES[name][1](graph, *values)
 
 
-def _topics_and_raw_types(graph: GraphView) -> dict[str, Any]:
-    types = list(graph.topics().values())
+def _topics_and_raw_types(graph: BusView) -> dict[str, Any]:
+    types = list(graph.topics.values())
     return {
-        "topics": list(graph.topics()),
+        "topics": list(graph.topics),
         "types": types,
-        "typedefs_full_text": [_definition(type_) for type_ in types],
+        "typedefs_full_text": [definition(type_) or "" for type_ in types],
     }
 
 
-def _services(graph: GraphView) -> dict[str, str]:
+def _services(graph: BusView) -> dict[str, str]:
     """Return the types of the services that clients find: those of the bus, and of rosapi."""
-    return {**graph.services(), **TYPES}
+    return {**graph.services, **TYPES}
 
 
-def _node_details(graph: GraphView, node: str) -> dict[str, Any]:
+def _node_details(graph: BusView, node: str) -> dict[str, Any]:
     wanted = absolute(node)
     return {
-        "publishing": [topic for topic in graph.topics() if wanted in graph.publishers(topic)],
-        "subscribing": [topic for topic in graph.topics() if wanted in graph.subscribers(topic)],
-        "services": [service for service in graph.services() if wanted in graph.servers(service)],
+        "publishing": [topic for topic in graph.topics if wanted in graph.publishers.get(topic, ())],
+        "subscribing": [topic for topic in graph.topics if wanted in graph.subscribers.get(topic, ())],
+        "services": [service for service in graph.services if wanted in graph.servers.get(service, ())],
     }
 
 
-_ANSWERS: Mapping[str, Callable[..., dict[str, Any]]] = {
-    "topics": lambda graph: {"topics": list(graph.topics()), "types": list(graph.topics().values())},
-    "topics_and_raw_types": _topics_and_raw_types,
-    "interfaces": lambda graph: {"interfaces": sorted(name for kind in KINDS for name in registry.names(kind))},
-    "services": lambda graph: {"services": sorted(_services(graph))},
-    "action_servers": lambda graph: {"action_servers": sorted(graph.actions())},
-    "action_type": lambda graph, action: {"type": graph.actions().get(absolute(action), "")},
-    "nodes": lambda graph: {"nodes": list(graph.nodes())},
-    "node_details": _node_details,
-    "topic_type": lambda graph, topic: {"type": graph.topics().get(absolute(topic), "")},
-    "service_type": lambda graph, service: {"type": _services(graph).get(absolute(service), "")},
-    "service_node": lambda graph, service: {"node": next(iter(graph.servers(absolute(service))), "")},
-    "service_host": lambda graph, service: {"host": _HOST if absolute(service) in _services(graph) else ""},
-    "service_providers": lambda graph, type_: {"providers": _of_type(_services(graph), type_, "srv")},
-    "topics_for_type": lambda graph, type_: {"topics": _of_type(graph.topics(), type_, "msg")},
-    "services_for_type": lambda graph, type_: {"services": _of_type(_services(graph), type_, "srv")},
-    "publishers": lambda graph, topic: {"publishers": list(graph.publishers(absolute(topic)))},
-    "subscribers": lambda graph, topic: {"subscribers": list(graph.subscribers(absolute(topic)))},
-    "get_ros_version": lambda graph: dict(_VERSION),
+_SERVICES: Mapping[str, tuple[tuple[str, ...], Callable[..., dict[str, Any]]]] = {
+    "topics": ((), lambda graph: {"topics": list(graph.topics), "types": list(graph.topics.values())}),
+    "topics_and_raw_types": ((), _topics_and_raw_types),
+    "interfaces": ((), lambda graph: {"interfaces": sorted(name for kind in KINDS for name in registry.names(kind))}),
+    "services": ((), lambda graph: {"services": sorted(_services(graph))}),
+    "action_servers": ((), lambda graph: {"action_servers": sorted(graph.actions)}),
+    "action_type": (("action",), lambda graph, action: {"type": graph.actions.get(absolute(action), "")}),
+    "nodes": ((), lambda graph: {"nodes": list(graph.nodes)}),
+    "node_details": (("node",), _node_details),
+    "topic_type": (("topic",), lambda graph, topic: {"type": graph.topics.get(absolute(topic), "")}),
+    "service_type": (("service",), lambda graph, service: {"type": _services(graph).get(absolute(service), "")}),
+    "service_node": (
+        ("service",),
+        lambda graph, service: {"node": next(iter(graph.servers.get(absolute(service), ())), "")},
+    ),
+    "service_host": (
+        ("service",),
+        lambda graph, service: {"host": _HOST if absolute(service) in _services(graph) else ""},
+    ),
+    "service_providers": (("service",), lambda graph, type_: {"providers": _of_type(_services(graph), type_, "srv")}),
+    "topics_for_type": (("type",), lambda graph, type_: {"topics": _of_type(graph.topics, type_, "msg")}),
+    "services_for_type": (("type",), lambda graph, type_: {"services": _of_type(_services(graph), type_, "srv")}),
+    "publishers": (("topic",), lambda graph, topic: {"publishers": list(graph.publishers.get(absolute(topic), ()))}),
+    "subscribers": (("topic",), lambda graph, topic: {"subscribers": list(graph.subscribers.get(absolute(topic), ()))}),
+    "get_ros_version": ((), lambda graph: dict(_VERSION)),
+    "message_details": (("type",), lambda graph, type_: _details(_known(registry.message, type_))),
+    "service_request_details": (("type",), lambda graph, type_: _details(_known(registry.service, type_).Request)),
+    "service_response_details": (("type",), lambda graph, type_: _details(_known(registry.service, type_).Response)),
+    "action_goal_details": (("type",), lambda graph, type_: _details(_known(registry.action, type_).Goal)),
+    "action_result_details": (("type",), lambda graph, type_: _details(_known(registry.action, type_).Result)),
+    "action_feedback_details": (("type",), lambda graph, type_: _details(_known(registry.action, type_).Feedback)),
 }
+"""The services of rosapi that need only what is on the bus: their arguments, and what answers."""
+ARGUMENTS: Mapping[str, tuple[str, ...]] = {
+    **{name: arguments for name, (arguments, _) in _SERVICES.items()},
+    "get_time": (),
+    "get_param": ("name", "default_value"),
+    "get_param_names": (),
+    "has_param": ("name",),
+    "set_param": ("name", "value"),
+}
+"""All services of rosapi, each with its arguments."""
+_TYPE_NAMES = {"action_servers": "GetActionServers", "get_ros_version": "GetROSVersion"}
+TYPES: Mapping[str, str] = {
+    f"/rosapi/{name}": f"rosapi_msgs/srv/{_TYPE_NAMES.get(name) or name.title().replace('_', '')}" for name in ARGUMENTS
+}
+"""Their types, by their names on the bus."""
+
+
+def _details(message: type[Message]) -> dict[str, Any]:
+    return {"typedefs": list(_typedefs(message))}
 
 
 def _typedefs(message: type[Message]) -> Iterator[dict[str, Any]]:
@@ -180,12 +158,12 @@ def _length(type_: FieldType) -> int:
     return type_.length if type_.shape is FieldShape.ARRAY else 0
 
 
-def _definition(type_: str) -> str:
-    """Return the text of a message and those within it; empty if there is none here."""
+def definition(type_: str) -> str | None:
+    """Return the text of a message and those within it; None if it is not known here."""
     try:
         return packages.whole_text(registry.message(type_).TYPE)
-    except KeyError:
-        return ""
+    except (KeyError, OSError):
+        return None
 
 
 def _example(base: str, shape: FieldShape) -> str:

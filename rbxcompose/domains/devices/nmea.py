@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from functools import reduce
+from operator import xor
 
 from rbxcompose.base.dataclass import dataclass
 
@@ -75,7 +77,7 @@ class SentenceReader:
             return None
         if before:
             self._faults["half sentences"] += 1
-        if len(rest) > LONGEST or len(given) != 2 or not rest.isascii() or checksum(body) != _hexadecimal(given):
+        if len(rest) > LONGEST or not rest.isascii() or given.upper() != b"%02X" % checksum(body):
             self._faults["wrong checksums"] += 1
             return None
         name, *fields = body.decode("ascii").split(",")
@@ -84,22 +86,7 @@ class SentenceReader:
 
 def checksum(body: bytes) -> int:
     """Return the checksum of what is between `$` and `*`."""
-    found = 0
-    for byte in body:
-        found ^= byte
-    return found
-
-
-def framed(body: str) -> bytes:
-    """Return a whole sentence."""
-    return f"${body}*{checksum(body.encode('ascii')):02X}\r\n".encode("ascii")
-
-
-def _hexadecimal(text: bytes) -> int:
-    try:
-        return int(text, 16) if text.isalnum() else -1
-    except ValueError:
-        return -1
+    return reduce(xor, body, 0)
 
 
 @dataclass(frozen=True, slots=True)

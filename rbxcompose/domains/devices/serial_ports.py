@@ -1,18 +1,24 @@
-"""The serial ports of this machine with their USB devices, and what can be wrong with one."""
+"""The serial ports of this machine with their USB devices, what can be wrong with one, and ports that are open."""
 
 from __future__ import annotations
 
+import errno
 import os
 import re
+import select
+import termios
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path, PurePath
-from typing import ClassVar, Self
+from typing import TYPE_CHECKING, Self
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import Finding, FindingKind, Severity, Span, kind
 from rbxcompose.base.printable import plain
+
+if TYPE_CHECKING:
+    import serial
 
 USB_PORT = r"[0-9]+-[0-9]+(?:\.[0-9]+)*"
 _NAMED = re.compile(
@@ -22,6 +28,41 @@ _NAMED = re.compile(
 )
 _SPACES = re.compile(r"\s+")
 _REPLACED = re.compile(r"[^0-9A-Za-z#+.:=@_\x80-\U0010ffff-]")
+_RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
+SLOW = 0.001  # [s] of an adapter's latency timer above which it delays every reply
+NO_PORT = kind("RBX2201")
+FORBIDDEN = kind("RBX2202")
+BUSY = kind("RBX2203")
+UNFIT = kind("RBX2204")
+LOST = kind("RBX2205")
+NO_USB_DEVICE = kind("RBX2251")
+TWO_USB_DEVICES = kind("RBX2252")
+SLOW_ADAPTER = kind("RBX2206", Severity.WARNING)
+ROOT = Path("/")
+_TTYS = ("*:*/tty/tty*", "*:*/*/tty/tty*")  # below a device: of a modem (ttyACM), of a converter (ttyUSB)
+_LONGEST = 300  # characters of a port as it is shown
+_ONBOARD = ("ttyAMA", "ttyTHS", "ttymxc")
+_LINKS = ("dev/serial/by-id", "dev/serial/by-path", "dev")
+_MOST = 4096  # entries of a folder that are looked at
+_ATTRIBUTE = 4096  # [B], the longest that the kernel shows
+_HELP = {
+    NO_PORT: "plug the adapter in, or look for it below /dev/serial/by-id",
+    FORBIDDEN: "sudo usermod -aG dialout $USER, then log in again; or a udev rule with MODE and GROUP",
+    BUSY: "end the other program: 'rbxcompose ps' shows robots that run",
+    UNFIT: "name a serial port, and a baud rate of its adapter",
+    LOST: "plug the adapter in again",
+}
+_CHUNK = 4096  # [B] of one read
+_STUCK = 0.2  # [s] after which a port that takes no bytes is given up
+_ERRORS: dict[int | None, tuple[FindingKind, str]] = {
+    errno.ENOENT: (NO_PORT, "does not exist"),
+    errno.ENXIO: (NO_PORT, "has no device"),
+    errno.ENODEV: (NO_PORT, "has no device"),
+    errno.EACCES: (FORBIDDEN, "may not be opened by this user"),
+    errno.EPERM: (FORBIDDEN, "may not be opened by this user"),
+    errno.EBUSY: (BUSY, "is used by another program"),
+    errno.EAGAIN: (BUSY, "is used by another program"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,87 +131,24 @@ def as_udev_writes(serial: str) -> str:
     return _REPLACED.sub("_", _SPACES.sub("_", serial.strip()))
 
 
-_RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
-SLOW = 0.001  # [s] of an adapter's latency timer above which it delays every reply
-
-NO_PORT = kind("RBX2201")
-FORBIDDEN = kind("RBX2202")
-BUSY = kind("RBX2203")
-UNFIT = kind("RBX2204")
-LOST = kind("RBX2205")
-NO_USB_DEVICE = kind("RBX2251")
-TWO_USB_DEVICES = kind("RBX2252")
-SLOW_ADAPTER = kind("RBX2206", Severity.WARNING)
-ROOT = Path("/")
-_TTYS = ("*:*/tty/tty*", "*:*/*/tty/tty*")  # below a device: of a modem (ttyACM), of a converter (ttyUSB)
-_LONGEST = 300  # characters of a port as it is shown
-_ONBOARD = ("ttyAMA", "ttyTHS", "ttymxc")
-_LINKS = ("dev/serial/by-id", "dev/serial/by-path", "dev")
-_MOST = 4096  # entries of a folder that are looked at
-_ATTRIBUTE = 4096  # [B], the longest that the kernel shows
-
-
 class PortError(Exception):
-    """Raised when a serial port cannot be used; each cause has its own class, kind of finding and help."""
+    """Raised when a serial port cannot be used; `kind` is the cause."""
 
-    kind: ClassVar[FindingKind]
-    help: str = ""
-
-    def __init__(self, path: str, problem: str, help: str = "") -> None:
+    def __init__(self, kind: FindingKind, path: str, problem: str, help: str = "") -> None:
         super().__init__(f"{path} {problem}")
-        self.path, self.problem = path, problem
-        self.help = help or self.help
+        self.kind, self.path, self.problem = kind, path, problem
+        self.help = help or _HELP[kind]
 
     def finding(self, span: Span | None = None) -> Finding:
         """Return the message for people."""
         return self.kind.at(span, f"{plain(self.path)} {plain(self.problem)}", help=self.help)
 
 
-class NoPortError(PortError):
-    """Raised when nothing has the name of the port."""
-
-    kind = NO_PORT
-    help = "plug the adapter in, or look for it below /dev/serial/by-id"
-
-
-class ForbiddenPortError(PortError):
-    """Raised when the user may not open the port."""
-
-    kind = FORBIDDEN
-    help = "sudo usermod -aG dialout $USER, then log in again; or a udev rule with MODE and GROUP"
-
-
-class BusyPortError(PortError):
-    """Raised when another program has locked the port."""
-
-    kind = BUSY
-    help = "end the other program: 'rbxcompose ps' shows robots that run"
-
-
-class UnfitPortError(PortError):
-    """Raised when the file is no serial port, or does not have the baud rate."""
-
-    kind = UNFIT
-    help = "name a serial port, and a baud rate of its adapter"
-
-
-class NoDeviceError(PortError):
-    """Raised when the USB device of a port is not connected."""
-
-    kind = NO_USB_DEVICE
-
-
-class DeviceNotUniqueError(PortError):
-    """Raised when more than one port belongs to a USB device as it is named."""
-
-    kind = TWO_USB_DEVICES
-
-
 class LostPortError(PortError):
     """Raised when an open port has gone."""
 
-    kind = LOST
-    help = "plug the adapter in again"
+    def __init__(self, path: str, problem: str) -> None:
+        super().__init__(LOST, path, problem)
 
 
 def slow_adapter(path: str, latency: float | None, span: Span | None = None) -> Finding | None:
@@ -288,8 +266,7 @@ def port_path(name: str, root: Path = ROOT) -> str:
     """Return the path of a port by its name, as it is now.
 
     Raises:
-        NoDeviceError: if it names a device that is not connected.
-        DeviceNotUniqueError: if more than one such device is connected.
+        PortError: if it names a device that is not connected, or more than one such device is.
     """
     wanted = UsbDevice.of(name)
     return name if wanted is None else port_of(wanted, serial_ports(root)).path
@@ -308,9 +285,11 @@ def port_of(wanted: UsbDevice, ports: Iterable[SerialPort]) -> SerialPort:
     if len(matching) != 1:
         matching = [port for port in linked if port in matching or not (matching or port.device)] or matching
     if not matching:
-        raise NoDeviceError(wanted.called, "is not connected", connected(usb, "USB serial port"))
+        raise PortError(NO_USB_DEVICE, wanted.called, "is not connected", connected(usb, "USB serial port"))
     if len(matching) > 1:
-        raise DeviceNotUniqueError(wanted.called, f"has {len(matching)} ports", connected(matching, "USB serial port"))
+        raise PortError(
+            TWO_USB_DEVICES, wanted.called, f"has {len(matching)} ports", connected(matching, "USB serial port")
+        )
     return matching[0]
 
 
@@ -339,3 +318,95 @@ def latency_of(path: str, root: Path = ROOT) -> float | None:
         except (OSError, ValueError):
             continue
     return None
+
+
+def opened(path: str, baud: int) -> serial.Serial:
+    """Open a serial port at any rate [bit/s] that its adapter has, for this program alone.
+
+    Raises:
+        PortError: if that cannot be done, with the reason.
+    """
+    import serial
+
+    try:
+        return serial.Serial(path, baud, timeout=0, exclusive=True)
+    except (OSError, termios.error, ValueError, OverflowError) as error:
+        number = getattr(error, "errno", None)
+        kind, words = _ERRORS.get(number, (UNFIT, f"cannot be a serial port at {baud} bit/s"))
+        raise PortError(kind, path, words) from error
+
+
+class SerialLine:
+    """A serial port by its name, which may be that of a device, at `baud` [bit/s]. It begins closed."""
+
+    def __init__(self, name: str, baud: int) -> None:
+        self.name, self.baud = name, baud
+        self._port: serial.Serial | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Return whether it is open."""
+        return self._port is not None
+
+    def open(self) -> None:
+        """Open it, and forget what came before.
+
+        Raises:
+            PortError: if that cannot be done, with the reason.
+        """
+        self._port = opened(port_path(self.name), self.baud)
+        try:
+            termios.tcflush(self._port.fileno(), termios.TCIFLUSH)
+        except termios.error as error:
+            raise self._lost() from error
+
+    def read(self, patience: float) -> bytes:
+        """Return what has come, waiting for at most `patience` [s] for the first byte.
+
+        Raises:
+            LostPortError: if the port has gone.
+        """
+        try:
+            descriptor = self._descriptor()
+            if not select.select([descriptor], [], [], patience)[0]:
+                return b""
+            data = os.read(descriptor, _CHUNK)
+        except (OSError, ValueError) as error:
+            raise self._lost() from error
+        if not data:
+            raise self._lost()
+        return data
+
+    def write(self, data: bytes) -> bool:
+        """Send bytes; return whether all were taken.
+
+        Raises:
+            LostPortError: if the port has gone.
+        """
+        sent = 0
+        try:
+            descriptor = self._descriptor()
+            while sent < len(data):
+                if not select.select([], [descriptor], [], _STUCK)[1]:
+                    return False
+                sent += os.write(descriptor, data[sent:])
+        except BlockingIOError:
+            return False
+        except (OSError, ValueError) as error:
+            raise self._lost() from error
+        return True
+
+    def close(self) -> None:
+        """Close it."""
+        if self._port is not None:
+            port, self._port = self._port, None
+            port.close()
+
+    def _descriptor(self) -> int:
+        if self._port is None:
+            raise OSError("it is closed")
+        return int(self._port.fileno())
+
+    def _lost(self) -> LostPortError:
+        self.close()
+        return LostPortError(self.name, "has gone")

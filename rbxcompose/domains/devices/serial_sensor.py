@@ -12,8 +12,7 @@ from rbxcompose import sdk
 from rbxcompose.base.config import BitRate
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.devices.sections.devices import SerialPortName
-from rbxcompose.domains.devices.serial_line import SerialLine
-from rbxcompose.domains.devices.serial_ports import PortError
+from rbxcompose.domains.devices.serial_ports import PortError, SerialLine
 
 AGAIN = 1.0  # [s] between two tries to open a port
 WAIT = 0.015  # [s] of a step in which it waits for bytes, in real time

@@ -45,6 +45,8 @@ OTHER_RULES = kind("RBX9414", Severity.WARNING)
 SAME_SERIAL = kind("RBX9415", Severity.WARNING)
 NOT_IN_GROUP = kind("RBX9416", Severity.WARNING)
 OTHER_LINK = kind("RBX9417")
+Named = Mapping[str, tuple[UsbDevice, Span | None]]
+"""Devices of a manifest by their names, with their places."""
 
 
 def names_of(port: SerialPort, named: Iterable[UsbDevice]) -> list[str]:
@@ -146,10 +148,6 @@ def this_account() -> Account:
         frozenset(item.gr_name for item in every if name in item.gr_mem),
         number == 0,
     )
-
-
-Named = Mapping[str, tuple[UsbDevice, Span | None]]
-"""Devices of a manifest by their names, with their places."""
 
 
 def device_answers(

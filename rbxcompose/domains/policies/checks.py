@@ -22,11 +22,8 @@ def unusable_policy(robot: Robot) -> Iterator[Finding]:
 
 
 def _examined(robot: Robot, made: RobotComponent) -> Iterator[Finding]:
-    from rbxcompose.domains.policies.network import (
-        PolicyNetwork,
-        PolicyNetworkError,
-        read_network,
-    )  # few robots have one
+    # Few robots have one.
+    from rbxcompose.domains.policies.components.policy import PolicyNetwork, PolicyNetworkError, read_network
 
     config: Any = made.config
     path = Path(config.model)

@@ -1,20 +1,24 @@
-"""One program of others as its component sees it: started, heard, stopped."""
+"""One program of others as its component sees it: started, heard, stopped; and what it writes, as lines of the log."""
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import select
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 from uuid import uuid4
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.levels import Level
+from rbxcompose.base.printable import plain
 
 KEEPER = Path(__file__).with_name("keeper.py")
 MOST_READ = 256 * 1024  # [bytes] at once; a program that writes more waits
@@ -24,6 +28,16 @@ _CLEANS_UP = 5.0  # [s] for what ends something elsewhere
 _LOOKS = 3  # in a row that find nothing: a process that is just starting another program has no environment
 _PAUSE = 0.005  # [s] between two looks for what is left
 _MARK = "RBXCOMPOSE_RUN"  # in the environment of all that belongs to one run of a program
+Event = tuple[str, Any]
+"""What happened, with a value: `line` (its text; to which output it was written does not matter), `started` (the
+process), `failed` (why it could not be started), `deaf` (it did not end within its time after the signal, and was
+killed), `ended` (the wait status), `left` (how many processes it had left in the background, which were killed)."""
+LONGEST = 500  # characters of a line in the log
+AT_ONCE, PER_SECOND = 200, 20  # lines that are logged at once, and for a long time
+TELLS = 10.0  # [s] between two records of how many were left out
+_COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+_USUAL = {Level.ERROR: r"\b(ERROR|FATAL|CRITICAL|Error|Traceback)\b", Level.WARN: r"\b(WARN|WARNING|Warning)\b"}
+"""How loggers mark their lines: those of ROS 2, Python, and most others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,49 +57,6 @@ class StartOrder:
     """Open files that it inherits."""
     cleanup: Sequence[str] = ()
     """Run when it has ended, also if nobody is left: it ends what runs elsewhere on its behalf."""
-
-
-@dataclass(frozen=True, slots=True)
-class WrittenLine:
-    """A line that it wrote, to which of its outputs does not matter."""
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class ProgramStarted:
-    """It runs."""
-
-    pid: int
-
-
-@dataclass(frozen=True, slots=True)
-class NotStarted:
-    """It could not be started."""
-
-    why: str
-
-
-@dataclass(frozen=True, slots=True)
-class Deaf:
-    """It did not end within its time after the signal, and was killed."""
-
-
-@dataclass(frozen=True, slots=True)
-class ProgramEnd:
-    """It ended; its wait status."""
-
-    status: int
-
-
-@dataclass(frozen=True, slots=True)
-class LeftBehind:
-    """It had left so many processes in the background, which were killed."""
-
-    number: int
-
-
-Event = WrittenLine | ProgramStarted | NotStarted | Deaf | ProgramEnd | LeftBehind
 
 
 class Child:
@@ -138,9 +109,11 @@ class Child:
         is_over = self.is_over  # before reading, else the last lines may come after the look
         reports = list(self._read(self._reports, is_over=is_over))  # before its lines, which then include the last ones
         for line in self._read(self._lines, is_over=is_over):
-            yield WrittenLine(line.decode("utf-8", "replace"))
-        for report in reports:
-            yield self._event(json.loads(report))
+            yield "line", line.decode("utf-8", "replace")
+        for what, value in map(json.loads, reports):
+            if what in ("started", "ended"):
+                self.pid = value if what == "started" else None
+            yield what, value
 
     def wait(self, seconds: float) -> None:
         """Wait until there is something to hear, at most so long [s]."""
@@ -178,21 +151,6 @@ class Child:
                 self._keeper.stdin.write(data)
         except BrokenPipeError:
             return  # it is over
-
-    def _event(self, report: Mapping[str, object]) -> Event:
-        match report:
-            case {"event": "started", "pid": int(pid)}:
-                self.pid = pid
-                return ProgramStarted(pid)
-            case {"event": "failed", "why": str(why)}:
-                return NotStarted(why)
-            case {"event": "ended", "status": int(status)}:
-                self.pid = None
-                return ProgramEnd(status)
-            case {"event": "left", "number": int(number)}:
-                return LeftBehind(number)
-            case _:
-                return Deaf()
 
     def _read(self, descriptor: int, *, is_over: bool) -> Iterator[bytes]:
         """Yield the lines that have come, without what is too long of them; the last one only once it is whole."""
@@ -252,3 +210,35 @@ def _children_of(pid: int) -> list[int]:
         files = [Path(f"/proc/{pid}/task/{task}/children") for task in tasks]
         return [int(text) for file in files for text in file.read_text(encoding="ascii").split()]
     return []
+
+
+class OutputLog:
+    """Turns lines into records; a program that floods its output loses the rest, which is counted."""
+
+    def __init__(self, patterns: Mapping[Level, str]) -> None:
+        """Take regular expressions by level, instead of the usual marks; ERROR counts before WARN."""
+        given = {**_USUAL, **patterns}
+        self._patterns = [(level, re.compile(given[level])) for level in (Level.ERROR, Level.WARN)]
+        self._credit, self._since = float(AT_ONCE), 0.0
+        self._left_out, self._told = 0, -TELLS
+
+    def take(self, lines: Iterable[str], now: float) -> Iterator[tuple[Level, str]]:
+        """Yield the records of lines that came at `now` [s]; infinite at its end, so that nothing is left untold."""
+        self._credit = min(float(AT_ONCE), self._credit + (now - self._since) * PER_SECOND)
+        self._since = now
+        for line in lines:
+            text = _COLOURS.sub("", line).rstrip()
+            if not text:
+                continue
+            if self._credit < 1.0:
+                self._left_out += 1
+                continue
+            self._credit -= 1.0
+            yield self._level(text), plain(text, LONGEST)
+        if self._left_out and now - self._told >= TELLS:
+            number, self._left_out, self._told = self._left_out, 0, now
+            lines_were = "one line was" if number == 1 else f"{number} lines were"
+            yield Level.WARN, f"{lines_were} left out: it writes too many"
+
+    def _level(self, text: str) -> Level:
+        return next((level for level, pattern in self._patterns if pattern.search(text)), Level.OK)

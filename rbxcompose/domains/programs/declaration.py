@@ -229,22 +229,21 @@ class DeclaredPorts(Config):
         """Yield what it can do, each value with its field."""
         can = self.capabilities
         if can.drives is not None:
-            yield Drives(can.drives.commands, can.drives.odometry, **_settings("drives", can.drives, _DRIVES))
+            yield Drives(can.drives.commands, can.drives.odometry, **_settings("drives", can.drives))
         if can.commands_motion is not None:
-            limits = _settings("commands_motion", can.commands_motion, ("max_speed", "max_turn_rate"))
-            yield CommandsMotion(can.commands_motion.commands, **limits)
+            yield CommandsMotion(can.commands_motion.commands, **_settings("commands_motion", can.commands_motion))
         if can.drains is not None:
-            yield Drains(can.drains.level, **_settings("drains", can.drains, ("runtime", "warn", "error")))
+            yield Drains(can.drains.level, **_settings("drains", can.drains))
         for child, parent in can.frames.items():
             yield WritesFrame("tf", Setting(parent), Setting(child))
 
 
-_DRIVES = ("max_speed", "max_turn_rate", "stops_after", "acceleration", "turn_acceleration", "wheel_distance")
+_PORTS = ("commands", "odometry", "level")  # fields that name ports; the others are settings
 
 
-def _settings(name: str, model: Config, fields: tuple[str, ...]) -> Mapping[str, Any]:
-    values = ((field, getattr(model, field)) for field in fields)
-    return {field: Setting(value, f"capabilities.{name}.{field}") for field, value in values if value is not None}
+def _settings(name: str, model: Config) -> Mapping[str, Any]:
+    given = {field: value for field, value in model if field not in _PORTS and value is not None}
+    return {field: Setting(value, f"capabilities.{name}.{field}") for field, value in given.items()}
 
 
 _KINDS = ("publishes", "subscribes", "serves", "calls", "serves_actions", "calls_actions")

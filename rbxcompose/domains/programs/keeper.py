@@ -45,9 +45,9 @@ def main() -> None:
     signal.signal(signal.SIGCHLD, lambda number, frame: None)
     os.set_inheritable(wanted["report"], False)
 
-    def report(**event: object) -> None:
+    def report(what: str, value: object = None) -> None:
         try:
-            os.write(wanted["report"], (json.dumps(event) + "\n").encode())
+            os.write(wanted["report"], (json.dumps((what, value)) + "\n").encode())
         except OSError:
             return  # nobody is left to read it
 
@@ -76,9 +76,9 @@ def start(wanted: ProgramOrder, report: Report) -> int | None:
     os.close(failed)
     if problem:
         os.waitpid(child, 0)
-        report(event="failed", why=problem.decode("utf-8", "replace"))
+        report("failed", problem.decode("utf-8", "replace"))
         return None
-    report(event="started", pid=child)
+    report("started", child)
     return child
 
 
@@ -182,13 +182,13 @@ def keep(wanted: ProgramOrder, child: int, ended: int, report: Report) -> None:
             is_asked, deadline = True, min(deadline, time.monotonic() + patience)
         if time.monotonic() >= deadline:
             if not is_deaf:
-                report(event="deaf")
+                report("deaf")
             is_deaf, deadline = True, time.monotonic() + _AT_ONCE
             _signal_group(child, signal.SIGKILL)
-    report(event="ended", status=status)
+    report("ended", status)
     left = _end_all()
     if left and not is_deaf:
-        report(event="left", number=left)
+        report("left", left)
 
 
 def _reaped(child: int, status: int | None) -> int | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator
-from enum import StrEnum
+from typing import Literal, get_args
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
@@ -20,21 +20,9 @@ OWN = re.compile(
 """What every ROS 2 node has, besides what it is for."""
 
 
-class EndKind(StrEnum):
-    """What a session has at a key."""
-
-    PUBLISHER = "publisher"
-    SUBSCRIBER = "subscriber"
-    QUERYABLE = "queryable"
-    QUERIER = "querier"
-
-
-_VERBS = {
-    EndKind.PUBLISHER: ("publishes", "publishes"),
-    EndKind.SUBSCRIBER: ("subscribes to", "subscribes"),
-    EndKind.QUERYABLE: ("serves", "serves"),
-    EndKind.QUERIER: ("calls", "calls"),
-}
+EndKind = Literal["publishes", "calls", "serves", "subscribes"]
+"""What a session does at a key, by the key of the manifest for that."""
+_ORDER = get_args(EndKind)  # of what is reported
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +35,12 @@ class KeyOnBus:
     hash: str
 
     @classmethod
-    def of(cls, kind: str, key: str, domain: int) -> KeyOnBus | None:
+    def of(cls, kind: EndKind, key: str, domain: int) -> KeyOnBus | None:
         """Read a key such as `0/odom/nav_msgs::msg::dds_::Odometry_/RIHS01_...`; None for any other."""
         head, *name, type_, hash_ = key.split("/") if key.count("/") > 2 else ("", "", "")
-        if head != str(domain) or not name or kind not in list(EndKind) or "::" not in type_:
+        if head != str(domain) or not name or "::" not in type_:
             return None
-        return cls(EndKind(kind), "/" + "/".join(name), type_, hash_)
+        return cls(kind, "/" + "/".join(name), type_, hash_)
 
     def text(self, domain: int) -> str:
         """Return the key itself."""
@@ -106,12 +94,12 @@ class ProgramWatch:
                 yield text
 
     def _undeclared(self, session: Collection[KeyOnBus]) -> Iterator[str]:
-        for key in sorted(session, key=lambda one: (one.kind, one.name)):
+        for key in sorted(session, key=lambda key: (_ORDER.index(key.kind), key.name)):
             known = self._declared.get((key.kind, key.name))
             action = _ACTION.sub("", key.name)
             if known is None and (OWN.search(key.name) or action in self._actions):
                 continue
-            verb, where = _VERBS[key.kind]
+            verb, where = _verb(key.kind), key.kind
             if known is None and action != key.name:
                 if key.name.endswith("/send_goal"):  # one of its five ends stands for all
                     yield f"{verb} the action '{action}', which '{where}_actions' does not declare"
@@ -128,11 +116,15 @@ class ProgramWatch:
         there = {(key.kind, key.name) for key in session}
         for (kind, name), end in self._declared.items():
             heard = self.count(end.port) > 0
-            is_there = (kind, name) in there or (kind is EndKind.PUBLISHER and heard)
-            if session and not is_there and kind is not EndKind.QUERIER:
-                yield f"declares '{_ACTION.sub('', name)}', but never {_VERBS[kind][0]} it"
-            elif kind is EndKind.PUBLISHER and not heard and (end.rate is not None or not session):
+            is_there = (kind, name) in there or (kind == "publishes" and heard)
+            if session and not is_there and kind != "calls":
+                yield f"declares '{_ACTION.sub('', name)}', but never {_verb(kind)} it"
+            elif kind == "publishes" and not heard and (end.rate is not None or not session):
                 yield f"has published nothing on '{name}' for {PATIENCE:g} s"
+
+
+def _verb(kind: EndKind) -> str:
+    return "subscribes to" if kind == "subscribes" else kind
 
 
 def _ros(dds: str) -> str:

@@ -19,7 +19,7 @@ from dynamixel_sdk import (
     Protocol2PacketHandler,
 )
 
-from rbxcompose.domains.devices import serial_line, serial_ports
+from rbxcompose.domains.devices import serial_ports
 from rbxcompose.domains.servos.bus import REPLY, ROOM
 from rbxcompose.domains.servos.transfers import Stretch
 
@@ -65,7 +65,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     def _open(self) -> None:
         if self.is_open:
             self.closePort()
-        self.ser = serial_line.opened(str(self.port_name), self.baudrate)
+        self.ser = serial_ports.opened(str(self.port_name), self.baudrate)
         self._descriptor = self.ser.fileno()
         self.is_open, self.is_using = True, False
         self.tx_time_per_byte = 1000.0 * BITS / self.baudrate

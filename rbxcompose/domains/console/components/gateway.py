@@ -33,7 +33,7 @@ from rbxcompose.base.config import AngularSpeed, Config, Speed
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Refused
 from rbxcompose.bus.actions import ActionServer, ServedGoal
-from rbxcompose.bus.graph import Graph, GraphName
+from rbxcompose.bus.graph import Graph, GraphEnd, GraphName
 from rbxcompose.bus.names import data_key, resolve
 from rbxcompose.bus.services import ServedRequest
 from rbxcompose.bus.tokens import SPACE
@@ -42,45 +42,16 @@ from rbxcompose.bus.transport import Closable
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import NAME, Guest
 from rbxcompose.commands.lookup import place_of
+from rbxcompose.domains.console import protocol
 from rbxcompose.domains.console.access import LOCAL_NAMES, Door, Role, network_names, own_secret, role_of, secret_path
 from rbxcompose.domains.console.editor_process import EditorProcess
 from rbxcompose.domains.console.foxglove_server import FoxgloveServer, RobotAccess
 from rbxcompose.domains.console.lease import DriveLimits
 from rbxcompose.domains.console.log_tail import findings, tail
 from rbxcompose.domains.console.models import MESHES, CandidateModels, ServedFile, ServedModel
-from rbxcompose.domains.console.protocol import (
-    LARGEST,
-    RELEASE,
-    STOP,
-    Advertise,
-    AskRobot,
-    Bridge,
-    BusRequest,
-    CancelGoal,
-    CountMessages,
-    EditMission,
-    GoalEnd,
-    GoalFeedback,
-    Publish,
-    ReadTested,
-    SaveSettings,
-    SendGoal,
-    Serve,
-    ServeAction,
-    ServiceAnswer,
-    ServiceCall,
-    Subscribe,
-    TailLog,
-    Unadvertise,
-    Unserve,
-    UnserveAction,
-    Unsubscribe,
-    Unwatch,
-    Watch,
-)
-from rbxcompose.domains.console.streams import BOUNDARY, Streams, part
+from rbxcompose.domains.console.rosapi import BusView
 from rbxcompose.domains.console.topic_rates import KEPT, TopicRates
-from rbxcompose.domains.console.video import IMAGES, Picture, list_page, viewer_page, wanted
+from rbxcompose.domains.console.video import BOUNDARY, IMAGES, Picture, Streams, list_page, part, viewer_page, wanted
 from rbxcompose.missions.view.tested import read_tested
 from rbxcompose.msgs.images import WrongPictureError
 from rbxcompose.msgs.types import Action, Message, Service
@@ -97,6 +68,8 @@ if TYPE_CHECKING:
     from starlette.requests import HTTPConnection, Request
     from starlette.responses import Response
     from starlette.websockets import WebSocket
+
+    Answering = Callable[[Request], Awaitable[Response]]
 
 STATIC = Path(__file__).parents[1] / "static"  # the built page
 MOST_CLIENTS = 64
@@ -382,40 +355,28 @@ class LiveGraph:
 
     def _change(self, key: str, *, is_there: bool) -> None:
         (self._keys.add if is_there else self._keys.discard)(key)
-        self.__dict__.pop("_graph", None)
+        for known in ("_graph", "view"):
+            self.__dict__.pop(known, None)
         self.changed()
 
     @cached_property
     def _graph(self) -> Graph:
         return Graph.of(self._keys)
 
-    def topics(self) -> dict[str, str]:
-        """Return the types of the topics."""
-        return _types(self._graph.topics)
-
-    def services(self) -> dict[str, str]:
-        """Return the types of the services that somebody serves."""
-        return _types([service for service in self._graph.services if service.givers])
-
-    def actions(self) -> dict[str, str]:
-        """Return the types of the actions that somebody serves."""
-        return _types([action for action in self._graph.actions if action.givers])
-
-    def servers(self, service: str) -> Sequence[str]:
-        """Return the names of the nodes that serve a service."""
-        return sorted({end.node for found in self._graph.services if found.name == service for end in found.givers})
-
-    def nodes(self) -> Sequence[str]:
-        """Return the names of the nodes."""
-        return [node for node in self._graph.nodes if not node.startswith("/_")]
-
-    def publishers(self, topic: str) -> Sequence[str]:
-        """Return the names of the nodes that publish on a topic."""
-        return self._ends(topic, "givers")
-
-    def subscribers(self, topic: str) -> Sequence[str]:
-        """Return the names of the nodes that subscribe to a topic."""
-        return self._ends(topic, "takers")
+    @cached_property
+    def view(self) -> BusView:
+        """Return what is there now."""
+        graph = self._graph
+        return BusView(
+            topics=_types(graph.topics),
+            services=_types(service for service in graph.services if service.givers),
+            actions=_types(action for action in graph.actions if action.givers),
+            nodes=[node for node in graph.nodes if not node.startswith("/_")],
+            publishers={topic.name: sorted({end.node for end in topic.givers}) for topic in graph.topics},
+            subscribers={topic.name: sorted({end.node for end in topic.takers}) for topic in graph.topics},
+            servers={service.name: sorted({end.node for end in service.givers}) for service in graph.services},
+            latched={topic.name for topic in graph.topics if any(map(_is_latched, topic.givers))},
+        )
 
     def key(self, topic: str, domain: int) -> str:
         """Return the key on which the messages of a topic are published, in the type that most know."""
@@ -423,13 +384,13 @@ class LiveGraph:
         kind = found.kinds[0]
         return data_key(domain, topic, kind.type, kind.hash)
 
-    def is_latched(self, topic: str) -> bool:
-        """Return whether the last message of a topic is kept for late subscribers."""
-        ends = (end for found in self._graph.topics if found.name == topic for end in found.givers)
-        return any(end.qos is not None and end.qos.is_transient_local for end in ends)
 
-    def _ends(self, topic: str, side: str) -> list[str]:
-        return sorted({end.node for found in self._graph.topics if found.name == topic for end in getattr(found, side)})
+def _types(names: Iterable[GraphName]) -> dict[str, str]:
+    return {found.name: found.types[0] for found in names if not found.is_hidden}
+
+
+def _is_latched(end: GraphEnd) -> bool:
+    return end.qos is not None and end.qos.is_transient_local
 
 
 class _Unsent:
@@ -453,8 +414,16 @@ def _address(request: HTTPConnection) -> str:
     return request.client.host if request.client else "?"
 
 
-def _types(names: Sequence[GraphName]) -> dict[str, str]:
-    return {found.name: found.types[0] for found in names if not found.is_hidden}
+def _file(request: Request, file: ServedFile | None) -> Response:
+    """Return a file of the robot's body, unless the browser has it already."""
+    from starlette.responses import JSONResponse, Response
+
+    if file is None:
+        return JSONResponse({"message": "the robot's body has no such file"}, 404)
+    headers = {"etag": file.tag, "cache-control": "no-cache"}
+    if file.tag in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    return Response(file.content, media_type=file.kind, headers=headers)
 
 
 class GatewaySession:
@@ -474,10 +443,10 @@ class GatewaySession:
         self._graph = LiveGraph(guest)
         guest.graph()  # a round trip, after which the tokens of all others are here, too
         guarded = {pattern: Role[role.upper()] for pattern, role in config.guard.items()}
-        self._bridge = Bridge(self._graph, config.drive, guarded, self._role_of)
+        self._bridge = protocol.Bridge(lambda: self._graph.view, config.drive, guarded, self._role_of)
         self._bridge.show_config(self._shown_config())
         self._bus = guest.bus()
-        self._streams = Streams(lambda topic: self._graph.topics().get(topic, ""), self._subscribe_to_images)
+        self._streams = Streams(lambda topic: self._graph.view.topics.get(topic, ""), self._subscribe_to_images)
         self._ends: dict[tuple[type[object], str], Any] = {}  # publishers, subscriptions and clients, by name
         self._asked_of_clients: dict[int, ServedRequest[Any, Any]] = {}  # that have not answered
         self._goals_of_clients: dict[int, ServedGoal[Any, Any, Any]] = {}  # that clients carry out
@@ -493,7 +462,7 @@ class GatewaySession:
         self._rates = TopicRates(partial(self._hear, Qos.STATE))
         self._rates_timer: asyncio.TimerHandle | None = None
         self._tasks: set[asyncio.Task[None]] = set()
-        self._is_command: dict[str, bool] = dict.fromkeys((STOP["type"], RELEASE["type"]), True)
+        self._is_command: dict[str, bool] = dict.fromkeys((protocol.STOP["type"], protocol.RELEASE["type"]), True)
         self._is_command |= dict.fromkeys(("robot.RobotStatus", _DESCRIBE["type"]), False)
         self._foxglove: FoxgloveServer | None = None
         self.trouble = ""  # what is not served beside the page
@@ -555,7 +524,7 @@ class GatewaySession:
             lifespan="off",
             http=LimitedConnection,
             ws="websockets-sansio",
-            ws_max_size=2 * LARGEST,  # beyond that, the connection is closed
+            ws_max_size=2 * protocol.LARGEST,  # beyond that, the connection is closed
             ws_per_message_deflate=False,  # within a machine it costs more than it saves
             ws_ping_interval=_PING,
             ws_ping_timeout=_PING,
@@ -605,10 +574,8 @@ class GatewaySession:
         from starlette.staticfiles import StaticFiles
 
         async def config(request: Request) -> Response:
-            role = self._role(request)
-            if role < Role.VIEW:
-                return JSONResponse(_LOCKED, 401)
-            return JSONResponse(self._shown_config() | {"role": role.word}, headers={"cache-control": "no-store"})
+            role = self._role(request).word
+            return JSONResponse(self._shown_config() | {"role": role}, headers={"cache-control": "no-store"})
 
         async def log_in(request: Request) -> Response:
             if int(request.headers.get("content-length") or _LONGEST_LOGIN + 1) > _LONGEST_LOGIN:
@@ -629,7 +596,7 @@ class GatewaySession:
         is_built = (STATIC / "index.html").exists()
         page: BaseRoute = Mount("/", StaticFiles(directory=STATIC, html=True)) if is_built else Route("/", not_built)
         sockets = [WebSocketRoute(path, self._talk) for path in SOCKETS]
-        own = [Route("/console/config", config), Route("/console/login", log_in, methods=["POST"])]
+        own = [Route("/console/config", self._for_viewers(config)), Route("/console/login", log_in, methods=["POST"])]
         return Starlette(routes=[*sockets, *own, *self._video(), *self._model(), page])
 
     def _model(self) -> list[Any]:
@@ -639,40 +606,33 @@ class GatewaySession:
         model = ServedModel(self.config.urdf, self.config.meshes)
 
         async def urdf(request: Request) -> Response:
-            return self._file(request, model.urdf)
+            return _file(request, model.urdf)
 
         async def mesh(request: Request) -> Response:
-            if self._role(request) < Role.VIEW:
-                return self._file(request, None)
             address = request.path_params["address"]
             found = await asyncio.to_thread(model.mesh, address)
-            return self._file(request, found or await asyncio.to_thread(self._candidates.mesh, address))
+            return _file(request, found or await asyncio.to_thread(self._candidates.mesh, address))
 
-        return [Route("/console/model.urdf", urdf), Route(f"{MESHES}{{address:path}}", mesh)]
+        routes = {"/console/model.urdf": urdf, f"{MESHES}{{address:path}}": mesh}
+        return [Route(path, self._for_viewers(answer)) for path, answer in routes.items()]
 
-    def _file(self, request: Request, file: ServedFile | None) -> Response:
-        """Return a file of the robot's body to who may see it, unless the browser has it already."""
-        from starlette.responses import JSONResponse, Response
+    def _for_viewers(self, answer: Answering) -> Answering:
+        """Return what answers only who may look."""
+        from starlette.responses import JSONResponse
 
-        if self._role(request) < Role.VIEW:
-            return JSONResponse(_LOCKED, 401)
-        if file is None:
-            return JSONResponse({"message": "the robot's body has no such file"}, 404)
-        headers = {"etag": file.tag, "cache-control": "no-cache"}
-        if file.tag in request.headers.get("if-none-match", ""):
-            return Response(status_code=304, headers=headers)
-        return Response(file.content, media_type=file.kind, headers=headers)
+        async def guarded(request: Request) -> Response:
+            return JSONResponse(_LOCKED, 401) if self._role(request) < Role.VIEW else await answer(request)
+
+        return guarded
 
     def _video(self) -> list[Any]:
         """Return the pages of pictures, at the addresses of web_video_server."""
-        from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, StreamingResponse
+        from starlette.responses import HTMLResponse, PlainTextResponse, StreamingResponse
         from starlette.responses import Response as Answer
         from starlette.routing import Route
 
-        def shown(show: Callable[[Request, Picture], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
+        def shown(show: Callable[[Request, Picture], Awaitable[Response]]) -> Answering:
             async def answer(request: Request) -> Response:
-                if self._role(request) < Role.VIEW:
-                    return JSONResponse(_LOCKED, 401)
                 try:
                     return await show(request, wanted(request.query_params))
                 except WrongPictureError as error:
@@ -712,22 +672,16 @@ class GatewaySession:
             return HTMLResponse(viewer_page(request.url.query))
 
         async def listed(request: Request) -> Response:
-            if self._role(request) < Role.VIEW:
-                return JSONResponse(_LOCKED, 401)
-            return HTMLResponse(list_page(self._image_topics()))
+            return HTMLResponse(list_page(topic for topic, type_ in self._graph.view.topics.items() if type_ in IMAGES))
 
-        routes = {"/stream": stream, "/snapshot": snapshot, "/stream_viewer": viewer}
-        return [Route("/streams", listed), *(Route(path, shown(show)) for path, show in routes.items())]
-
-    def _image_topics(self) -> list[str]:
-        return [topic for topic, type_ in self._graph.topics().items() if type_ in IMAGES]
+        pictures = {"/stream": stream, "/snapshot": snapshot, "/stream_viewer": viewer}
+        routes = {"/streams": listed, **{path: shown(show) for path, show in pictures.items()}}
+        return [Route(path, self._for_viewers(answer)) for path, answer in routes.items()]
 
     def _subscribe_to_images(
         self, topic: str, message: type[Message], then: Callable[[Any], None]
     ) -> Callable[[], None]:
-        end = self._bus.subscribe(
-            NAME, topic, message, Qos.BULK, then, max_rate=math.inf, limits=BULK, may_be_silent=True
-        )
+        end = self._subscription(topic, message, Qos.BULK, then)
         self._pump()
         return partial(self._withdraw, end)
 
@@ -854,7 +808,7 @@ class GatewaySession:
 
     # The bus
 
-    def _do(self, requests: Sequence[BusRequest]) -> None:
+    def _do(self, requests: Sequence[protocol.BusRequest]) -> None:
         for request in requests:
             self._carry_out(request)
         self._pump()
@@ -881,71 +835,62 @@ class GatewaySession:
             if (wake := self._wakes.get(self._bridge.woken.pop())) is not None:
                 wake.set()
 
-    def _carry_out(self, request: BusRequest) -> None:
+    def _carry_out(self, request: protocol.BusRequest) -> None:
         match request:
-            case Subscribe(topic, message):
+            case protocol.Subscribe(topic, message):
                 self._subscribe(topic, message)
-            case Advertise(topic, message, is_latched):
+            case protocol.Advertise(topic, message, is_latched):
                 qos = Qos.COMMAND if topic == self.config.drive_topic else Qos.LATCHED if is_latched else Qos.STATE
-                self._ends[Advertise, topic] = self._bus.publisher(NAME, topic, message, qos)
-            case Unsubscribe(topic):
-                self._withdraw(self._ends.pop((Subscribe, topic)))
-            case Unadvertise(topic):
-                self._withdraw(self._ends.pop((Advertise, topic)))
-            case Publish(topic, message):
-                self._ends[Advertise, topic](message)
-            case ServiceCall():
+                self._ends[protocol.Advertise, topic] = self._bus.publisher(NAME, topic, message, qos)
+            case protocol.Withdraw(kind, name):
+                self._withdraw(self._ends.pop((kind, name)))
+            case protocol.Publish(topic, message):
+                self._ends[protocol.Advertise, topic](message)
+            case protocol.ServiceCall():
                 self._call(request)
-            case Serve(service, type_):
+            case protocol.Serve(service, type_):
                 self._serve(service, type_)
-            case Unserve(service):
-                self._withdraw(self._ends.pop((Serve, service)))
-            case ServeAction(action, type_):
+            case protocol.ServeAction(action, type_):
                 self._serve_action(action, type_)
-            case UnserveAction(action):
-                self._withdraw(self._ends.pop((ServeAction, action)))
-            case GoalFeedback(number, feedback):
+            case protocol.GoalFeedback(number, feedback):
                 self._goals_of_clients[number].feedback(feedback)
-            case GoalEnd():
+            case protocol.GoalEnd():
                 self._end_goal(request)
-            case ServiceAnswer(number, response, error):
+            case protocol.ServiceAnswer(number, response, error):
                 asked = self._asked_of_clients.pop(number)
                 asked.fail(error) if response is None else asked.reply(response)
-            case SendGoal():
+            case protocol.SendGoal():
                 self._send_goal(request)
-            case CancelGoal(number):
+            case protocol.CancelGoal(number):
                 self._goals[number].cancel()
-            case AskRobot():
-                self._begin(self._ask_robot(request))
-            case CountMessages(number):
+            case protocol.AskRobot(number):
+                self._begin(self._pass_on(number, self._ask_robot, request))
+            case protocol.CountMessages(number):
                 self._loop.call_soon(self._count_messages, number)
-            case TailLog():
-                self._begin(self._read_log(request))
-            case ReadTested(number, mission):
-                self._begin(self._read_tested(number, mission))
-            case EditMission(number, asked):
-                self._begin(self._edit_mission(number, asked))
-            case SaveSettings():
-                self._begin(self._save(request))
-            case Watch():
+            case protocol.TailLog(number, after):
+                self._begin(self._pass_on(number, self._read_log, after))
+            case protocol.ReadTested(number, mission):
+                self._begin(self._pass_on(number, self._read_tested, mission))
+            case protocol.EditMission(number, asked):
+                self._begin(self._pass_on(number, self._edit_mission, asked))
+            case protocol.SaveSettings(number):
+                self._begin(self._pass_on(number, self._save, request))
+            case protocol.Watch():
                 self._stop_watching(request.window)
                 self._watches[request.window] = self._begin(self._watch(request))
-            case Unwatch(window):
+            case protocol.Unwatch(window):
                 self._stop_watching(window)
 
     def _subscribe(self, topic: str, message: type[Message]) -> None:
-        end = self._bus.subscribe(
-            NAME,
-            topic,
-            message,
-            Qos.LATCHED if self._graph.is_latched(topic) else Qos.STATE,
-            lambda arrived: self._bridge.arrived(topic, arrived, self._now, self._stamp),
-            max_rate=math.inf,
-            limits=BULK,
-            may_be_silent=True,
+        qos = Qos.LATCHED if topic in self._graph.view.latched else Qos.STATE
+        end = self._subscription(
+            topic, message, qos, lambda arrived: self._bridge.arrived(topic, arrived, self._now, self._stamp)
         )
         end.is_wanted = lambda: self._bridge.wants(topic, self._now)  # what comes too early is not decoded
-        self._ends[Subscribe, topic] = end
+        self._ends[protocol.Subscribe, topic] = end
+
+    def _subscription(self, topic: str, message: type[Message], qos: Qos, then: Callable[[Any], None]) -> Any:
+        return self._bus.subscribe(NAME, topic, message, qos, then, max_rate=math.inf, limits=BULK, may_be_silent=True)
 
     def _carry_out_further(self) -> None:
         """Do what something from the bus made necessary."""
@@ -964,7 +909,7 @@ class GatewaySession:
         """Serve Foxglove beside the page, as soon as the port is free; the page is served all the same."""
         robot = RobotAccess(
             listen=self._listen_raw,
-            is_latched=self._graph.is_latched,
+            is_latched=lambda topic: topic in self._graph.view.latched,
             publisher=self._publisher_soon,
             call=self._call_soon,
             full_name=resolve,
@@ -984,7 +929,7 @@ class GatewaySession:
         def offer() -> None:
             nonlocal timer
             timer = None
-            server.offer(self._graph.topics(), self._graph.services())
+            server.offer(self._graph.view.topics, self._graph.view.services)
 
         def changed() -> None:
             nonlocal timer
@@ -995,7 +940,7 @@ class GatewaySession:
 
     def _listen_raw(self, topic: str, take: Callable[[bytes], None]) -> Callable[[], None]:
         """Pass the bytes of a topic on, in the thread that brings them, first those that are latched."""
-        return self._hear(Qos.LATCHED if self._graph.is_latched(topic) else Qos.STATE, topic, take)
+        return self._hear(Qos.LATCHED if topic in self._graph.view.latched else Qos.STATE, topic, take)
 
     def _hear(self, qos: Qos, topic: str, take: Callable[[bytes], None]) -> Callable[[], None]:
         key = self._graph.key(topic, self._guest.domain)
@@ -1030,7 +975,7 @@ class GatewaySession:
                 future.set_exception(RuntimeError(reply.error))
 
         def call() -> None:
-            self._call(ServiceCall(0, service, type_, request, _PATIENCE), answered)
+            self._call(protocol.ServiceCall(0, service, type_, request, _PATIENCE), answered)
             self._pump()
 
         self._loop.call_soon_threadsafe(call)
@@ -1057,23 +1002,26 @@ class GatewaySession:
             self._ends[kind, name] = type_, end
         return end
 
-    def _call(self, request: ServiceCall, then: Callable[[Reply[Any]], None] | None = None) -> None:
+    def _call(self, request: protocol.ServiceCall, then: Callable[[Reply[Any]], None] | None = None) -> None:
         """Call a service as soon as its server is known to a client of it; the bridge takes the reply, or `then`."""
-        caller = self._client_of(ServiceCall, request.service, request.type, self._bus.client)
+        caller = self._client_of(protocol.ServiceCall, request.service, request.type, self._bus.client)
         deadline = self._now + request.timeout
 
         def answered(reply: Reply[Any]) -> None:
             self._bridge.answered(request.number, reply.response, reply.error)
             self._carry_out_further()
 
-        def attempt() -> None:
-            left = deadline - self._now
-            if caller.is_available or left <= 0:
-                caller(request.request, then or answered, timeout=max(_PAUSE, left))
-            else:
-                self._guest.scheduler.at(self._now + _PAUSE / 10, NAME, attempt)
+        def call() -> None:
+            caller(request.request, then or answered, timeout=max(_PAUSE, deadline - self._now))
 
-        attempt()
+        self._once(lambda: caller.is_available or self._now >= deadline, call)
+
+    def _once(self, is_ready: Callable[[], bool], do: Callable[[], None]) -> None:
+        """Do something as soon as it can be done."""
+        if is_ready():
+            do()
+        else:
+            self._guest.scheduler.at(self._now + _PAUSE / 10, NAME, partial(self._once, is_ready, do))
 
     def _serve(self, service: str, type_: type[Service[Any, Any]]) -> None:
         def requested(asked: ServedRequest[Any, Any]) -> None:
@@ -1082,7 +1030,7 @@ class GatewaySession:
             self._bridge.requested(service, self._requests_so_far, asked.message)
             self._carry_out_further()
 
-        self._ends[Serve, service] = self._bus.serve_later(NAME, service, type_, requested)
+        self._ends[protocol.Serve, service] = self._bus.serve_later(NAME, service, type_, requested)
 
     def _serve_action(self, action: str, type_: type[Action[Any, Any, Any]]) -> None:
         server: ActionServer[Any, Any, Any] = self._bus.serve_action(NAME, action, type_, lambda goal: "")
@@ -1094,9 +1042,9 @@ class GatewaySession:
                 self._bridge.goal_came(action, self._requests_so_far, server.current.request)
 
         server.began, server.canceling = began, partial(self._bridge.goal_unwanted, action)
-        self._ends[ServeAction, action] = server
+        self._ends[protocol.ServeAction, action] = server
 
-    def _end_goal(self, end: GoalEnd) -> None:
+    def _end_goal(self, end: protocol.GoalEnd) -> None:
         goal = self._goals_of_clients.pop(end.number)
         match end.outcome:
             case Outcome.SUCCEEDED:
@@ -1106,10 +1054,10 @@ class GatewaySession:
             case _:
                 goal.aborted(end.reason, end.result)
 
-    def _send_goal(self, request: SendGoal) -> None:
+    def _send_goal(self, request: protocol.SendGoal) -> None:
         """Send a goal as soon as the server of its action is known to a client of it."""
         number = request.number
-        caller = self._client_of(SendGoal, request.action, request.type, self._bus.action_client)
+        caller = self._client_of(protocol.SendGoal, request.action, request.type, self._bus.action_client)
         deadline = self._now + _PATIENCE
         unsent = self._goals[number] = _Unsent()
 
@@ -1117,32 +1065,32 @@ class GatewaySession:
             del self._goals[number]
             self._bridge.ended(number, end)
 
-        def attempt() -> None:
+        def send() -> None:
             if unsent.is_cancelled:
                 ended(Ended(Outcome.CANCELED, message="canceled before it was sent"))
             elif caller.is_available:
                 feedback = partial(self._bridge.fed_back, number) if request.wants_feedback else None
                 self._goals[number] = caller(request.goal, ended, feedback)
-            elif self._now > deadline:
-                ended(Ended(Outcome.LOST, message=f"the server of '{request.action}' does not answer"))
             else:
-                self._guest.scheduler.at(self._now + _PAUSE / 10, NAME, attempt)
+                ended(Ended(Outcome.LOST, message=f"the server of '{request.action}' does not answer"))
 
-        attempt()
+        self._once(lambda: unsent.is_cancelled or caller.is_available or self._now > deadline, send)
 
-    async def _ask_robot(self, request: AskRobot) -> None:
-        """Send a request as the command line does."""
-        if request.request is STOP:
-            answer, refusal = await self._stop(request.who)
-        else:
-            answer, refusal = await self._asked(request.request, request.role, request.who)
-        self._bridge.robot_answered(request.number, answer, refusal)
+    async def _pass_on(self, number: int, ask: Callable[[Any], Awaitable[tuple[Any, str]]], request: object) -> None:
+        """Pass the answer to a request to the bridge, or the reason why there is none."""
+        self._bridge.robot_answered(number, *await ask(request))
         self._pump()
+
+    def _ask_robot(self, request: protocol.AskRobot) -> Awaitable[tuple[Any, str]]:
+        """Send a request as the command line does."""
+        if request.request is protocol.STOP:
+            return self._stop(request.who)
+        return self._asked(request.request, request.role, request.who)
 
     async def _stop(self, who: str) -> tuple[Any, str]:
         """Stop the robot, also if its supervisor is slow; return what it answers, or why it did not stop."""
-        self._note(f"{who}: asks {STOP['type']}")
-        answer, refusal = await self._answer(STOP, self._stopping)
+        self._note(f"{who}: asks {protocol.STOP['type']}")
+        answer, refusal = await self._answer(protocol.STOP, self._stopping)
         if refusal:
             ask = partial(self._guest.ask, stop_key(self._folder.path.name), _STOPPED)
             stopped = await self._loop.run_in_executor(self._stopping, ask)
@@ -1152,24 +1100,22 @@ class GatewaySession:
 
     def _count_messages(self, number: int) -> None:
         """Answer with the rates since somebody asked last, and count on for a while."""
-        self._bridge.robot_answered(number, self._rates.look(self._graph.topics(), self._now))
+        self._bridge.robot_answered(number, self._rates.look(self._graph.view.topics, self._now))
         if self._rates_timer is not None:
             self._rates_timer.cancel()
         self._rates_timer = self._loop.call_later(KEPT, self._rates.rest)
         self._pump()
 
-    async def _read_log(self, request: TailLog) -> None:
-        answer = await asyncio.to_thread(tail, self._folder.path / LOG, request.after)
-        if request.after == 0:
+    async def _read_log(self, after: int) -> tuple[Any, str]:
+        answer = await asyncio.to_thread(tail, self._folder.path / LOG, after)
+        if after == 0:
             answer["findings"] = findings(self._folder.path / FINDINGS)
-        self._bridge.robot_answered(request.number, answer)
-        self._pump()
+        return answer, ""
 
-    async def _read_tested(self, number: int, mission: str) -> None:
-        self._bridge.robot_answered(number, await asyncio.to_thread(read_tested, self.config.robot, mission))
-        self._pump()
+    async def _read_tested(self, mission: str) -> tuple[Any, str]:
+        return await asyncio.to_thread(read_tested, self.config.robot, mission), ""
 
-    async def _save(self, request: SaveSettings) -> None:
+    async def _save(self, request: protocol.SaveSettings) -> tuple[Any, str]:
         """Save as the command line does, in a process of its own: it needs the whole compiler."""
         trial = ("--dry-run",) if request.is_trial else ("--only-as", request.seen) if request.seen else ()
         robot = ("--robot", self._folder.path.name)
@@ -1179,19 +1125,16 @@ class GatewaySession:
             try:
                 done = await asyncio.to_thread(run)
                 answer = json.loads(done.stdout) if done.returncode == 0 else None
-                refusal = "" if answer is not None else done.stderr.strip() or done.stdout.strip()
+                return answer, "" if answer is not None else done.stderr.strip() or done.stdout.strip()
             except (subprocess.TimeoutExpired, ValueError) as error:
-                answer, refusal = None, f"it was not saved: {type(error).__name__}"
-        self._bridge.robot_answered(request.number, answer, refusal)
-        self._pump()
+                return None, f"it was not saved: {type(error).__name__}"
 
-    async def _edit_mission(self, number: int, request: Mapping[str, Any]) -> None:
+    async def _edit_mission(self, request: Mapping[str, Any]) -> tuple[Any, str]:
         process = self._trier if request["do"].startswith(_LONG) else self._editor
         answer, refusal = await process.ask(request)
         if isinstance(answer, dict) and isinstance(model := answer.get("model"), dict):
             answer["model"] = await asyncio.to_thread(self._candidates.add, model["urdf"], model["meshes"])
-        self._bridge.robot_answered(number, answer, refusal)
-        self._pump()
+        return answer, refusal
 
     async def _asked(
         self, request: Mapping[str, Any], role: Role, who: str = "", *, may_change: bool = True
@@ -1221,7 +1164,7 @@ class GatewaySession:
         for each in described or ():
             self._is_command |= each["requests"]
 
-    async def _watch(self, watch: Watch) -> None:
+    async def _watch(self, watch: protocol.Watch) -> None:
         """Look at the robot again and again; nobody else looks."""
         while True:
             is_due = asyncio.Event()

@@ -68,19 +68,14 @@ class ConsoleModel(Config):
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     if (read := contents.of(console)) is None:
         return
-    name, about = (_text(contents.root, key) for key in _HEAD)
+    name, about = (_text(contents.root, key) for key in ("name", "about"))
     components: Mapping[str, RobotComponent] = wiring.components
     namespace = contents.of(bus).namespace or ""
     config = {
         "robot": name,
         "about": about,
-        "port": read.port,
-        "listen": read.listen,
-        "origins": read.origins,
+        **{key: getattr(read, key) for key in ("port", "listen", "origins", "guard", "pages", "first_page")},
         "foxglove": FOXGLOVE_PORT if read.foxglove is True else int(read.foxglove),
-        "guard": read.guard,
-        "pages": read.pages,
-        "first_page": read.first_page,
         **_drive(read.drive, components, namespace),
         "camera": _camera(read.drive.camera, components, namespace),
         "values": _values(contents, components, namespace),
@@ -88,9 +83,6 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         **_body(contents),
     }
     yield WantedComponent(GATEWAY, GATEWAY, config, ("console",))
-
-
-_HEAD = ("name", "about")
 
 
 def _text(node: TreeNode | None, key: str) -> str:
@@ -142,23 +134,27 @@ def _camera(written: str | None, components: Mapping[str, RobotComponent], names
 
 def _free(components: Mapping[str, RobotComponent], driven: PortEnd) -> str:
     """Return the topic of the input `teleop` of the mux that commands this end, else its own topic."""
-    for mux in components.values():
-        for forwards in mux.declared(Forwards):
-            output, teleop = mux.end(forwards.output), mux.end(_TELEOP)
-            if output and teleop and output.topic == driven.topic and _TELEOP in forwards.inputs:
-                return teleop.topic
+    for mux, forwards in _muxes(components, driven):
+        if (teleop := mux.end(_TELEOP)) and _TELEOP in forwards.inputs:
+            return teleop.topic
     return driven.topic
 
 
 def _on_the_way(components: Mapping[str, RobotComponent], driven: PortEnd) -> set[str]:
     """Return the topics by which velocities come to this end: its own, and those of the inputs of its mux."""
     found = {driven.topic}
+    for mux, forwards in _muxes(components, driven):
+        inputs = filter(None, map(mux.end, forwards.inputs))
+        found |= {end.topic for end in inputs if end.type_name == driven.type_name}
+    return found
+
+
+def _muxes(components: Mapping[str, RobotComponent], driven: PortEnd) -> Iterator[tuple[RobotComponent, Forwards]]:
+    """Yield the muxes that command this end."""
     for mux in components.values():
         for forwards in mux.declared(Forwards):
             if (output := mux.end(forwards.output)) is not None and output.topic == driven.topic:
-                inputs = filter(None, map(mux.end, forwards.inputs))
-                found |= {end.topic for end in inputs if end.type_name == driven.type_name}
-    return found
+                yield mux, forwards
 
 
 def _least(written: float | None, of_base: Setting[float] | None) -> float:

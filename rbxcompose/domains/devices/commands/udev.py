@@ -13,6 +13,7 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -51,16 +52,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     words = f"the group that may open the devices (default: {udev.GROUP})"
     group = argument("--group", type=_group, default=udev.GROUP, metavar="NAME", help=words)
     yes = argument("-y", "--yes", action="store_true", help="do not ask")
+    check = "report whether the devices of a robot are plugged in, named and open to you"
     install = "show the rules that would be written below /etc/udev/rules.d, ask, and write them"
-    table: tuple[tuple[str, str, Do, tuple[Declare, ...]], ...] = (
+    rows: tuple[tuple[str, str, Do, tuple[Declare, ...]], ...] = (
         ("scan", "list the serial ports that are plugged in, and write entries for new ones", _scan, ()),
-        ("generate", "print the rules of udev for the devices of a robot", _generate, (group,)),
-        ("check", "report whether the devices of a robot are plugged in, named and open to you", _check, (group,)),
-        ("install", install, _install, (group, yes)),
+        ("generate", "print the rules of udev for the devices of a robot", partial(_with_devices, _generate), (group,)),
+        ("check", check, partial(_with_devices, _check), (group,)),
+        ("install", install, partial(_with_devices, _install), (group, yes)),
     )
     add_actions(
         parser,
-        (Subcommand(name, item, do, (*shared, *own), f"{item[0].upper()}{item[1:]}.") for name, item, do, own in table),
+        (Subcommand(name, item, do, (*shared, *own), f"{item[0].upper()}{item[1:]}.") for name, item, do, own in rows),
     )
 
 
@@ -102,9 +104,10 @@ def _group(text: str) -> str:
     return text
 
 
-def devices_of(arguments: argparse.Namespace) -> RobotDevices | None:
-    """Return the devices of the robot that is meant; None after telling why there are none."""
-    return read_devices(robot_path(arguments.path), arguments)
+def _with_devices(do: Callable[[argparse.Namespace, RobotDevices], int], arguments: argparse.Namespace) -> int:
+    """Do something with the devices of the robot that is meant, unless it has errors, which are reported."""
+    found = read_devices(robot_path(arguments.path), arguments)
+    return do(arguments, found) if found is not None and found.is_right else console.FINDINGS
 
 
 def read_devices(path: str, arguments: argparse.Namespace) -> RobotDevices | None:
@@ -123,13 +126,10 @@ def read_devices(path: str, arguments: argparse.Namespace) -> RobotDevices | Non
 
 
 def _scan(arguments: argparse.Namespace) -> int:
-    found = RobotDevices("", {}, {}, is_right=True)
     path = arguments.path if arguments.path is not None else _own()
-    if path is not None:
-        read = read_devices(path, arguments)
-        if read is None:
-            return console.FINDINGS
-        found = read
+    found = RobotDevices("", {}, {}, is_right=True) if path is None else read_devices(path, arguments)
+    if found is None:
+        return console.FINDINGS
     ports = serial_ports(arguments.root)
     named = [device for device, _ in found.named.values()]
     if arguments.json:
@@ -195,11 +195,7 @@ def _data(port: SerialPort, ports: Sequence[SerialPort], named: Sequence[UsbDevi
     return {
         "path": port.path,
         "links": list(port.names),
-        "vendor": own.vendor,
-        "product": own.product,
-        "serial": own.serial,
-        "usb_port": own.usb_port,
-        "interface": own.interface,
+        **{key: getattr(own, key) for key in ("vendor", "product", "serial", "usb_port", "interface")},
         "driver": port.driver,
         "about": port.about,
         "devices": udev.names_of(port, named),
@@ -207,19 +203,13 @@ def _data(port: SerialPort, ports: Sequence[SerialPort], named: Sequence[UsbDevi
     }
 
 
-def _generate(arguments: argparse.Namespace) -> int:
-    found = devices_of(arguments)
-    if found is None or not found.is_right:
-        return console.FINDINGS
+def _generate(arguments: argparse.Namespace, found: RobotDevices) -> int:
     rules = found.rules(arguments.group)
     console.emit(json.dumps({"file": f"/{found.file}", "rules": rules}) if arguments.json else rules.rstrip("\n"))
     return 0
 
 
-def _check(arguments: argparse.Namespace) -> int:
-    found = devices_of(arguments)
-    if found is None or not found.is_right:
-        return console.FINDINGS
+def _check(arguments: argparse.Namespace, found: RobotDevices) -> int:
     ports = serial_ports(arguments.root)
     rules = udev.rules_answer(found.rules(arguments.group), installed(arguments.root / found.file), f"/{found.file}")
     are_right = isinstance(rules, str)
@@ -244,10 +234,7 @@ def installed(file: Path) -> str | None:
         return None
 
 
-def _install(arguments: argparse.Namespace) -> int:
-    found = devices_of(arguments)
-    if found is None or not found.is_right:
-        return console.FINDINGS
+def _install(arguments: argparse.Namespace, found: RobotDevices) -> int:
     if not found.named:
         return console.refuse(
             NO_DEVICES.at(None, f"the robot '{found.robot}' has no devices, so there are no rules to write")

@@ -62,6 +62,12 @@ _AXES: Mapping[AxisName, tuple[int, int]] = {  # with a right stick that is RX a
     "pad_x": (ABS_HAT0X, ABS_HAT0X),
     "pad_y": (ABS_HAT0Y, ABS_HAT0Y),
 }
+FOLDER = Path("/dev/input")
+JOIN_GROUP = 'sudo usermod -aG input $USER, then log in again; or a udev rule with TAG+="uaccess"'
+_PREFIX = "event"
+_MOST = 16  # reads of 64 events each in one go: a device that floods holds nothing up, and the kernel drops the rest
+_WAIT = 0.008  # [s] of a step in which it waits for events, in real time
+_AGAIN = 1.0  # [s] between two looks for a gamepad that is not there
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,12 +208,6 @@ class HeldDrive:
         return wanted
 
 
-FOLDER = Path("/dev/input")
-JOIN_GROUP = 'sudo usermod -aG input $USER, then log in again; or a udev rule with TAG+="uaccess"'
-_PREFIX = "event"
-_MOST = 16  # reads of 64 events each in one go: a device that floods holds nothing up, and the kernel drops the rest
-
-
 class NoGamepadError(Exception):
     """Raised when there is no gamepad to open, with the reason and what helps; `is_wrong` if waiting does not."""
 
@@ -261,10 +261,10 @@ class EventPad:
         self.state.read_anew(axes, self._device.active_keys())
 
 
-def listing(folder: Path | None = None) -> tuple[tuple[str, int], ...]:
+def listing() -> tuple[tuple[str, int], ...]:
     """Return the input devices that are there now, each with when it or its rights changed: cheap to compare."""
     try:
-        with os.scandir(folder or FOLDER) as entries:
+        with os.scandir(FOLDER) as entries:
             found = [(entry.path, entry.stat().st_ctime_ns) for entry in entries if entry.name.startswith(_PREFIX)]
     except OSError:
         return ()  # none was ever plugged in, or it went meanwhile
@@ -328,10 +328,6 @@ def _layout(device: InputDevice[str]) -> PadLayout:
     found: dict[int, list[Any]] = dict(device.capabilities())  # evdev's own type says nothing of ranges
     axes = {code: (info.min, info.max) for code, info in found.get(EV_ABS, ())}
     return PadLayout(axes, tuple(found.get(EV_KEY, ())))
-
-
-_WAIT = 0.008  # [s] of a step in which it waits for events, in real time
-_AGAIN = 1.0  # [s] between two looks for a gamepad that is not there
 
 
 def _event_device(text: str) -> str:

@@ -125,7 +125,10 @@ def _reading(sentence: Sentence) -> BoardReading:
     return BoardReading(quaternion_from_rpy(roll, -pitch, math.pi / 2 - yaw), (wx, -wy, -wz), (ax, -ay, -az))
 
 
-_DECODERS = {"witmotion": WitmotionDecoder, "vectornav": VectornavDecoder}
+_DECODERS: dict[str, type[WitmotionDecoder | VectornavDecoder]] = {
+    "witmotion": WitmotionDecoder,
+    "vectornav": VectornavDecoder,
+}
 
 
 class ImuConfig(SerialConfig):

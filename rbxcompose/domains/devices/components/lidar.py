@@ -29,6 +29,7 @@ LENGTH = _PACKET.size  # 47 [B]
 _TURN = 36_000  # [0.01 deg]
 _WIDEST = 3_000  # [0.01 deg] that a packet can span at any speed of the motor
 Ranges = NDArray[np.float32]
+_SLOWEST = 5.0  # [Hz] of turns; it is made for 10
 
 
 def crc8(data: bytes) -> int:
@@ -150,9 +151,6 @@ class TurnMaker:
         known = self._ranges[ray]
         if np.isnan(known) or distance < known:
             self._ranges[ray], self._strengths[ray] = distance, strength
-
-
-_SLOWEST = 5.0  # [Hz] of turns; it is made for 10
 
 
 class LidarConfig(SerialConfig):

@@ -26,6 +26,8 @@ _REASON = 200  # characters of what a program complains of
 
 Pipeline = Sequence[Sequence[str]]
 """Commands, each a list of words, of which each reads what the one before it writes."""
+_SLOWEST = 3.0  # times the usual duration, and as many seconds, after which a program is taken for stuck
+SaidGoal = sdk.ServedGoal[Say.Goal, Say.Result, Say.Feedback]
 
 
 def duration_of(words: str) -> float:
@@ -112,10 +114,6 @@ class Utterance:
             if process.stdout is not None:
                 process.stdout.close()
         self._complaints.close()
-
-
-_SLOWEST = 3.0  # times the usual duration, and as many seconds, after which a program is taken for stuck
-SaidGoal = sdk.ServedGoal[Say.Goal, Say.Result, Say.Feedback]
 
 
 class VoiceConfig(sdk.Config):

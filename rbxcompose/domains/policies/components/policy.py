@@ -1,22 +1,26 @@
-"""A network of the user that commands joints or the base."""
+"""A network of the user that commands joints or the base: its file in ONNX, what it observes, what it may answer."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import field
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
 from rbxcompose import sdk
-from rbxcompose.base.config import LocalFiles
+from rbxcompose.base.config import JointName, LocalFiles
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import NotRegularError, TooLargeError, read_regular
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.policies.core import AnswerLimits, PolicyCore
-from rbxcompose.domains.policies.network import PolicyNetwork, PolicyNetworkError
-from rbxcompose.domains.policies.observation import JOINT_STATE, NothingObservedError, ObservationConfig, observed
-from rbxcompose.manifest.fields import TopicName
+from rbxcompose.manifest.fields import FieldPath, TopicName
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.arrays import filled
+from rbxcompose.msgs.fields import NoFieldError, field_type
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.stamps import to_duration
 from rbxcompose.msgs.std_msgs import Float64MultiArray
@@ -25,10 +29,95 @@ from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoin
 from rbxcompose.msgs.types import Message
 from rbxcompose.sdk.ports import BULK
 
+LARGEST = 512 * 1024 * 1024  # [B] of a network
+ROUNDING = 1e-6  # of a limit, by which a number of 32 bits may be beyond it
+JOINT_STATE = "sensor_msgs/msg/JointState"
+OF_JOINTS = ("position", "velocity", "effort")
+MOST_NUMBERS = 10_000  # of one field
 JOINTS, NUMBERS, VELOCITY = JointTrajectory.TYPE, Float64MultiArray.TYPE, Twist.TYPE
 MESSAGES: Mapping[str, type[Message]] = {JOINTS: JointTrajectory, NUMBERS: Float64MultiArray, VELOCITY: Twist}
 AXES = tuple(f"{kind}.{axis}" for kind in ("linear", "angular") for axis in "xyz")
 PERIODS = 2.0  # of the rate, in which joints arrive if nothing else is said
+
+
+class PolicyNetworkError(ValueError):
+    """Raised for a file that is no network of a policy, and for one that fails."""
+
+
+class PolicyNetwork:
+    """A network with one vector as its input, and one as its first output: both of the shape N or 1xN, of floats."""
+
+    def __init__(self, path: Path) -> None:
+        """Load it.
+
+        Raises:
+            PolicyNetworkError: if the file is no such network.
+        """
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.log_severity_level = 4  # what goes wrong is raised
+        data = read_network(path)
+        try:
+            self._session: Any = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+        except Exception as error:  # its errors have no common class
+            raise PolicyNetworkError(f"'{path.name}' is no network in ONNX: {_first_line(error)}") from error
+        inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
+        if len(inputs) != 1:
+            raise PolicyNetworkError(f"it has {len(inputs)} inputs, and not one vector")
+        self._input, self._output = inputs[0].name, outputs[0].name
+        self._is_batch = len(inputs[0].shape) == 2
+        self.takes = _length(inputs[0], "input")
+        """How many numbers it takes; None if it does not say."""
+        self.gives = _length(outputs[0], "output")
+        """How many numbers it gives; None if it does not say."""
+
+    def answer(self, vector: Sequence[float]) -> list[float]:
+        """Return its answer to an observation.
+
+        Raises:
+            PolicyNetworkError: if it cannot be computed.
+        """
+        import numpy as np
+
+        given = np.asarray([vector] if self._is_batch else vector, np.float32)
+        try:
+            found = self._session.run([self._output], {self._input: given})[0]
+        except Exception as error:  # its errors have no common class
+            raise PolicyNetworkError(f"the network fails: {_first_line(error)}") from error
+        return [float(value) for value in np.ravel(found)]
+
+
+def read_network(path: Path) -> bytes:
+    """Return the contents of a file.
+
+    Raises:
+        PolicyNetworkError: if there is none, or it cannot be read.
+    """
+    try:
+        return read_regular(path, LARGEST)
+    except FileNotFoundError:
+        raise PolicyNetworkError(f"there is no file '{path}'") from None
+    except (NotRegularError, TooLargeError) as error:
+        raise PolicyNetworkError(f"'{path.name}' cannot be used: {error}") from None
+    except OSError as error:
+        raise PolicyNetworkError(f"'{path.name}' cannot be read: {error.strerror}") from None
+
+
+def _length(end: Any, what: str) -> int | None:
+    shape = end.shape
+    is_vector = len(shape) == 1 or (len(shape) == 2 and (shape[0] == 1 or not isinstance(shape[0], int)))
+    if end.type != "tensor(float)" or not is_vector:
+        written = "x".join(map(str, shape)) or "nothing"
+        raise PolicyNetworkError(
+            f"its {what} '{end.name}' is {end.type} of the shape {written}, and not floats N or 1xN"
+        )
+    return shape[-1] if isinstance(shape[-1], int) else None
+
+
+def _first_line(error: Exception) -> str:
+    return next(iter(str(error).splitlines()), type(error).__name__)[:120]
 
 
 class PolicyOutputConfig(sdk.Config):
@@ -47,6 +136,150 @@ class PolicyOutputConfig(sdk.Config):
         if "least" in info.data and most < info.data["least"]:
             raise ValueError(f"it is below 'least', {info.data['least']:g}")
         return most
+
+
+@dataclass(slots=True)
+class PolicyCore:
+    """Judges answers, and says when what is commanded must rest."""
+
+    limits: Mapping[str, PolicyOutputConfig]
+    """By the name of each number of an answer, in its order."""
+    deadline: float
+    """[s] from an observation to its command, and from the last command until rest."""
+    counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(("sent", "late", "refused", "unseen"), 0))
+    """What became of answers since the policy was configured; `unseen` are times with nothing to observe."""
+    last: tuple[float, ...] | None = None
+    """What is sent; None at first, and after a rest."""
+    sent_at: float = -math.inf
+
+    def judge(self, answer: Sequence[float], start: Sequence[float], began: float, ended: float) -> str:
+        """Return why an answer must not be sent, or nothing: then `last` is to be sent.
+
+        `start` is where the first answer begins; times [s] are those of the observation and of the answer.
+        """
+        took = ended - began
+        if took > self.deadline:
+            self.counts["late"] += 1
+            return f"an answer took {took * 1e3:.0f} ms, and is late after {self.deadline * 1e3:.0f} ms"
+        if problem := self._problem(answer, start if self.last is None else self.last):
+            self.counts["refused"] += 1
+            return problem
+        pairs = zip(self.limits.values(), answer, strict=True)
+        self.last, self.sent_at = tuple(min(max(value, limits.least), limits.most) for limits, value in pairs), ended
+        self.counts["sent"] += 1
+        return ""
+
+    def _problem(self, answer: Sequence[float], before: Sequence[float]) -> str:
+        if len(answer) != len(self.limits):
+            return f"an answer has {len(answer)} numbers, and not {len(self.limits)}"
+        for (name, limits), value, old in zip(self.limits.items(), answer, before, strict=True):
+            if not math.isfinite(value):
+                return f"'{name}' is not finite"
+            if not limits.least - _slack(limits.least) <= value <= limits.most + _slack(limits.most):
+                return f"'{name}' is {value:.4g}, beyond {limits.least:g} to {limits.most:g}"
+            if abs(value - old) > limits.jump + _slack(limits.jump, value):
+                return f"'{name}' jumps from {old:.4g} to {value:.4g}, by more than {limits.jump:g}"
+        return ""
+
+    def must_rest(self, now: float) -> bool:
+        """Return whether what is commanded must rest now: its last command was good too long ago; once."""
+        if self.last is None or now - self.sent_at <= self.deadline:
+            return False
+        self.last = None
+        return True
+
+    def forget(self) -> bool:
+        """Start again with the next answer; return whether something is commanded that must rest."""
+        is_moving, self.last = self.last is not None, None
+        return is_moving
+
+
+def _slack(*values: float) -> float:
+    return ROUNDING * max(map(abs, values))
+
+
+class NothingObservedError(Exception):
+    """Raised when a message does not have the numbers that are observed."""
+
+
+class ObservationConfig(sdk.Config):
+    """Numbers of one topic."""
+
+    topic: TopicName
+    """Where they come from."""
+    message: sdk.MessageName = JOINT_STATE
+    """The type of the topic."""
+    joints: list[JointName] = []
+    """The joints, in their order; only of joint states."""
+    size: int = Field(1, ge=1, le=MOST_NUMBERS)
+    """How many numbers each field has, if it is a list and not of joints."""
+    fields: list[FieldPath] = Field(["position"], min_length=1, validate_default=True)
+    """The fields in their order, such as `twist.twist.linear.x`: of joints each field of all joints, then the next."""
+    timeout: sdk.Time = Field(0.5, gt=0)
+    """A message that is older counts for nothing, and the policy gives no answer."""
+
+    @field_validator("joints")
+    @classmethod
+    def _of_joint_states(cls, joints: list[str], info: ValidationInfo) -> list[str]:
+        if joints and info.data.get("message", JOINT_STATE) != JOINT_STATE:
+            raise ValueError(f"only {JOINT_STATE} has joints")
+        if len(set(joints)) < len(joints):
+            raise ValueError("a joint is there twice")
+        return joints
+
+    @field_validator("fields")
+    @classmethod
+    def _are_numbers(cls, fields: list[str], info: ValidationInfo) -> list[str]:
+        message = info.data.get("message")
+        for path in fields if message else ():
+            if info.data.get("joints") and path not in OF_JOINTS:
+                context = {"name": path, "valid": OF_JOINTS, "what": "fields of joints"}
+                raise PydanticCustomError("field", "a joint has no field '{name}'", context)
+            _require_numbers(str(message), path)
+        return fields
+
+    @property
+    def length(self) -> int:
+        """Return how many numbers it is."""
+        return len(self.fields) * (len(self.joints) or self.size)
+
+
+def _require_numbers(message: str, path: str) -> None:
+    try:
+        found = field_type(message, path)
+    except NoFieldError as error:
+        context = {"name": error.name, "valid": tuple(error.fields), "what": f"'message' is {message}, with the fields"}
+        raise PydanticCustomError("field", f"{error.message} has no field '{{name}}'", context) from None
+    if found.is_message or found.base in ("string", "wstring"):
+        raise PydanticCustomError("field", "'{path}' is a {type}, not numbers", {"path": path, "type": str(found)})
+
+
+def observed(config: ObservationConfig, message: Any) -> list[float]:
+    """Return the numbers of a message.
+
+    Raises:
+        NothingObservedError: if it does not have them.
+    """
+    return list(_of_joints(config, message) if config.joints else _of_fields(config, message))
+
+
+def _of_joints(config: ObservationConfig, message: Any) -> Iterator[float]:
+    places = {name: place for place, name in enumerate(message.name)}
+    for path in config.fields:
+        values: Sequence[float] = getattr(message, path)
+        for joint in config.joints:
+            if (place := places.get(joint)) is None or place >= len(values):
+                raise NothingObservedError(f"'{config.topic}' has no {path} of '{joint}'")
+            yield float(values[place])
+
+
+def _of_fields(config: ObservationConfig, message: Any) -> Iterator[float]:
+    for path in config.fields:
+        found = attrgetter(path)(message)
+        values = [found] if isinstance(found, int | float) else list(found)
+        if len(values) != config.size:
+            raise NothingObservedError(f"'{path}' of '{config.topic}' has {len(values)} numbers, and not {config.size}")
+        yield from map(float, values)
 
 
 class PolicyCommandsConfig(sdk.Config):
@@ -175,11 +408,7 @@ class Policy(sdk.Component[PolicyConfig]):
     def configure(self) -> None:
         """Load the network; if it is none, that is reported."""
         config = self.config
-        limits = {
-            name: AnswerLimits(output.least, output.most, output.jump)
-            for name, output in config.commands.outputs.items()
-        }
-        self.core = PolicyCore(limits, config.deadline)
+        self.core = PolicyCore(config.commands.outputs, config.deadline)
         self.observations = _observed(config)
         self.newest: dict[str, tuple[float, Any]] = {}
         self.is_on, self.problem = False, ""
@@ -220,8 +449,7 @@ class Policy(sdk.Component[PolicyConfig]):
         words = problem or ("sends" if self.is_on else "is off")
         is_silent = bool(problem) and self.core.last is None
         level = Level.ERROR if is_silent else Level.WARN if problem else Level.OK
-        counts = self.core.counts
-        self.status(level, words, sent=counts.sent, late=counts.late, refused=counts.refused, unseen=counts.unseen)
+        self.status(level, words, **self.core.counts)
 
     def ask(self, network: PolicyNetwork) -> str:
         """Send the answer to what is observed now; return why not, or nothing."""
@@ -229,12 +457,12 @@ class Policy(sdk.Component[PolicyConfig]):
         try:
             parts = self.observe(began)
         except NothingObservedError as error:
-            self.core.counts.unseen += 1
+            self.core.counts["unseen"] += 1
             return str(error)
         try:
             answer = network.answer([number for part in parts for number in part])
         except PolicyNetworkError as error:
-            self.core.counts.refused += 1
+            self.core.counts["refused"] += 1
             return str(error)
         if self.context.is_stopped:
             return "the robot is stopped"

@@ -17,37 +17,33 @@ from typing import Any
 
 from rbxcompose.base.requests import OutsideError
 from rbxcompose.bus.names import Attachment, data_key, dds_type
-from rbxcompose.bus.tokens import EntityKind, NodeToken, gid
+from rbxcompose.bus.tokens import NodeToken, gid
 from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, Closable, Question, RemotePublisher, TransportReply
 from rbxcompose.bus.wire import SERVICE_QOS, WireProfile, ros_qos
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
 from rbxcompose.domains.programs.bridge import link
-from rbxcompose.domains.programs.bridge.ends import BridgedEnd
-from rbxcompose.domains.programs.bridge.installation import RosInstallation
-from rbxcompose.domains.programs.child import Child, ProgramEnd, StartOrder, WrittenLine
+from rbxcompose.domains.programs.bridge.ends import TOKENS, ProgramEnd
+from rbxcompose.domains.programs.child import Child, StartOrder
+from rbxcompose.domains.programs.sections.ros2 import RosInstallation
 from rbxcompose.msgs.cdr import CdrError, decode, encode
 from rbxcompose.runtime.processes import describe_exit
 from rbxcompose.sdk.component import BusAddress
+from rbxcompose.sdk.ports import Qos
 
 ROS_SIDE = Path(__file__).with_name("ros_side.py")
 STARTS_WITHIN = 20.0  # [s] until ROS is there
 _MADE_WITHIN = 5.0  # [s] until ROS has what is to pass
 _LAST_WORDS = 1.0  # [s] for its process to end, which says more than a closed socket
+_DEEPEST = 1000  # messages that wait at ROS's side
 _ANSWER_WITHIN = 30.0  # [s] for a service; results of goals take as long as they take
-_TOKENS = {
-    ("topic", "from_ros"): EntityKind.PUBLISHER,
-    ("topic", "to_ros"): EntityKind.SUBSCRIPTION,
-    ("service", "to_ros"): EntityKind.SERVER,
-    ("service", "from_ros"): EntityKind.CLIENT,
-}
 
 
 class _Lane:
     """One end on our bus."""
 
-    def __init__(self, channel: int, end: BridgedEnd, key: str, own_gid: bytes) -> None:
+    def __init__(self, channel: int, end: ProgramEnd, key: str, own_gid: bytes) -> None:
         self.channel, self.end, self.key, self.gid = channel, end, key, own_gid
         self.sequence = count(1)
         self.publisher: RemotePublisher | None = None
@@ -97,7 +93,7 @@ class RosBridge:
             self.close()
             raise OutsideError(f"ROS 2 does not start ({installation.python}): {self.end or said}")
 
-    def add(self, component: str, ends: Iterable[BridgedEnd]) -> list[int]:
+    def add(self, component: str, ends: Iterable[ProgramEnd]) -> list[int]:
         """Let ends pass, in the name of a component; return their channels once ROS has them."""
         added: list[int] = []
         orders: list[dict[str, object]] = []
@@ -107,7 +103,7 @@ class RosBridge:
                 self._problems[channel] = deque(maxlen=20)
                 self._lanes[channel] = self._open(channel, component, end)
                 added.append(channel)
-                orders.append(end.for_ros(channel))
+                orders.append(_order(channel, end))
         self._link.event(add=orders)
         if not self._until(lambda: {*added} <= self._done, _MADE_WITHIN):
             for channel in added:
@@ -136,9 +132,9 @@ class RosBridge:
         with self._lock:
             for event in self._child.events():
                 match event:
-                    case WrittenLine(text):
+                    case "line", text:
                         self._heard.append(text)
-                    case ProgramEnd(status):
+                    case "ended", status:
                         last = f": {self._heard[-1]}" if self._heard else ""
                         self.end = f"the process in ROS's Python {describe_exit(status)}{last}"
             since = self._silent_since
@@ -162,24 +158,22 @@ class RosBridge:
 
     # The bus
 
-    def _open(self, channel: int, component: str, end: BridgedEnd) -> _Lane:
+    def _open(self, channel: int, component: str, end: ProgramEnd) -> _Lane:
         transport, domain, address = self._guest.transport, self._address.domain, self._address
         type_hash = self._wire.hash_of(end.interface)
         key = data_key(domain, end.name, end.interface.TYPE, type_hash)
         space = f"/{address.namespace.strip('/')}" if address.namespace else ""
         node = NodeToken(domain, transport.session, 0, component, space)
-        qos = ros_qos(end.qos) if end.kind == "topic" else SERVICE_QOS
+        qos = ros_qos(end.qos) if end.is_topic else SERVICE_QOS
         words = self._wire.qos_text(qos)
-        token = node.endpoint_key(
-            _TOKENS[(end.kind, end.way)], channel, end.name, dds_type(end.interface.TYPE), type_hash, words
-        )
+        token = node.endpoint_key(TOKENS[end.kind], channel, end.name, dds_type(end.interface.TYPE), type_hash, words)
         lane = _Lane(channel, end, key, gid(token))
-        if end.kind == "topic" and end.way == "from_ros":
+        if end.kind == "publishes":
             lane.publisher = transport.publisher(key, end.qos)
             lane.declared.append(lane.publisher)
-        elif end.kind == "topic":
+        elif end.kind == "subscribes":
             lane.declared.append(transport.subscribe(key, end.qos, partial(self._arrived, lane)))
-        elif end.way == "to_ros":
+        elif end.kind == "serves":
             lane.declared.append(transport.serve(key, partial(self._asked, lane)))
         lane.declared += [transport.announce(token)]
         return lane
@@ -243,6 +237,20 @@ class RosBridge:
             case {"problem": str(text), "channel": int(channel)}:
                 if (waiting := self._problems.get(channel)) is not None:
                     waiting.append(text)
+
+
+def _order(channel: int, end: ProgramEnd) -> dict[str, object]:
+    """Return what the other side needs to know of an end: a service of ROS is asked `to_ros`."""
+    return {
+        "channel": channel,
+        "name": end.name,
+        "kind": "topic" if end.is_topic else "service",
+        "way": "from_ros" if end.kind in ("publishes", "calls") else "to_ros",
+        "type": end.interface.TYPE,
+        "hash": end.interface.HASH,
+        "depth": min(end.qos.depth, _DEEPEST),
+        "latched": end.qos is Qos.LATCHED,
+    }
 
 
 def _exact(message: Any, payload: bytes) -> bytes:

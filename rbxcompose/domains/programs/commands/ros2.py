@@ -12,10 +12,14 @@ import argparse
 import json
 import os
 import subprocess
+from collections.abc import Iterator, Mapping
+from dataclasses import field
 from pathlib import Path
+from typing import Any
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
-from rbxcompose.base.findings import Fix, kind
+from rbxcompose.base.findings import Edit, Fix, Span, kind
 from rbxcompose.base.fixes import apply
 from rbxcompose.base.requests import OutsideError
 from rbxcompose.commands import options
@@ -23,17 +27,20 @@ from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, write_repo
 from rbxcompose.commands.messages import to_json
 from rbxcompose.commands.targets import add_path_argument, robot_path
 from rbxcompose.compiler.compile import Compilation, compile_robot
-from rbxcompose.domains.programs.bridge.installation import RosModel, installation_of
 from rbxcompose.domains.programs.bridge.ros_bridge import ROS_SIDE
-from rbxcompose.domains.programs.ros_nodes import KINDS, RosNode, edits_of
-from rbxcompose.domains.programs.sections.ros2 import ros2
-from rbxcompose.manifest.tree import FILE_BYTES, MappingNode, at
+from rbxcompose.domains.programs.sections.ros2 import RosModel, installation_of, ros2
+from rbxcompose.domains.programs.watch import OWN
+from rbxcompose.manifest.tree import FILE_BYTES, MappingNode, SequenceNode, TreeNode, at
 
 GROUP = "data"
 NO_ROS = kind("RBX9051")
 NO_NODE = kind("RBX9052")
 _LOOKS = 6.0  # [s] at most for discovery
 _MORE = 30.0  # [s] for ROS to start
+run = options.run_action
+_SEND_GOAL = "/_action/send_goal"
+KINDS = ("publishes", "subscribes", "serves", "calls", "serves_actions", "calls_actions")
+"""The keys of a component, in the order in which they are written."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,9 +63,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             ),
         ),
     )
-
-
-run = options.run_action
 
 
 def _scan(arguments: argparse.Namespace) -> int:
@@ -148,3 +152,101 @@ def _nodes(arguments: argparse.Namespace, compiled: Compilation | None) -> list[
         )
         raise NotDoneError(NO_ROS.at(None, f"ROS 2 does not start ({installation.python}): {last}", help=help_text))
     return [RosNode.of(name, found) for name, found in sorted(json.loads(ran.stdout).items())]
+
+
+@dataclass(frozen=True, slots=True)
+class RosNode:
+    """A node of ROS 2: types by name for each of `KINDS`, without what every node has; and which topics are latched."""
+
+    name: str
+    ends: Mapping[str, Mapping[str, str]]
+    latched: frozenset[str] = field(default_factory=frozenset)
+
+    @classmethod
+    def of(cls, name: str, found: Mapping[str, Any]) -> RosNode:
+        """Read what ROS's side says of it; a topic with several types counts with the first."""
+        ends: dict[str, dict[str, str]] = {key: {} for key in KINDS}
+        for key in ("publishes", "subscribes", "serves", "calls"):
+            for topic, types in found.get(key, {}).items():
+                if topic.endswith(_SEND_GOAL):
+                    action = types[0].replace("/action/", "/").removesuffix("_SendGoal")
+                    ends[f"{key}_actions"][topic.removesuffix(_SEND_GOAL)] = action
+                elif "/_action/" not in topic and not OWN.search(topic):
+                    ends[key][topic] = _short(types[0])
+        return cls(name, ends, frozenset(found.get("latched", ())) & ends["publishes"].keys())
+
+    def value(self, key: str, topic: str) -> str:
+        """Return what the manifest says of a topic, a service or an action."""
+        type_ = self.ends[key][topic]
+        return f"{{type: {type_}, qos: latched}}" if key == "publishes" and topic in self.latched else type_
+
+
+def _short(name: str) -> str:
+    package, _, bare = name.split("/")
+    return f"{package}/{bare}"
+
+
+def edits_of(node: RosNode, component: MappingNode, text: str) -> Iterator[Edit]:
+    """Yield the edits that declare what a node has and its component does not; `text` is that of the file."""
+    new: dict[str, dict[str, str]] = {}
+    for key in KINDS:
+        entry = component.entries.get(key)
+        known = entry.value.entries if entry is not None and isinstance(entry.value, MappingNode) else {}
+        there = {topic.strip("/") for topic in known}
+        added = {
+            _written(topic): node.value(key, topic) for topic in sorted(node.ends[key]) if topic.strip("/") not in there
+        }
+        if not added:
+            continue
+        if entry is not None and isinstance(entry.value, MappingNode) and known:
+            yield _addition(entry.value, text, [f"{topic}: {value}" for topic, value in added.items()])
+        else:
+            new[key] = added
+    if not new:
+        return
+    if _is_flow(component, text):
+        inner = {key: ", ".join(f"{topic}: {value}" for topic, value in added.items()) for key, added in new.items()}
+        yield _addition(component, text, [f"{key}: {{{words}}}" for key, words in inner.items()])
+    else:
+        lines = [
+            line
+            for key, added in new.items()
+            for line in (f"{key}:", *(f"  {topic}: {value}" for topic, value in added.items()))
+        ]
+        yield _addition(component, text, lines)
+
+
+def _written(topic: str) -> str:
+    """Return a topic as a manifest writes it: `scan` for `/scan`, but `/tf` as it is."""
+    return topic if topic in ("/tf", "/tf_static") else topic.removeprefix("/")
+
+
+def _is_flow(node: MappingNode, text: str) -> bool:
+    line = text.split("\n")[node.span.line - 1]
+    return line[node.span.column - 1 : node.span.column] == "{"
+
+
+def _addition(above: MappingNode, text: str, lines: list[str]) -> Edit:
+    """Return the edit that adds entries behind the last one of a map, in its style."""
+    end = _end(above)
+    if _is_flow(above, text):
+        at = Span(end.file, end.end_line, end.end_column, end.end_line, end.end_column)
+        return Edit(at, "", "".join(f", {line}" for line in lines))
+    indent = " " * (next(iter(above.entries.values())).key.span.column - 1)
+    column = len(text.split("\n")[end.end_line - 1]) + 1  # behind a comment
+    at = Span(end.file, end.end_line, column, end.end_line, column)
+    return Edit(at, "", "".join(f"\n{indent}{line}" for line in lines))
+
+
+def _end(node: TreeNode) -> Span:
+    """Return the place of the last thing that is written in a value: that of a block ends where the next one begins."""
+    match node:
+        case MappingNode() if node.entries:
+            return max((_end(entry.value) for entry in node.entries.values()), key=_order)
+        case SequenceNode() if node.items:
+            return max(map(_end, node.items), key=_order)
+    return node.span
+
+
+def _order(span: Span) -> tuple[int, int]:
+    return span.end_line, span.end_column

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from string import ascii_letters, digits
-from typing import Annotated, Any, Literal, TypeVar, cast
+from typing import Annotated, Any, Literal, TypeVar
 from uuid import uuid4
 from zlib import crc32
 
@@ -26,32 +26,23 @@ from rbxcompose.base.files import replace_file
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import OutsideError
 from rbxcompose.bus.names import ActionNames, dds_type
-from rbxcompose.bus.tokens import SPACE, EndpointToken, EntityKind, NodeToken, parse_token
+from rbxcompose.bus.tokens import SPACE, EndpointToken, NodeToken, parse_token
 from rbxcompose.bus.transport import Closable
 from rbxcompose.bus.wire import WireProfile, ros_qos
 from rbxcompose.bus.zenoh_session import SessionLink, as_file, guest_settings
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
-from rbxcompose.domains.programs.child import (
-    Child,
-    Deaf,
-    LeftBehind,
-    NotStarted,
-    ProgramEnd,
-    ProgramStarted,
-    StartOrder,
-    WrittenLine,
-)
+from rbxcompose.domains.programs.bridge.ends import TOKENS, ends_of
+from rbxcompose.domains.programs.child import Child, Event, OutputLog, StartOrder
 from rbxcompose.domains.programs.declaration import DeclaredPorts, port_name, published
-from rbxcompose.domains.programs.output import OutputLog
 from rbxcompose.domains.programs.watch import DeclaredKey, EndKind, KeyOnBus, ProgramWatch
-from rbxcompose.msgs.action_msgs import CancelGoal, GoalStatusArray
+from rbxcompose.msgs.action_msgs import CancelGoal
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.processes import Process, describe_exit
 from rbxcompose.sdk import Capability, Component, ComponentNoted, component
 from rbxcompose.sdk.capabilities import RunsProgram, Setting
-from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Qos, Serves, ServesAction
+from rbxcompose.sdk.ports import CallsAction, In, Out, Port, Qos, ServesAction
 from rbxcompose.sdk.updater import FrequencyTask, TaskStatus
 
 LOOKS = 1.0  # [s] between two looks at what its session declares, and at its memory
@@ -61,18 +52,8 @@ _LISTENS, _AGAIN = 10.0, 60.0  # [s] for which all that it publishes is heard at
 _LINKS = 2.0  # [s] for it to be linked with the robot's processes
 _STRANGER = 0.5  # [s] after which it does not seem to use the configuration that it was given
 _PAUSE = 0.05  # [s] between two looks at a program that is not ready yet
-_TOKENS = {
-    EndKind.PUBLISHER: EntityKind.PUBLISHER,
-    EndKind.SUBSCRIBER: EntityKind.SUBSCRIPTION,
-    EndKind.QUERYABLE: EntityKind.SERVER,
-    EndKind.QUERIER: EntityKind.CLIENT,
-}
-_OF_TOKENS = {token: kind for kind, token in _TOKENS.items()}
+_OF_TOKENS = {token: kind for kind, token in TOKENS.items()}
 _ACTIONS = ServesAction, CallsAction
-_KINDS = {Out: EndKind.PUBLISHER, In: EndKind.SUBSCRIBER, Serves: EndKind.QUERYABLE, Calls: EndKind.QUERIER}
-# Of the five ends of an action, in the order of their names:
-_SERVED = *(EndKind.QUERYABLE,) * 3, *(EndKind.PUBLISHER,) * 2
-_CALLED = *(EndKind.QUERIER,) * 3, *(EndKind.SUBSCRIBER,) * 2
 _MEGABYTE = 1_000_000
 
 
@@ -292,7 +273,8 @@ class Runner(Component[R]):
         self.heard: dict[str, Closable] = {}
         self.session = self.endpoint = ""
         self.joining: dict[str, str] = {}
-        self.output = OutputLog({level: text for level, text in self._levels() if text})
+        levels = {Level.ERROR: self.config.levels.error, Level.WARN: self.config.levels.warn}
+        self.output = OutputLog({level: text for level, text in levels.items() if text})
         ready = self.config.ready
         self.marks_ready = re.compile(ready.output) if ready is not None and ready.output is not None else None
         self.is_inert = type(self.context.clock) is SteppedClock
@@ -325,7 +307,7 @@ class Runner(Component[R]):
         self.is_over = False
         order = self.order({**os.environ, **self.joining})
         if self.joins_bus and order is not None:
-            subscribed, served = self._keys_of(EndKind.SUBSCRIBER), self._keys_of(EndKind.QUERYABLE)
+            subscribed, served = self._keys_of("subscribes"), self._keys_of("serves")
             self.link = SessionLink(self.endpoint, self.session, subscribed, served)
             self.linked = self.real_time.now()
         self.connect()
@@ -399,7 +381,8 @@ class Runner(Component[R]):
         settings, self.endpoint = guest_settings(address.router, self.session)
         file = RobotFolder.of(address.robot).path / f"{self.name}.zenoh.json5"
         replace_file(file, as_file(settings).encode())
-        keys = {f"RBXCOMPOSE_KEY_{name.upper()}": key.text(address.domain) for name, _, key in self._keys()}
+        names = ((f"{name}_{part}" if part else name, key) for name, part, key in self._keys())
+        keys = {f"RBXCOMPOSE_KEY_{name.upper()}": key.text(address.domain) for name, key in names}
         return {
             "ZENOH_CONFIG": str(file),
             "ZENOH_SESSION_CONFIG_URI": str(file),
@@ -415,32 +398,24 @@ class Runner(Component[R]):
         }
 
     def _keys(self) -> Iterator[tuple[str, str, KeyOnBus]]:
-        """Yield the name of each end, that of its port, and its key; an action has five."""
+        """Yield the name of each port, which part of an action it is of which there are five, and the key of that."""
         wire = WireProfile(self.context.address.wire)
         for name, port in self._elsewhere():
-            full, interface = str(self.bound[name]), cast(Any, port.interface)
-            if not isinstance(port, _ACTIONS):
-                yield name, name, KeyOnBus(_KINDS[type(port)], full, dds_type(interface.TYPE), wire.hash_of(interface))
-                continue
-            kinds = _SERVED if isinstance(port, ServesAction) else _CALLED
-            parts = interface.SendGoal, interface.GetResult, CancelGoal, interface.FeedbackMessage, GoalStatusArray
-            for kind, part, of_part in zip(kinds, ActionNames.__slots__, parts, strict=True):
-                key = KeyOnBus(kind, getattr(ActionNames.of(full), part), dds_type(of_part.TYPE), wire.hash_of(of_part))
-                yield f"{name}_{part}", name, key
+            for end in ends_of(port, str(self.bound[name])):
+                key = KeyOnBus(end.kind, end.name, dds_type(end.interface.TYPE), wire.hash_of(end.interface))
+                yield name, end.part, key
 
     def _keys_of(self, kind: EndKind) -> list[str]:
-        return [key.text(self.context.address.domain) for _, _, key in self._keys() if key.kind is kind]
+        return [key.text(self.context.address.domain) for _, _, key in self._keys() if key.kind == kind]
 
     def _elsewhere(self) -> Iterator[tuple[str, Port[Any]]]:
         return ((name, port) for name, port in self.ports(self.config).items() if port.is_elsewhere)
 
     def _declared(self) -> Iterator[DeclaredKey]:
         ports = dict(self._elsewhere())
-        for end, name, key in self._keys():
+        for name, part, key in self._keys():
             port = ports[name]
-            if isinstance(port, ServesAction) and end.endswith("_send_goal"):  # one of its ends stands for all
-                yield DeclaredKey(name, key)
-            elif not isinstance(port, _ACTIONS):
+            if not part or (isinstance(port, ServesAction) and part == "send_goal"):  # which stands for all parts
                 yield DeclaredKey(name, key, port.rate if isinstance(port, Out) else None)
 
     def _listen(self, guest: Guest) -> None:
@@ -493,11 +468,11 @@ class Runner(Component[R]):
         lines, ready = list[str](), self.config.ready
         for event in self.child.events():
             match event:
-                case WrittenLine(text):
+                case "line", text:
                     lines.append(text)
                     if self.marks_ready is not None and self.marks_ready.search(text):
                         self.is_ready = True
-                case ProgramStarted():
+                case "started", _:
                     self.is_ready = self.is_ready or ready is None
                     self.state = TaskStatus(Level.OK, "runs")
                 case _:
@@ -508,20 +483,20 @@ class Runner(Component[R]):
         if self.child is not None and self.child.is_over and not self.is_over:
             self._ended("was killed, since its keeper was")
 
-    def _happened(self, event: object) -> None:
+    def _happened(self, event: Event) -> None:
         match event:
-            case NotStarted(why):
+            case "failed", why:
                 self._ended(f"cannot be started: {why}")
-            case Deaf():
+            case "deaf", _:
                 within, name = self.config.stop.within, self.config.stop.signal
                 self.warn(f"did not end within {within:g} s of {name}, and was killed")
-            case LeftBehind(number):
+            case "left", number:
                 left = "one process, which was" if number == 1 else f"{number} processes, which were"
                 self.warn(f"left behind {left} killed: what it starts must end with it")
-            case ProgramEnd(status) if self.config.ready is not None and self.config.ready.ended and not status:
+            case "ended", status if self.config.ready is not None and self.config.ready.ended and not status:
                 self.is_over = self.is_ready = True
                 self.state = TaskStatus(Level.OK, "has ended, as it should")
-            case ProgramEnd(status):
+            case "ended", status:
                 self._ended(self.described(status))
 
     def _ended(self, how: str) -> None:
@@ -539,8 +514,8 @@ class Runner(Component[R]):
         while self.child is not None and not is_over:
             is_over = self.child.is_over  # before what may be the last look
             for event in self.child.events():
-                if isinstance(event, WrittenLine):
-                    self._log([event.text])
+                if event[0] == "line":
+                    self._log([event[1]])
                 else:
                     self._happened(event)
             if not is_over:
@@ -551,10 +526,6 @@ class Runner(Component[R]):
     def _log(self, lines: Iterable[str]) -> None:
         for level, text in self.output.take(lines, self.now):
             self.context.log(Level.OK if self.is_ending else level, text)  # its end is wanted, however loud
-
-    def _levels(self) -> Iterator[tuple[Level, str | None]]:
-        yield Level.ERROR, self.config.levels.error
-        yield Level.WARN, self.config.levels.warn
 
     def _mind_memory(self, child: Child) -> None:
         most = self.most_memory
@@ -603,8 +574,8 @@ class Runner(Component[R]):
         link.listen(f"{domain}/**" if since < _LISTENS or since % _AGAIN < 2 * LOOKS else None)
         declared = {key.text(domain): key for _, _, key in self._keys()}
         found = {declared[text] for text in link.matching()}
-        found |= {key for text in link.heard() if (key := KeyOnBus.of(EndKind.PUBLISHER, text, domain)) is not None}
-        return found | {key for key in declared.values() if found and key.kind is EndKind.PUBLISHER}
+        found |= {key for text in link.heard() if (key := KeyOnBus.of("publishes", text, domain)) is not None}
+        return found | {key for key in declared.values() if found and key.kind == "publishes"}
 
     def _announce(self, guest: Guest, found: set[KeyOnBus]) -> None:
         """Declare tokens for its ends, so that tools and clients find them as those of ROS 2."""
@@ -615,7 +586,7 @@ class Runner(Component[R]):
         wanted = {node.key} if found else set[str]()
         for key in found:
             words, number = wire.qos_text(ros_qos(qos.get(key.name, Qos.EVENT))), crc32(str(key).encode())
-            wanted.add(node.endpoint_key(_TOKENS[key.kind], number, key.name, key.type, key.hash, words))
+            wanted.add(node.endpoint_key(TOKENS[key.kind], number, key.name, key.type, key.hash, words))
         for text in wanted - self.tokens.keys():
             self.tokens[text] = guest.transport.announce(text)
         for text in self.tokens.keys() - wanted:

@@ -24,8 +24,7 @@ from rbxcompose.base.files import replace_file
 from rbxcompose.base.requests import OutsideError
 from rbxcompose.bus.names import resolve
 from rbxcompose.domains.programs.bridge import ros_bridge
-from rbxcompose.domains.programs.bridge.ends import BridgedEnd, ends_of, parameters_of
-from rbxcompose.domains.programs.bridge.installation import RosInstallation, RosModel, installation_of
+from rbxcompose.domains.programs.bridge.ends import ProgramEnd, ends_of, parameters_of
 from rbxcompose.domains.programs.child import StartOrder
 from rbxcompose.domains.programs.components.program import (
     CommandWords,
@@ -35,7 +34,7 @@ from rbxcompose.domains.programs.components.program import (
     bundle_command,
     order_of,
 )
-from rbxcompose.domains.programs.sections.ros2 import ros2
+from rbxcompose.domains.programs.sections.ros2 import RosInstallation, RosModel, installation_of, ros2
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.reader import read_source
 from rbxcompose.runtime.folder import RobotFolder
@@ -188,12 +187,12 @@ class Ros2Node(Runner[Ros2NodeConfig]):
         self.bridge = ros_bridge.joined(self.ros, self.context.address, self.name)
         self.channels = self.bridge.add(self.name, self._ends())
 
-    def _ends(self) -> Iterator[BridgedEnd]:
+    def _ends(self) -> Iterator[ProgramEnd]:
         for name, port in self._elsewhere():
             yield from ends_of(port, str(self.bound[name]))
-        yield from parameters_of(self.node_name, "to_ros")
+        yield from parameters_of(self.node_name, "serves")
         for other in self.config.configures:
-            yield from parameters_of(resolve(other, self.context.address.namespace), "from_ros")
+            yield from parameters_of(resolve(other, self.context.address.namespace), "calls")
 
     def attend(self) -> None:
         """Report what the bridge cannot do, and restart with it."""

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import field, replace
 from pathlib import Path, PurePath
+from typing import NamedTuple
 
 import yaml
 
@@ -43,36 +44,7 @@ _MANY = ("the transitions", "substitutions")
 _OF_ALL = ("if", "unless")
 _OF_PROGRAMS = (*_OF_ALL, "name", "output", "respawn", "respawn_delay", "respawn_max_retries", "cwd")
 _OF_NODES = (*_OF_PROGRAMS, "pkg", "exec", "exec_name", "namespace", "args", "ros_args")
-_KNOWN: Mapping[str, tuple[str, ...]] = {
-    "arg": (*_OF_ALL, "name", "default", "description"),
-    "let": (*_OF_ALL, "name", "value"),
-    "node": _OF_NODES,
-    "lifecycle_node": _OF_NODES,
-    "node_container": _OF_NODES,
-    "executable": (*_OF_PROGRAMS, "cmd", "args", "shell"),
-    "include": (*_OF_ALL, "file"),
-    "group": (*_OF_ALL, "scoped"),
-    "timer": (*_OF_ALL, "period"),
-    "push_ros_namespace": (*_OF_ALL, "namespace"),
-    "set_env": (*_OF_ALL, "name", "value"),
-    "unset_env": (*_OF_ALL, "name"),
-    "set_parameter": (*_OF_ALL, "name", "value", "type"),
-    "set_remap": (*_OF_ALL, "from", "to"),
-    "load_composable_node": (*_OF_ALL, "target"),
-    "param": ("name", "value", "value-sep", "from", "type", "allow_substs"),
-    "remap": ("from", "to"),
-    "env": ("name", "value"),
-}
-_PARTS: Mapping[str, tuple[str, ...]] = {
-    **dict.fromkeys(("node", "lifecycle_node"), ("param", "remap", "env", "argument")),
-    "node_container": ("param", "remap", "env", "argument", "composable_node"),
-    "executable": ("env", "argument"),
-    "include": ("arg", "let"),
-    "param": ("param", "item"),
-    "arg": ("choice",),
-    "load_composable_node": ("composable_node",),
-}
-"""The children of each kind that are parts of it."""
+_PARTS_OF_NODES = ("param", "remap", "env", "argument")
 _LEFT = (
     "launch-prefix",
     "emulate_tty",
@@ -162,23 +134,6 @@ class Evaluation:
         self._unset: set[str] = set()
         self._left, self._python, self._depth = _MOST_ENTITIES, _MOST_PYTHON, 0
         self._open: list[Path] = []
-        self._actions: dict[str, Callable[[LaunchEntity, _Scope], None]] = {
-            "arg": self._argument,
-            "let": self._let,
-            "node": self._node,
-            "lifecycle_node": self._node,
-            "node_container": self._node,
-            "executable": self._executable,
-            "include": self._include,
-            "load_composable_node": self._load,
-            "group": self._group,
-            "timer": self._timer,
-            "push_ros_namespace": self._push,
-            "set_env": self._set_env,
-            "unset_env": self._unset_env,
-            "set_parameter": self._set_parameter,
-            "set_remap": self._set_remap,
-        }
 
     def run(self, file: ForeignFile) -> None:
         """Add what a file starts."""
@@ -209,9 +164,9 @@ class Evaluation:
                 break
             if not self._holds(entity, scope):
                 continue
-            if (act := self._actions.get(entity.kind)) is not None:
+            if entity.kind in _ACTIONS:
                 self._check(entity)
-                act(entity, scope)
+                _ACTIONS[entity.kind].act(self, entity, scope)
             else:
                 words = f"'{plain(entity.kind, 60)}'{self._shown(entity, scope)}"
                 self._leave(entity.span, words, _WHY.get(entity.kind, "it is not known here"))
@@ -251,17 +206,17 @@ class Evaluation:
 
     def _check(self, entity: LaunchEntity) -> None:
         """Report the attributes and parts of an entity that nobody knows."""
-        known, parts, shown = _KNOWN[entity.kind], _PARTS.get(entity.kind, ()), f"'{entity.kind}'"
+        known, shown = _KNOWN[entity.kind], f"'{entity.kind}'"
         for name, given in entity.attributes.items():
             if name in _LEFT:
                 self._leave(given.span, f"'{name}' of {shown}", "nothing here has the same effect")
             elif name == TEXT:
                 self._leave(given.span, f"the text in {shown}", "only elements count")
-            elif name not in known:
+            elif name not in known.attributes:
                 words = f"unknown attribute '{plain(name, 60)}' of {shown}"
-                self._report.add(UNKNOWN_KEY.misspelt(given.span, words, name, known, KEYS))
+                self._report.add(UNKNOWN_KEY.misspelt(given.span, words, name, known.attributes, KEYS))
         for child in entity.children if entity.kind not in ("group", "timer") else ():
-            if child.kind not in parts:
+            if child.kind not in known.parts:
                 self._leave(child.span, f"'{plain(child.kind, 60)}' in {shown}", "it is not known here")
             elif child.kind in _KNOWN and child.kind != "arg":
                 self._check(child)
@@ -543,6 +498,40 @@ class Evaluation:
             self._report.add(NOT_KNOWN.at(param.attributes["value"].span, words))
             return None
         return values if between else values[0]
+
+
+class _Kind(NamedTuple):
+    """A kind of entities: its attributes, the children that are parts of it, and what carries out an action."""
+
+    attributes: tuple[str, ...]
+    parts: tuple[str, ...] = ()
+    act: Callable[[Evaluation, LaunchEntity, _Scope], None] = lambda *_: None
+
+
+_ACTIONS = {
+    "arg": _Kind((*_OF_ALL, "name", "default", "description"), ("choice",), Evaluation._argument),
+    "let": _Kind((*_OF_ALL, "name", "value"), (), Evaluation._let),
+    "node": _Kind(_OF_NODES, _PARTS_OF_NODES, Evaluation._node),
+    "lifecycle_node": _Kind(_OF_NODES, _PARTS_OF_NODES, Evaluation._node),
+    "node_container": _Kind(_OF_NODES, (*_PARTS_OF_NODES, "composable_node"), Evaluation._node),
+    "executable": _Kind((*_OF_PROGRAMS, "cmd", "args", "shell"), ("env", "argument"), Evaluation._executable),
+    "include": _Kind((*_OF_ALL, "file"), ("arg", "let"), Evaluation._include),
+    "group": _Kind((*_OF_ALL, "scoped"), (), Evaluation._group),
+    "timer": _Kind((*_OF_ALL, "period"), (), Evaluation._timer),
+    "push_ros_namespace": _Kind((*_OF_ALL, "namespace"), (), Evaluation._push),
+    "set_env": _Kind((*_OF_ALL, "name", "value"), (), Evaluation._set_env),
+    "unset_env": _Kind((*_OF_ALL, "name"), (), Evaluation._unset_env),
+    "set_parameter": _Kind((*_OF_ALL, "name", "value", "type"), (), Evaluation._set_parameter),
+    "set_remap": _Kind((*_OF_ALL, "from", "to"), (), Evaluation._set_remap),
+    "load_composable_node": _Kind((*_OF_ALL, "target"), ("composable_node",), Evaluation._load),
+}
+_KNOWN = {
+    **_ACTIONS,
+    "param": _Kind(("name", "value", "value-sep", "from", "type", "allow_substs"), ("param", "item")),
+    "remap": _Kind(("from", "to")),
+    "env": _Kind(("name", "value")),
+}
+"""Actions, and those of their parts that have attributes."""
 
 
 def _variables(text: LaunchText) -> Iterator[str]:
