@@ -14,9 +14,9 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
 from rbxcompose.base.printable import plain
 from rbxcompose.commands import new_files
-from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
+from rbxcompose.commands.console import ReportedError, emit, refuse, write_report
 from rbxcompose.commands.interrupts import INTERRUPTED
-from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.mission_facts import navigator_of, top_speed
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import PREFIX, find, project_of, shown_name
@@ -75,9 +75,6 @@ def run(arguments: argparse.Namespace) -> int:
     asker = new_files.Asker(is_asking=not arguments.yes)
     try:
         return _write(_MAKERS[arguments.what](arguments, asker))
-    except MistakenRobotError as error:
-        write_report(error.compilation.report, error.compilation.sources)
-        return FINDINGS
     except new_files.CancelledError:
         return INTERRUPTED
 
@@ -167,14 +164,6 @@ _MAKERS: dict[str, Callable[[argparse.Namespace, new_files.Asker], New]] = {
 }
 
 
-class MistakenRobotError(Exception):
-    """Raised with the compiler's result when the robot itself has mistakes."""
-
-    def __init__(self, compilation: Compilation) -> None:
-        super().__init__("the robot has errors")
-        self.compilation = compilation
-
-
 @dataclass(frozen=True, slots=True)
 class MissionHome:
     """The robot that gets a mission, its file, and the project of both."""
@@ -216,12 +205,13 @@ def find_home(written: str) -> MissionHome:
 
     Raises:
         AnswerError: if there is no such robot, if there are several, or if it belongs to the library.
-        MistakenRobotError: if it has mistakes.
+        ReportedError: if it has mistakes.
     """
     file = _file(written)
     out = compile_robot(str(file), environment=os.environ)
     if out.robot is None or out.report.has_errors:
-        raise MistakenRobotError(out)
+        write_report(out.report, out.sources)
+        raise ReportedError
     return MissionHome(out.robot, file, project_of(file))
 
 

@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from rbxcompose.commands.layout import MOST_EFFORT, TOO_TANGLED, Layout, LayoutItem, NotDrawnError, effort, lay_out
+from rbxcompose.commands.console import NotDoneError
+from rbxcompose.commands.layout import MOST_EFFORT, TOO_TANGLED, Layout, LayoutItem, effort, lay_out
 from rbxcompose.missions.program.answers import Form
 from rbxcompose.missions.program.outcomes import IDLE, NAMES
 from rbxcompose.missions.view.picture import Drawn, MissionPicture
@@ -56,11 +57,11 @@ def mission_html(picture: MissionPicture, statuses: Sequence[int] = ()) -> str:
     """Return the HTML of the page, light or dark as the reader has set it, with the status of each node if known.
 
     Raises:
-        NotDrawnError: if Graphviz is not installed, or would take too long.
+        NotDoneError: if Graphviz is not installed, or would take too long.
     """
     if sum(_effort(one) for root in picture.roots for one in root.all()) > MOST_EFFORT:
         message = f"mission '{picture.name}' has too many transitions for a picture"
-        raise NotDrawnError(TOO_TANGLED.at(None, message, help="use '--format text', 'dot' or 'mermaid'"))
+        raise NotDoneError(TOO_TANGLED.at(None, message, help="use '--format text', 'dot' or 'mermaid'"))
     return "".join(f"{line}\n" for line in _page(picture, statuses))
 
 
