@@ -129,6 +129,5 @@ def _text(answers: list[ExaminationResult]) -> str:
     lines = [
         f"ok  {result.examination:<{width}}  {result.answer}" for result in answers if isinstance(result.answer, str)
     ]
-    report = Report()
-    report.extend(result.answer for result in answers if isinstance(result.answer, Finding))
+    report = Report([result.answer for result in answers if isinstance(result.answer, Finding)])
     return "\n".join([*lines, render_text(report, {}, has_colour(sys.stdout))]).rstrip("\n")

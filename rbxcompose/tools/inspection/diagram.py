@@ -58,24 +58,20 @@ def qos_of(port: Port[Any]) -> str:
     return str(port.qos) if isinstance(port, In | Out) else ""
 
 
+_DOES = {  # the first one that a port is counts
+    Out: "sends",
+    ServesTopic: "carries out",
+    In: "takes",
+    Serves: "answers",
+    ServesAction: "carries out",
+    CallsAction: "asks for",
+    Calls: "calls",
+}
+
+
 def does(port: Port[Any]) -> str:
     """Return the verb phrase for what a component does at a port."""
-    match port:
-        case Out():
-            return "sends"
-        case ServesTopic():
-            return "carries out"
-        case In():
-            return "takes"
-        case Serves():
-            return "answers"
-        case ServesAction():
-            return "carries out"
-        case CallsAction():
-            return "asks for"
-        case Calls():
-            return "calls"
-    return "looks up"
+    return next((words for kind, words in _DOES.items() if isinstance(port, kind)), "looks up")
 
 
 class BoxShape(StrEnum):

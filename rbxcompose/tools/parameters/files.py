@@ -8,13 +8,12 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from rbxcompose.base.config import Config, key_of, leaves, value_at, with_values
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
-from rbxcompose.base.findings import Finding, Fix, Related, Span, kind
+from rbxcompose.base.findings import Fix, Related, Span, kind
 from rbxcompose.base.fixes import apply
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import Dimension
@@ -100,17 +99,9 @@ class LiveSettings:
         return replace(self.plan, instances=tuple(instances))
 
 
-def compiled_as_it_runs(state: RobotState, unsaved: Mapping[Path, str] = MappingProxyType({})) -> Compilation:
-    """Compile a robot that runs as its files are now, with the layers that it runs with.
-
-    `unsaved` are texts in place of those of files, by their real paths.
-    """
-    return compiled_with(state.file, state.layers, unsaved)
-
-
 def live_settings(nodes: ParameterNodes, state: RobotState) -> LiveSettings | None:
     """Return the settings of a robot that runs; None if its files have errors now."""
-    found = compiled_as_it_runs(state)
+    found = compiled_with(state.file, state.layers)
     if found.robot is None or found.plan is None:
         return None
     return LiveSettings(found.robot, found.plan, found.sources, live_configs(nodes, found.robot))
@@ -178,7 +169,8 @@ def files_with(live: LiveSettings, changes: Sequence[LiveChange], compiled: Comp
         try:
             edits.append(edit_of(live.robot.manifest, live.sources, path, change.live, change.dimension))
         except UnsavableError as error:
-            raise NotDoneError(_unsavable(change, error)) from error
+            message = f"'{change.path}' cannot be saved: {error.reason}"
+            raise NotDoneError(NOT_SAVED.at(error.span, message, help=error.help)) from error
     try:
         fix = merged(edits)
     except UnsavableError as error:
@@ -247,10 +239,6 @@ def _keys_changed(plan: Plan, folder: RobotFolder) -> dict[str, tuple[str, str]]
     found = answer_of(folder, ComparePlan(text), timeout=_COMPARE)
     each = ((component.name, reason) for component in found.components for reason in component.reasons)
     return {f"{name}.{change.key}": (change.before or "nothing", change.after or "nothing") for name, change in each}
-
-
-def _unsavable(change: LiveChange, error: UnsavableError) -> Finding:
-    return NOT_SAVED.at(error.span, f"'{change.path}' cannot be saved: {error.reason}", help=error.help)
 
 
 def _edited(live: LiveSettings, fix: Fix) -> NewTexts:
@@ -399,7 +387,7 @@ def param_save(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     changes = chosen(changed_since_up(live, folder, history), live, arguments.names)
     if changes:
         require_unedited(live, changes, folder, history)
-    exit_code = save(live, changes, partial(compiled_as_it_runs, state), arguments)
+    exit_code = save(live, changes, partial(compiled_with, state.file, state.layers), arguments)
     if changes and not arguments.dry_run:
         names: dict[str, list[str]] = {}
         for change in changes:
@@ -428,17 +416,8 @@ def save(live: LiveSettings, changes: Sequence[LiveChange], compiled: Compiled, 
             write(texts)
         places = sorted(str(edit.span) for edit in texts.fix.edits)
     if arguments.json:
-        emit(
-            json.dumps(
-                {
-                    "saved": [_data(live_change) for live_change in changes],
-                    "places": places,
-                    "difference": lines,
-                    "hash": seen,
-                    "dry_run": arguments.dry_run,
-                }
-            )
-        )
+        told = {"places": places, "difference": lines, "hash": seen, "dry_run": arguments.dry_run}
+        emit(json.dumps({"saved": [_data(change) for change in changes], **told}))
         return 0
     for change in changes:
         emit(_change_text(change))
