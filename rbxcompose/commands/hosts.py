@@ -314,12 +314,11 @@ def _show(label: str, line: str) -> None:
 
 def follow_all(shares: Shares, words: Callable[[str], Sequence[str]]) -> int:
     """Run a verb for each share, and show each line as it comes."""
-    return follow_commands(
-        {
-            label_of(shares, host, robot): remote.rbxcompose(words(robot), has_terminal=True)
-            for (host, robot), remote in shares.items()
-        }
-    )
+    commands = {
+        label_of(shares, host, robot): remote.rbxcompose(words(robot), has_terminal=True)
+        for (host, robot), remote in shares.items()
+    }
+    return follow_commands(commands)
 
 
 def ask_all(shares: Shares, words: Callable[[str], Sequence[str]], *, in_json: bool, tolerates: str = "") -> int:
@@ -334,11 +333,8 @@ def ask_all(shares: Shares, words: Callable[[str], Sequence[str]], *, in_json: b
     if in_json:
         emit(json.dumps({"hosts": [_data(label, entry) for label, entry in done.items()]}))
     else:
-        emit(
-            "\n\n".join(
-                "\n".join([f"{label}:", *(f"  {line}" for line in entry.lines)]) for label, entry in done.items()
-            )
-        )
+        texts = ["\n".join([f"{label}:", *(f"  {line}" for line in entry.lines)]) for label, entry in done.items()]
+        emit("\n\n".join(texts))
     return max(codes[label] for label in done)
 
 

@@ -3,7 +3,6 @@
 import argparse
 import json
 import os
-from collections.abc import Iterable
 from contextlib import suppress
 from typing import TypeVar
 
@@ -53,8 +52,8 @@ def find_robot(wanted: str | None) -> RobotFolder:
         return next(iter(found.values()))
     if wanted in found:
         return found[wanted]
-    files = {_file_of(folder): folder for folder in found.values()}
-    for path in _possible_files(wanted):
+    files = {state.file: folder for folder in found.values() if (state := known_state(folder)) is not None}
+    for path in map(os.path.realpath, (wanted, os.path.join(wanted, "robot.yaml"))):
         if path in files:
             return files[path]
     raise NotDoneError(NOT_UP.at(None, f"no robot '{wanted}' is up", help=suggest(wanted, found, "robots that are up")))
@@ -70,16 +69,6 @@ def robots_up() -> list[RobotFolder]:
         return all_folders()
     except UnsafeFolderError as error:
         raise NotDoneError(UNSAFE.at(None, str(error))) from error
-
-
-def _file_of(folder: RobotFolder) -> str:
-    state = known_state(folder)
-    return state.file if state else ""
-
-
-def _possible_files(path: str) -> Iterable[str]:
-    yield os.path.realpath(path)
-    yield os.path.realpath(os.path.join(path, "robot.yaml"))
 
 
 def known_state(folder: RobotFolder) -> RobotState | None:

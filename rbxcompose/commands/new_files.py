@@ -4,7 +4,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import ExitStack, suppress
 from io import TextIOWrapper
 from pathlib import Path
@@ -31,7 +31,6 @@ _YAML_WORDS = frozenset({"true", "false", "null"})  # as YAML values these are n
 EXISTS = kind("RBX9101")
 NOT_WRITTEN = kind("RBX9104")
 _PLAIN_TEXT = re.compile(r"[A-Za-z][A-Za-z0-9 ,.()/'-]*")
-_WORDS = frozenset({"true", "false", "null"})
 
 
 class AnswerError(NotDoneError):
@@ -155,7 +154,7 @@ def _prepare(path: Path, text: str, undo: ExitStack) -> tuple[Path, Path]:
     """Write the text to a temporary file beside its destination."""
     if os.path.lexists(path):
         raise FileExistsError(0, "", str(path))
-    for folder in _missing_folders(path):
+    for folder in reversed([folder for folder in path.parents if not folder.exists()]):
         folder.mkdir(exist_ok=True)
         undo.callback(_remove_if_empty, folder)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
@@ -165,10 +164,6 @@ def _prepare(path: Path, text: str, undo: ExitStack) -> tuple[Path, Path]:
         file.flush()
         os.fsync(file.fileno())
     return temporary, path
-
-
-def _missing_folders(path: Path) -> Iterator[Path]:
-    yield from reversed([folder for folder in path.parents if not folder.exists()])
 
 
 def _remove_if_empty(folder: Path) -> None:
@@ -188,7 +183,7 @@ def render(template: str, **answers: object) -> str:
 def yaml_text(text: str) -> str:
     """Return a text as a YAML scalar of a Robot or Mission file: in quotes where needed, with dollars doubled."""
     text = text.replace("$", "$$")
-    if _PLAIN_TEXT.fullmatch(text) and text.lower() not in _WORDS:
+    if _PLAIN_TEXT.fullmatch(text) and text.lower() not in _YAML_WORDS:
         return text
     return json.dumps(text, ensure_ascii=False)
 

@@ -126,14 +126,8 @@ def mission_in(robot: Robot, name: str) -> Any:
 def skills(arguments: argparse.Namespace) -> int:
     """List all skills that a robot's missions may use."""
     robot = robot_of(arguments.path)
-    found = dict(
-        sorted(
-            {
-                **{python_skill.skill.name: python_skill for python_skill in python_skills(skill_names())},
-                **robot.skills,
-            }.items()
-        )
-    )
+    in_python = {source.skill.name: source for source in python_skills(skill_names())}
+    found = dict(sorted({**in_python, **robot.skills}.items()))
     if arguments.json:
         emit(json.dumps([_data(entry) for entry in found.values()]))
         return 0

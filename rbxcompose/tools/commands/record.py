@@ -165,15 +165,9 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: b
     warn_of_unmatched(tap.unmatched, tap.others)
     counts = recorder.counts
     if is_json:
-        emit(
-            json.dumps(
-                {
-                    "files": [str(path) for path in recorder.paths],
-                    "messages": {topic.name: number for topic, number in counts.items()},
-                    "unmatched": tap.unmatched,
-                }
-            )
-        )
+        messages = {topic.name: number for topic, number in counts.items()}
+        files = [str(path) for path in recorder.paths]
+        emit(json.dumps({"files": files, "messages": messages, "unmatched": tap.unmatched}))
         return 0
     paths = ", ".join(map(str, recorder.paths))
     emit(f"{count_table(counts)}\nrecorded {counts.total():,} messages to {paths}")

@@ -39,11 +39,11 @@ from rbxcompose.runtime.recording import codes
 from rbxcompose.runtime.recording.files import PART, Recorder, write_problem
 from rbxcompose.runtime.recording.reader import RecordingReader, RecordingSummary, playlist, summary_of
 from rbxcompose.runtime.recording.tape import PLAN
-from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, by_name, is_replayable, matches
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, is_replayable, matches
 from rbxcompose.runtime.replay import ReplayResult, RunDifference, missing_topics, replayed
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.tools.commands.record import add_selection_options, selection_of
-from rbxcompose.tools.recordings import count_table, opened, recover_in, warn, warn_of_unmatched
+from rbxcompose.tools.recordings import count_table, opened, recover_in, sorted_counts, warn, warn_of_unmatched
 
 GROUP = "data"
 _MATCHING = 1.0  # [s] maximum wait until subscribers have found a new publisher
@@ -237,7 +237,7 @@ def _fields(summary: RecordingSummary, damage: str) -> dict[str, object]:
             "encoding": topic.encoding,
             "messages": number,
         }
-        for topic, number in sorted(by_name(summary.counts).items(), key=lambda item: (item[0].name, item[0].type))
+        for topic, number in sorted_counts(summary.counts)
     ]
     return {
         "messages": summary.messages,

@@ -98,14 +98,9 @@ def _bring(system: System, host: str, folder: Path, arguments: argparse.Namespac
 
 def _audit(system: System, path: str, *, in_json: bool) -> int:
     endpoints, keys = list(listeners(system)), list(reachable_keys(system))
-    report = Report()
-    report.extend(_certificates(system, path))
+    report = Report([*_certificates(system, path)])
     if in_json:
-        emit(
-            json.dumps(
-                {"listeners": [to_data(endpoint) for endpoint in endpoints], "keys": [to_data(key) for key in keys]}
-            )
-        )
+        emit(json.dumps({"listeners": to_data(endpoints), "keys": to_data(keys)}))
     else:
         for end in endpoints:
             warning = "  OPEN TO STRANGERS" if end.is_open else ""

@@ -52,7 +52,9 @@ def run(arguments: argparse.Namespace) -> int:
         return misused("up", f"--watch is for the foreground in real time, without {other}")
     path = targets.robot_path(arguments.path, may_run=False)
     if is_system(path):
-        return _run_share(path, arguments)
+        from rbxcompose.tools.system_runs import run_share  # only needed for systems
+
+        return run_share(path, arguments, _options(arguments))
     if arguments.host or arguments.robot:
         return misused("up", "--host and --robot are for systems")
     compilation = targets.compiled(path, arguments)
@@ -88,12 +90,6 @@ def _options(arguments: argparse.Namespace) -> RunOptions:
         record=arguments.record.absolute() if arguments.record else None,
         layers=targets.chosen_layers(arguments),
     )
-
-
-def _run_share(path: str, arguments: argparse.Namespace) -> int:
-    from rbxcompose.tools.system_runs import run_share  # only needed for systems
-
-    return run_share(path, arguments, _options(arguments))
 
 
 def _write_problem(path: Path) -> str:
