@@ -52,21 +52,22 @@ def deferred(module: str, function: str) -> Callable[..., int]:
 
 
 def add_actions(
-    parser: argparse.ArgumentParser, actions: Iterable[Subcommand], *common: Declare, metavar: str = ""
+    parser: argparse.ArgumentParser, actions: Iterable[Subcommand], *common: Declare, metavar: str = "", usual: str = ""
 ) -> None:
     """Declare subcommands, each with its own arguments and then the `common` ones; `metavar` names them all.
 
-    The first one is the most common reading, and is meant if none is written.
+    The `usual` one, else the first, is the most common reading, and is meant if none is written.
     """
     made = parser.add_subparsers(dest="action", required=True)
     for subcommand in actions:
-        words = subcommand.help if made.choices else f"{subcommand.help} (the default)"
+        usual = usual or subcommand.name
+        words = f"{subcommand.help} (the default)" if subcommand.name == usual else subcommand.help
         action = made.add_parser(subcommand.name, help=words, description=subcommand.about)
         for declare in (*subcommand.declares, *common):
             declare(action)
         action.set_defaults(do=subcommand.do)
     made.metavar = metavar or "|".join(made.choices)
-    parser.set_defaults(action=next(iter(made.choices)))
+    parser.set_defaults(action=usual)
 
 
 def run_action(arguments: argparse.Namespace, *before: object) -> int:

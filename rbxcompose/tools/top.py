@@ -5,6 +5,7 @@ from collections import Counter, deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
+from itertools import repeat
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
@@ -158,11 +159,7 @@ def _components(components: Sequence[ComponentPicture]) -> list[PictureLine]:
         )
         for component in components
     ]
-    head, *lines = table_of([("component", "type", "state", "process", "restarts", "msg/s", ""), *rows])
-    return [
-        PictureLine(head, FAINT),
-        *(PictureLine(line, _alarm(component)) for line, component in zip(lines, components, strict=True)),
-    ]
+    return _table([("component", "type", "state", "process", "restarts", "msg/s", ""), *rows], map(_alarm, components))
 
 
 def _alarm(component: ComponentPicture) -> str:
@@ -176,8 +173,7 @@ def _loads(loads: Sequence[Load]) -> list[PictureLine]:
         (load.process, str(load.pid), "-" if load.cpu is None else f"{load.cpu:.1%}", f"{load.memory / 1e6:.0f} MB")
         for load in loads
     ]
-    head, *lines = table_of([("process", "pid", "cpu", "memory"), *rows])
-    return [PictureLine(head, FAINT), *map(PictureLine, lines)]
+    return _table([("process", "pid", "cpu", "memory"), *rows], repeat(""))
 
 
 def _trees(trees: Sequence[Tree], room: int) -> list[PictureLine]:
@@ -198,7 +194,7 @@ def _health(health: Sequence[tuple[str, Level, str]]) -> list[PictureLine]:
         if level is not Level.OK
     ]
     lines += [PictureLine(f"OK {', '.join(fine)}")] if fine else []
-    return [PictureLine(""), *lines] if lines else []
+    return _apart(lines)
 
 
 def _warnings(warnings: Sequence[Record]) -> list[PictureLine]:
@@ -206,7 +202,18 @@ def _warnings(warnings: Sequence[Record]) -> list[PictureLine]:
         PictureLine(f"{warning.time:8.1f}  {plain(warning.source)}: {plain(warning.text)}", COLOURS[warning.level])
         for warning in warnings[-MOST_WARNINGS:]
     ]
+    return _apart(lines)
+
+
+def _apart(lines: Sequence[PictureLine]) -> list[PictureLine]:
+    """Return lines below an empty one, if there are any."""
     return [PictureLine(""), *lines] if lines else []
+
+
+def _table(rows: Sequence[Iterable[str]], colours: Iterable[str]) -> list[PictureLine]:
+    """Return a head, and rows below it in these colours."""
+    head, *lines = table_of(rows)
+    return [PictureLine(head, FAINT), *map(PictureLine, lines, colours)]
 
 
 def shortened(lines: Sequence[PictureLine], room: int) -> list[PictureLine]:
@@ -279,50 +286,30 @@ def _shares(shares: Sequence[ShareView]) -> list[PictureLine]:
         use = (f"{cpu:.0%}", f"{memory:.0f} MB") if loads else ("-", "-")
         batteries = ", ".join(map(str, answer.get("batteries", {}).values()))
         rows.append((share.robot, share.host, *use, batteries, str(answer.get("mission") or ""), share.state))
-    head, *lines = table_of([("robot", "host", "cpu", "memory", "battery", "mission", "state"), *rows])
     colours = (RED if view.is_silent else "" if view.state == "up" else YELLOW for view in shares)
-    return [PictureLine(head, FAINT), *map(PictureLine, lines, colours)]
+    return _table([("robot", "host", "cpu", "memory", "battery", "mission", "state"), *rows], colours)
 
 
 def _share_components(shares: Sequence[ShareView]) -> list[PictureLine]:
     rows, colours = [], []
     for share in shares:
         for component in share.answer["components"] if share.answer is not None and not share.is_silent else ():
-            level, rate = component["level"], component["rate"]
+            level, state, restarts = component["level"], component["state"], str(component["restarts"])
             says = "" if level in (None, Level.OK.name) else f"{level}: {component['message']}"
-            times = "-" if rate is None else f"{rate:.1f}"
-            rows.append(
-                (
-                    share.robot,
-                    share.host,
-                    component["name"],
-                    component["state"],
-                    str(component["restarts"]),
-                    times,
-                    says,
-                )
-            )
-            colours.append(ALARMS.get(level, "") if component["state"] == "active" else YELLOW)
-    head, *lines = table_of([("robot", "host", "component", "state", "restarts", "msg/s", ""), *rows])
-    return [PictureLine(head, FAINT), *map(PictureLine, lines, colours)]
+            rate = "-" if component["rate"] is None else f"{component['rate']:.1f}"
+            rows.append((share.robot, share.host, component["name"], state, restarts, rate, says))
+            colours.append(ALARMS.get(level, "") if state == "active" else YELLOW)
+    return _table([("robot", "host", "component", "state", "restarts", "msg/s", ""), *rows], colours)
 
 
 def _share_warnings(shares: Sequence[ShareView]) -> list[PictureLine]:
     """Return the last warnings of each share: their times count from its own start, so they are not mixed."""
-    found = [
-        (share, warning)
-        for share in shares
-        if share.answer and not share.is_silent
-        for warning in share.answer["warnings"][-MOST_WARNINGS:]
-    ]
-    lines = [
-        PictureLine(
-            plain(f"{share.robot} {share.host} {entry['time']:8.1f}  {entry['source']}: {entry['text']}"),
-            ALARMS.get(entry["level"], ""),
-        )
-        for share, entry in found
-    ]
-    return [PictureLine(""), *lines] if lines else []
+    lines = []
+    for share in shares:
+        for entry in share.answer["warnings"][-MOST_WARNINGS:] if share.answer and not share.is_silent else ():
+            text = f"{share.robot} {share.host} {entry['time']:8.1f}  {entry['source']}: {entry['text']}"
+            lines.append(PictureLine(plain(text), ALARMS.get(entry["level"], "")))
+    return _apart(lines)
 
 
 class Sampler:
@@ -497,7 +484,7 @@ class MissionsSeen:
     def __init__(self, guest: Guest, robot: str) -> None:
         self._guest, self._robot = guest, robot
         self._replicas: dict[str, Replica] = {}
-        self._asked: set[str] = set()  # paths with a pending answer
+        self._asked: dict[str, object] = {}  # the query whose answer is awaited, by path
         self._is_listed = False
         news: Inbox[bytes] = Inbox(VISITOR, LONGEST_QUEUE, self._receive, guest.scheduler.post)
         transport = guest.transport
@@ -523,18 +510,18 @@ class MissionsSeen:
     def _ask(self, path: str) -> None:
         if path in self._asked:
             return
-        self._asked.add(path)
-        transport, answers = self._guest.transport, _Answers(self, path)
-        inbox: Inbox[TransportReply] = Inbox(VISITOR, None, answers.take, self._guest.scheduler.post)
+        query = self._asked[path] = object()
+        answered, transport = partial(self._answered, path, query), self._guest.transport
+        inbox: Inbox[TransportReply] = Inbox(VISITOR, None, answered, self._guest.scheduler.post)
         take, key = lambda answer: inbox.put(answer, transport.wake), admin_key(self._robot, path)
         transport.ask(key, b"", b"", take, of_all=True, within=LONGEST_WAIT)
 
-    def answered(self, path: str, answer: TransportReply) -> None:
-        """Apply the first answer to a query."""
-        self._asked.discard(path)
-        if answer.error:
+    def _answered(self, path: str, query: object, answer: TransportReply) -> None:
+        """Apply the first answer to a query, which ends with an error even after one."""
+        if self._asked.get(path) is not query:
             return
-        if (message := _read(answer.payload)) is None:
+        del self._asked[path]
+        if answer.error or (message := _read(answer.payload)) is None:
             return
         if path == _PATH:
             self._is_listed = True
@@ -558,16 +545,3 @@ def _read(payload: bytes) -> dict[str, Any] | None:
     """Return a message, or None if the robot runs another version with another format."""
     message: dict[str, Any] = json.loads(payload)
     return message if message.get("schema") == SCHEMA else None
-
-
-class _Answers:
-    """The answers to one query: it ends with an error even after an answer, so only the first counts."""
-
-    def __init__(self, asking: MissionsSeen, path: str) -> None:
-        self._asking, self._path = asking, path
-        self._is_over = False
-
-    def take(self, answer: TransportReply) -> None:
-        if not self._is_over:
-            self._is_over = True
-            self._asking.answered(self._path, answer)

@@ -306,23 +306,15 @@ def param_undo(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     except NothingToUndoError as error:
         return refuse(NO_NAME.at(None, str(error), help="'rbxcompose param history' lists the changes"))
     wanted: dict[str, list[rcl_interfaces.Parameter]] = {}
-    for change in sorted(found, key=lambda each: each.component):  # processes report a change in any order
-        wanted.setdefault(homes[change.component], []).append(rcl_interfaces.Parameter(change.name, change.before))
     expected: dict[str, list[rcl_interfaces.Parameter]] = {}
-    for change in found:
-        expected.setdefault(homes[change.component], []).append(rcl_interfaces.Parameter(change.name, change.after))
-    change_values(
-        nodes,
-        wanted,
-        "undo",
-        {homes[parameter_change.component]: _first(parameter_change, found) for parameter_change in found},
-        expected,
-    )
+    undoes: dict[str, int] = {}
+    for change in sorted(found, key=lambda each: each.component):  # processes report a change in any order
+        node = homes[change.component]
+        wanted.setdefault(node, []).append(rcl_interfaces.Parameter(change.name, change.before))
+        expected.setdefault(node, []).append(rcl_interfaces.Parameter(change.name, change.after))
+        undoes[node] = min(change.number, undoes.get(node, change.number))
+    change_values(nodes, wanted, "undo", undoes, expected)
     return write_values(nodes, wanted, arguments)
-
-
-def _first(change: ParameterChange, found: Sequence[ParameterChange]) -> int:
-    return min(each.number for each in found if each.component == change.component)
 
 
 def assignments(words: Sequence[str]) -> list[tuple[str, str, str]]:
