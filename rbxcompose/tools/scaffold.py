@@ -17,7 +17,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.functions import FUNCTIONS
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.plugins import BrokenPluginError
-from rbxcompose.commands.new_files import ANSWER, NAME, AnswerError, class_name, read_name, read_place, render
+from rbxcompose.commands.new_files import NAME, AnswerError, class_name, read_name, read_place, render, wrong_answer
 from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.msgs.geometry_msgs import Twist
@@ -119,9 +119,9 @@ def read_next_place(text: str, before: Sequence[Place]) -> Place:
     place = read_place(text, taken)
     for other in (DOCK, *before):
         if math.hypot(place.x - other.x, place.y - other.y) < 0.1:  # [m], twice the tolerance of `go_to`
-            raise AnswerError(ANSWER.at(None, f"the place '{place.name}' is where '{other.name}' is", help="move it"))
+            raise wrong_answer(f"the place '{place.name}' is where '{other.name}' is", "move it")
     if len(before) >= MOST_PLACES:
-        raise AnswerError(ANSWER.at(None, f"more than {MOST_PLACES} places", help="add the others in the file"))
+        raise wrong_answer(f"more than {MOST_PLACES} places", "add the others in the file")
     return place
 
 
@@ -132,21 +132,19 @@ def read_base(name: str) -> str:
         AnswerError: if there is no such type, or it cannot be the base.
     """
     if name not in component_names():
-        help_text = suggest(name, component_names(), "component types")
-        raise AnswerError(ANSWER.at(None, f"there is no component type '{name}'", help=help_text))
+        hint = suggest(name, component_names(), "component types")
+        raise wrong_answer(f"there is no component type '{name}'", hint)
     try:
         base = component_type(name)
     except BrokenPluginError as error:
-        raise AnswerError(ANSWER.at(None, str(error), help=f"take '{BASE}'")) from error
+        raise wrong_answer(str(error), f"take '{BASE}'") from error
     try:
         drives = _drives(base)
     except ValidationError:
         help_text = f"take '{BASE}', and write the other one into the file"
-        raise AnswerError(ANSWER.at(None, f"'{name}' needs settings of its own", help=help_text)) from None
+        raise wrong_answer(f"'{name}' needs settings of its own", help_text) from None
     if drives is None:
-        raise AnswerError(
-            ANSWER.at(None, f"'{name}' is not a base: it does not follow 'cmd_vel'", help=f"take '{BASE}'")
-        )
+        raise wrong_answer(f"'{name}' is not a base: it does not follow 'cmd_vel'", f"take '{BASE}'")
     return name
 
 

@@ -16,6 +16,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.commands import new_files
 from rbxcompose.commands.console import ReportedError, emit, refuse, write_report
 from rbxcompose.commands.interrupts import INTERRUPTED
+from rbxcompose.commands.options import argument
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.mission_facts import navigator_of, top_speed
 from rbxcompose.compiler.model.robot import Robot
@@ -42,39 +43,34 @@ class New:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
+    name = argument("name", metavar="NAME", help="lower-case letters, digits, underscores")
+    yes = argument("--yes", action="store_true", help="ask nothing; use the defaults where there is no option")
+    words = "the project's folder (default: this one)"
+    into = argument("--into", metavar="DIR", type=Path, default=Path(), help=words)
+    said = argument("--about", metavar="TEXT", help="what it is for, in a sentence")
+    base = argument("--base", metavar="TYPE", help=f"the component that drives ({scaffold.BASE})")
+    place = argument("--place", metavar="NAME=X,Y", action="append", help="a place to go to, besides the dock at 0,0")
+    robot = argument("--robot", metavar="PATH", default="", help="the robot, if there is more than one")
+    bare = argument("--no-add", action="store_true", help="do not change the robot's file; show what to add")
     kinds = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
-    for what, about in (
-        ("robot", "a robot that drives, with its mission"),
-        ("mission", "one more mission for a robot"),
-        ("part", "a part that robots can include"),
-        ("world", "a world for simulated robots, with a map"),
-        ("component", "a component type in Python, as a package to install"),
+    for what, about, make, own in (
+        ("robot", "a robot that drives, with its mission", _robot, (into, said, base, place)),
+        ("mission", "one more mission for a robot", _mission, (said, robot, bare)),
+        ("part", "a part that robots can include", _part, (into, said)),
+        ("world", "a world for simulated robots, with a map", _world, (into, said)),
+        ("component", "a component type in Python, as a package to install", _component, (into,)),
     ):
         subparser = kinds.add_parser(what, help=about, description=f"Write {about}.", allow_abbrev=False)
-        subparser.add_argument("name", metavar="NAME", help="lower-case letters, digits, underscores")
-        subparser.add_argument(
-            "--yes", action="store_true", help="ask nothing; use the defaults where there is no option"
-        )
-        if what != "mission":
-            subparser.add_argument(
-                "--into", metavar="DIR", type=Path, default=Path(), help="the project's folder (default: this one)"
-            )
-        if what != "component":
-            subparser.add_argument("--about", metavar="TEXT", help="what it is for, in a sentence")
-    new_robot, new_mission = kinds.choices["robot"], kinds.choices["mission"]
-    new_robot.add_argument("--base", metavar="TYPE", help=f"the component that drives ({scaffold.BASE})")
-    new_robot.add_argument(
-        "--place", metavar="NAME=X,Y", action="append", help="a place to go to, besides the dock at 0,0"
-    )
-    new_mission.add_argument("--robot", metavar="PATH", default="", help="the robot, if there is more than one")
-    new_mission.add_argument("--no-add", action="store_true", help="do not change the robot's file; show what to add")
+        subparser.set_defaults(make=make)
+        for declare in (name, yes, *own):
+            declare(subparser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Ask, write the files, and report them."""
     asker = new_files.Asker(is_asking=not arguments.yes)
     try:
-        return _write(_MAKERS[arguments.what](arguments, asker))
+        return _write(arguments.make(arguments, asker))
     except new_files.CancelledError:
         return INTERRUPTED
 
@@ -155,15 +151,6 @@ def _mission(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
     return New(home.project, scaffold.mission_files(answers), then, entry)
 
 
-_MAKERS: dict[str, Callable[[argparse.Namespace, new_files.Asker], New]] = {
-    "robot": _robot,
-    "mission": _mission,
-    "part": _part,
-    "world": _world,
-    "component": _component,
-}
-
-
 @dataclass(frozen=True, slots=True)
 class MissionHome:
     """The robot that gets a mission, its file, and the project of both."""
@@ -217,10 +204,8 @@ def find_home(written: str) -> MissionHome:
 
 def _file(written: str) -> Path:
     if written.startswith(PREFIX):
-        help_text = "create your own with 'rbxcompose new robot NAME'"
-        raise new_files.AnswerError(
-            new_files.ANSWER.at(None, f"'{written}' is a robot of the library, which stays as it is", help=help_text)
-        )
+        message = f"'{written}' is a robot of the library, which stays as it is"
+        raise new_files.wrong_answer(message, "create your own with 'rbxcompose new robot NAME'")
     path = find(written or _only())
     if isinstance(path, Path):
         return path
@@ -233,9 +218,5 @@ def _only() -> str:
         return str(files[0])
     if files:
         names = ", ".join(shown_name(file.parent) for file in files)
-        raise new_files.AnswerError(
-            new_files.ANSWER.at(None, "which robot is the mission for?", help=f"name it with '--robot': {names}")
-        )
-    raise new_files.AnswerError(
-        new_files.ANSWER.at(None, "there is no robot below 'robots/'", help="name one with '--robot PATH'")
-    )
+        raise new_files.wrong_answer("which robot is the mission for?", f"name it with '--robot': {names}")
+    raise new_files.wrong_answer("there is no robot below 'robots/'", "name one with '--robot PATH'")
