@@ -276,17 +276,11 @@ def write_names(names: Sequence[GraphName], ends: tuple[str, str], arguments: ar
     if arguments.json:
         emit(json.dumps([_counted(name, ends) for name in listed]))
         return 0
-    rows = [
-        (
-            graph_name.name,
-            ", ".join(graph_name.types),
-            str(len(graph_name.givers)),
-            str(len(graph_name.takers)),
-            graph_name.clash and f"! {graph_name.clash}",
-        )
-        for graph_name in listed
-    ]
-    emit(table([("name", "type", *ends, ""), *rows]))
+    rows = [("name", "type", *ends, "")]
+    for name in listed:
+        clash = name.clash and f"! {name.clash}"
+        rows.append((name.name, ", ".join(name.types), str(len(name.givers)), str(len(name.takers)), clash))
+    emit(table(rows))
     return 0
 
 

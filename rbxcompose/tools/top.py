@@ -147,18 +147,11 @@ def lines_of(picture: RobotPicture, width: int, height: int, *, colour: bool = F
 
 
 def _components(components: Sequence[ComponentPicture]) -> list[PictureLine]:
-    rows = [
-        (
-            component.name,
-            component.type,
-            component.state,
-            component.process,
-            str(component.restarts),
-            "-" if component.rate is None else f"{component.rate:.1f}",
-            "" if component.level in (None, Level.OK) else f"{component.level.name}: {component.message}",
-        )
-        for component in components
-    ]
+    rows = []
+    for one in components:
+        rate = "-" if one.rate is None else f"{one.rate:.1f}"
+        says = "" if one.level in (None, Level.OK) else f"{one.level.name}: {one.message}"
+        rows.append((one.name, one.type, one.state, one.process, str(one.restarts), rate, says))
     return _table([("component", "type", "state", "process", "restarts", "msg/s", ""), *rows], map(_alarm, components))
 
 

@@ -124,18 +124,17 @@ def aligned(text: str) -> str:
 
 def expand_data(manifest: RobotManifest) -> dict[str, Any]:
     """Return the robot as data: its values as in a manifest, and the origin of each by its dotted path."""
-    origins = {
-        ".".join(map(str, path)): {
-            "file": origin.span.file,
-            "line": origin.span.line,
-            "column": origin.span.column,
-            "layer": origin.layer,
-            **({"written": origin.written} if origin.written else {}),
-        }
-        for path, node in leaves(manifest.root)
-        for origin in [origin_of(manifest, path, node)]
-    }
+    origins = {}
+    for path, node in leaves(manifest.root):
+        origin = origin_of(manifest, path, node)
+        written = {"written": origin.written} if origin.written else {}
+        origins[".".join(map(str, path))] = {**placed(origin.span), "layer": origin.layer, **written}
     return {"robot": as_data(manifest.root), "origins": origins}
+
+
+def placed(span: Span) -> dict[str, Any]:
+    """Return where a place begins, as data."""
+    return {"file": span.file, "line": span.line, "column": span.column}
 
 
 def leaves(node: TreeNode, path: KeyPath = ()) -> Iterator[tuple[KeyPath, TreeNode]]:

@@ -95,13 +95,10 @@ def _wire(wire: Wire, port: Port[Any]) -> str:
 
 def with_places(found: Mapping[str, Any], robot: Robot) -> dict[str, Any]:
     """Return the difference, with the place of each new value that is written in the robot's files."""
-    components = [
-        {
-            **component,
-            "reasons": [{**each, "place": _place(robot, component["name"], each)} for each in component["reasons"]],
-        }
-        for component in found["components"]
-    ]
+    components = []
+    for component in found["components"]:
+        reasons = [{**each, "place": _place(robot, component["name"], each)} for each in component["reasons"]]
+        components.append({**component, "reasons": reasons})
     return {**found, "components": components}
 
 

@@ -149,17 +149,11 @@ def param_ls(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     if arguments.json:
         emit(to_json([{key: data[key] for key in _KEYS} for data in map(_data, found)]))
         return 0
-    cells = [
-        (
-            parameter.node,
-            parameter.about.name,
-            parameter.text(parameter.value)[:_WIDEST],
-            "" if parameter.about.read_only else "live",
-            parameter.about.description,
-        )
-        for parameter in found
-    ]
-    emit(table([("component", "parameter", "value", "", "about"), *cells]))
+    rows = [("component", "parameter", "value", "", "about")]
+    for one in found:
+        is_live = "" if one.about.read_only else "live"
+        rows.append((one.node, one.about.name, one.text(one.value)[:_WIDEST], is_live, one.about.description))
+    emit(table(rows))
     return 0
 
 
