@@ -110,9 +110,8 @@ def send_all(remotes: Iterable[Remote], bundle: Bundle) -> dict[str, str | Findi
     """Bring a bundle to all hosts at once; return its folder on each, or why it is not there."""
     away = [remote for remote in remotes if not remote.is_here]
     with ThreadPoolExecutor() as pool:
-        return dict(
-            zip((remote.name for remote in away), pool.map(lambda remote: send(remote, bundle), away), strict=True)
-        )
+        found = pool.map(lambda remote: send(remote, bundle), away)
+        return {remote.name: one for remote, one in zip(away, found, strict=True)}
 
 
 class Running:
@@ -253,9 +252,8 @@ def remember(path: str, shares: Shares) -> None:
     """Keep where shares of a system are brought up, for `compiled`."""
     with suppress(OSError), alone_in(made_base()):  # without it they are stopped by their names
         models = {key: share.model.model_dump() for key, share in (recalled(path, None) | dict(shares)).items()}
-        replace_file(
-            system_record(path), json.dumps([(*key, model) for key, model in models.items()]).encode(), mode=0o600
-        )
+        text = json.dumps([(*key, model) for key, model in models.items()])
+        replace_file(system_record(path), text.encode(), mode=0o600)
 
 
 def reached(shares: Shares, bundle: Bundle, *, needs_all: bool = True) -> dict[str, str]:

@@ -5,6 +5,7 @@ import json
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -114,24 +115,23 @@ def add_system_options(parser: argparse.ArgumentParser, *, has_profile: bool = F
     parser.add_argument("--ssh-config", metavar="FILE", help="of a system: ssh's configuration, instead of the user's")
 
 
+def _head_of(path: Path) -> bytes | None:
+    """Return the start of a file, None if it cannot be read."""
+    with suppress(OSError), open_regular(path) as file:
+        return file.read(_HEAD)
+    return None
+
+
 def kind_of(path: Path) -> str:
     """Return the kind that a manifest names; empty if it names none or cannot be read."""
-    try:
-        with open_regular(path) as file:
-            found = _KIND.search(file.read(_HEAD))
-    except OSError:
-        return ""
+    found = _KIND.search(_head_of(path) or b"")
     return found[1].decode() if found else ""
 
 
 def is_manifest(path: Path) -> bool:
     """Return whether a file without a kind is meant as a manifest, by its name or its keys."""
-    try:
-        with open_regular(path) as file:
-            head = file.read(_HEAD)
-    except OSError:
-        return True
-    if path.stem == "robot" or _MANIFEST.search(head):
+    head = _head_of(path)
+    if head is None or path.stem == "robot" or _MANIFEST.search(head):
         return True
     from rbxcompose.manifest.registry import robot_keys  # takes longer to import
 

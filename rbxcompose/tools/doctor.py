@@ -126,11 +126,8 @@ class HostFacts:
     @property
     def robots(self) -> list[Robot]:
         """Return the robots that the files describe, of all that are examined."""
-        return [
-            robot
-            for robot in (self.file, *(running_robot.robot for running_robot in self.running))
-            if robot is not None
-        ]
+        described = (self.file, *(running.robot for running in self.running))
+        return [robot for robot in described if robot is not None]
 
 
 Examine = Callable[[HostFacts], Iterable[str | Finding]]

@@ -97,11 +97,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--namespace", type=_namespace, metavar="NAME", help="put it before all topics")
     parser.add_argument("--over", action="store_true", help="also topics that are being published now")
     parser.add_argument("--loop", action="store_true", help="start again at the end, until Ctrl-C")
-    parser.add_argument(
-        "--into",
-        metavar="COMPONENT",
-        help="run one component of a recorded run again, as it was or as in --robot PATH, and compare",
-    )
+    words = "run one component of a recorded run again, as it was or as in --robot PATH, and compare"
+    parser.add_argument("--into", metavar="COMPONENT", help=words)
     parser.add_argument("--write", type=Path, metavar="FILE", help="with --into: keep what it sends now")
     add_layer_options(parser)
     parser.add_argument("--info", action="store_true", help="only show topics, types, counts and duration")
