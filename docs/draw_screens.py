@@ -26,8 +26,8 @@ from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.testing.bench import Bench
 from rbxcompose.tools import mission_view as live_view
-from rbxcompose.tools.inspection.mission_html import STYLE, mission_html
 from rbxcompose.tools.inspection.mission_text import running_lines
+from rbxcompose.tools.inspection.pages import STYLE, mission_html
 from rbxcompose.tools.top import ComponentPicture, RobotPicture, Tree
 from rbxcompose.tools.top import lines_of as lines_of_top
 

@@ -38,8 +38,8 @@ from rbxcompose.missions.sources import SkillSource, SkillWay
 from rbxcompose.missions.view.picture import MissionPicture, picture_from_data, picture_of
 from rbxcompose.missions.view.replica import joined, status_list
 from rbxcompose.sdk.skills import skill_names
-from rbxcompose.tools.inspection.mission_html import mission_html
 from rbxcompose.tools.inspection.mission_text import mission_dot, mission_mermaid, mission_sentences, mission_text
+from rbxcompose.tools.inspection.pages import mission_html
 from rbxcompose.tools.mission_tests.explorer import ExplorationLimits, text_of
 from rbxcompose.tools.mission_tests.explorer import explore as explore_program
 
@@ -70,15 +70,11 @@ def robot_of(path: str | None) -> Robot:
         ReportedError: if it has errors.
     """
     if path is None:
-        path = _running_file() or robot_path(None, may_run=False)
+        found = robots_up()
+        state = known_state(found[0]) if len(found) == 1 else None
+        path = state.file if state is not None else robot_path(None, may_run=False)
     robot, _ = without_errors(compile_robot(path, environment=os.environ))
     return robot
-
-
-def _running_file() -> str | None:
-    found = robots_up()
-    state = known_state(found[0]) if len(found) == 1 else None
-    return state.file if state is not None else None
 
 
 def show(arguments: argparse.Namespace) -> int:

@@ -12,8 +12,8 @@ from rbxcompose.missions.program.outcomes import FAILURE, IDLE, RUNNING, SKIPPED
 from rbxcompose.missions.program.program import RobotNames
 from rbxcompose.missions.view.picture import MissionPicture, picture_from_data, picture_of, picture_to_data
 from rbxcompose.testing.golden import Golden
-from rbxcompose.tools.inspection.mission_html import mission_html
 from rbxcompose.tools.inspection.mission_text import mission_dot, mission_lines, mission_mermaid, mission_text
+from rbxcompose.tools.inspection.pages import mission_html
 from tests.executive.fake_robot import program_of
 from tests.inspection.pictures import undrawn
 
@@ -141,7 +141,7 @@ def machine(count: int) -> MissionPicture:
 
 
 def test_a_machine_that_nobody_could_follow_is_not_laid_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rbxcompose.tools.inspection.mission_html.lay_out", None)
+    monkeypatch.setattr("rbxcompose.tools.inspection.pages.lay_out", None)
     with pytest.raises(NotDoneError, match="mission 'web' has too many transitions for a picture") as caught:
         mission_html(machine(200))
     assert caught.value.finding.code == "RBX9014"

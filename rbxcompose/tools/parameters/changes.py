@@ -321,18 +321,13 @@ def assignments(words: Sequence[str]) -> list[tuple[str, str, str]]:
     """Return component, parameter and value of each change that the words of `param set` mean; none if they do not."""
     if len(words) == _WORDS and "=" not in words[0]:
         return [(words[0], words[1], words[2])]
-    return [_pair(word) for word in words] if all(map(_is_pair, words)) else []
-
-
-def _is_pair(word: str) -> bool:
-    path, equals, _ = word.partition("=")
-    return bool(equals) and SEPARATOR in path
-
-
-def _pair(word: str) -> tuple[str, str, str]:
-    path, _, value = word.partition("=")
-    component, _, name = path.partition(SEPARATOR)
-    return component, name, value
+    found = []
+    for path, equals, value in (word.partition("=") for word in words):
+        component, separator, name = path.partition(SEPARATOR)
+        if not equals or not separator:
+            return []
+        found.append((component, name, value))
+    return found
 
 
 def message_of(value: object) -> rcl_interfaces.ParameterValue:
