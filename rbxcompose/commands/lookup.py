@@ -22,6 +22,7 @@ WHICH = kind("RBX9003")
 REFUSED = kind("RBX9004")
 NO_ANSWER = kind("RBX9005")
 UNSAFE = kind("RBX9006")
+_ADDRESSED = "the robot, by name or file; or a system"
 NO_SUPERVISOR = "its supervisor has died"
 
 
@@ -30,10 +31,16 @@ def add_robot_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--robot", metavar="NAME", help="the robot, if several are up")
 
 
+def add_addressed_robot(parser: argparse.ArgumentParser, words: str = _ADDRESSED) -> None:
+    """Declare the robot as an argument, or as `--robot NAME`, either of which may be left out."""
+    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help=words)
+    add_robot_option(parser)
+    add_system_options(parser)
+
+
 def add_robot_argument(parser: argparse.ArgumentParser) -> None:
     """Declare the robot as the only argument, for what is typed in a hurry; `--robot` says the same."""
-    words = "the robot, by name or file; or a system"
-    parser.add_argument("robot", nargs="?", default=argparse.SUPPRESS, metavar="ROBOT|PATH", help=words)
+    parser.add_argument("robot", nargs="?", default=argparse.SUPPRESS, metavar="ROBOT|PATH", help=_ADDRESSED)
 
 
 def find_robot(wanted: str | None) -> RobotFolder:

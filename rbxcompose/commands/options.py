@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import math
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
@@ -186,6 +187,14 @@ def add_count_options(parser: argparse.ArgumentParser) -> None:
     counts = parser.add_mutually_exclusive_group()
     counts.add_argument("--once", dest="count", action="store_const", const=1, help="end after one")
     counts.add_argument("-n", "--count", type=count, metavar="N", help="end after this many")
+
+
+def speed_up(text: str, examples: str) -> float:
+    """Read `20x`, how much faster than real time something shall be."""
+    with suppress(ValueError):
+        if 0 < (factor := float(text.removesuffix("x"))) < math.inf:
+            return factor
+    raise argparse.ArgumentTypeError(f"'{text}' is not a rate; write {examples}")
 
 
 def seconds(text: str) -> float:

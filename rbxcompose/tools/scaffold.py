@@ -63,36 +63,21 @@ def world_files(name: str, about: str = WORLD_ABOUT) -> dict[str, str]:
     }
 
 
-@dataclass(frozen=True, slots=True)
-class RobotAnswers:
-    """What must be known about a new robot; the dock is always at the origin."""
-
-    name: str
-    about: str = ROBOT_ABOUT
-    base: str = BASE
-    places: Sequence[Place] = PLACES
-
-
-def robot_files(answers: RobotAnswers) -> dict[str, str]:
-    """Return the texts of the robot's file, its mission and its test, by path."""
-    places = [DOCK, *answers.places]
+def robot_files(
+    name: str, about: str = ROBOT_ABOUT, base: str = BASE, goals: Sequence[Place] = PLACES
+) -> dict[str, str]:
+    """Return the texts of the robot's file, its mission and its test, by path; the dock is always at the origin."""
+    places = [DOCK, *goals]
     longest = max(math.hypot(place.x - other.x, place.y - other.y) for place, other in combinations(places, 2)) / _SPEED
     timeout = 10 * math.ceil((2 * longest + 20) / 10)  # [s], with time to turn
     minutes = max(10, math.ceil(8 * longest / 60))  # so that the last third of the charge is enough for the way home
-    names = [place.name for place in answers.places]
-    said = {"name": answers.name, "timeout": f"{timeout} s"}
+    names = [place.name for place in goals]
+    said = {"name": name, "timeout": f"{timeout} s"}
+    whole = {**said, "about": about, "places": places, "base": base, "base_settings": _base_settings(base)}
     return {
-        f"robots/{answers.name}/robot.yaml": render(
-            "robot.yaml.j2",
-            **said,
-            about=answers.about,
-            places=places,
-            base=answers.base,
-            base_settings=_base_settings(answers.base),
-            runtime=f"{minutes} min",
-        ),
-        f"missions/{answers.name}.yaml": render("robot_mission.yaml.j2", **said, places=names),
-        f"tests/test_{answers.name}.py": render(
+        f"robots/{name}/robot.yaml": render("robot.yaml.j2", **whole, runtime=f"{minutes} min"),
+        f"missions/{name}.yaml": render("robot_mission.yaml.j2", **said, places=names),
+        f"tests/test_{name}.py": render(
             "robot_test.py.j2",
             **said,
             tour=", ".join(f'"{name}"' for name in (*names, DOCK.name)),

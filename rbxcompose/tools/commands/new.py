@@ -95,7 +95,7 @@ def _robot(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
         places = tuple(asker.ask_several(question, scaffold.read_next_place)) or scaffold.PLACES
     else:
         places = scaffold.read_places(arguments.place)
-    files = scaffold.robot_files(scaffold.RobotAnswers(name, about, base, places))
+    files = scaffold.robot_files(name, about, base, places)
     path = shown_name(arguments.into / f"robots/{name}")
     then = (
         f"rbxcompose check {path}",

@@ -11,7 +11,6 @@ its recorded inputs, and compares its outputs with the recording. The settings a
 
 import argparse
 import json
-import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -31,7 +30,7 @@ from rbxcompose.bus.zenoh_session import open_router
 from rbxcompose.commands.console import NotDoneError, emit, misused, refuse, write_report
 from rbxcompose.commands.guest import NO_ROUTER, Guest
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place, robots_up
-from rbxcompose.commands.options import seconds
+from rbxcompose.commands.options import seconds, speed_up
 from rbxcompose.commands.targets import add_layer_options, compiled
 from rbxcompose.compiler.plan.dump import PlanTextError, dump, load
 from rbxcompose.compiler.plan.model import Instance, Plan
@@ -256,13 +255,7 @@ def _namespace(text: str) -> str:
 
 def _rate(text: str) -> float:
     """Read `2x`."""
-    try:
-        rate = float(text.removesuffix("x"))
-    except ValueError:
-        rate = math.nan
-    if not 0 < rate < math.inf:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a rate; write '2x' or '0.5x'")
-    return rate
+    return speed_up(text, "'2x' or '0.5x'")
 
 
 @contextmanager

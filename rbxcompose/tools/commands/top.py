@@ -16,9 +16,9 @@ from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import NotDoneError, emit, has_colour
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.hosts import Remote, Running, Shares, SystemCommand
-from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, place_of
+from rbxcompose.commands.lookup import NOT_UP, add_addressed_robot, find_robot, place_of
 from rbxcompose.commands.messages import to_json
-from rbxcompose.commands.options import EACH, add_json_option, add_system_options
+from rbxcompose.commands.options import EACH, add_json_option
 from rbxcompose.commands.terminal import LiveScreen, is_terminal
 from rbxcompose.tools.top import RobotPicture, Sampler, ShareView, lines_of, system_lines
 
@@ -33,9 +33,7 @@ _AGAIN = 3.0  # [s] after a command has ended until it is started again
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="the robot, by name or file; or a system")
-    add_robot_option(parser)
-    add_system_options(parser)
+    add_addressed_robot(parser)
     parser.add_argument("--once", action="store_true", help="watch for a second, print the result, and end")
     add_json_option(parser)
     parser.add_argument("--follow", action="store_true", help="with --json: a line each second, until interrupted")

@@ -5,14 +5,13 @@ Exit codes: 0 fine, 1 findings, 2 wrong usage, 3 the mission failed, 4 the robot
 """
 
 import argparse
-import math
 from pathlib import Path
 
 from rbxcompose.base.units import TIME, UnitError, to_si
 from rbxcompose.commands import targets
 from rbxcompose.commands.console import FINDINGS, misused, refuse
 from rbxcompose.commands.formats.json_ import render_json
-from rbxcompose.commands.options import add_system_options, is_system
+from rbxcompose.commands.options import add_system_options, is_system, speed_up
 from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.recording.codes import UNWRITABLE
 from rbxcompose.tools.live_rules import LiveRules
@@ -102,12 +101,7 @@ def _rate(text: str) -> RunOptions:
     """Read `20x`, `max` or `1x`."""
     if text == "max":
         return RunOptions(is_stepped=True)
-    try:
-        rate = float(text.removesuffix("x"))
-    except ValueError:
-        rate = math.nan
-    if not 0 < rate < math.inf:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a rate; write '20x', '1x' or 'max'")
+    rate = speed_up(text, "'20x', '1x' or 'max'")
     return RunOptions() if rate == 1 else RunOptions(is_stepped=True, rate=rate)
 
 

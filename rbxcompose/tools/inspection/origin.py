@@ -1,6 +1,6 @@
 """The composed robot as one manifest, with the origin of each value: its place, its layer, and how it was written."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rbxcompose.base.config import HIDDEN, Secret
@@ -13,7 +13,7 @@ from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_manifest import ROBOT_LAYER, RobotManifest
 from rbxcompose.manifest.arguments import show
 from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, children
+from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at, children
 
 LONGEST = 60  # characters of a text shown beside a value
 
@@ -54,6 +54,15 @@ def is_leaf(node: TreeNode) -> bool:
         case SequenceNode(items=items):
             return not items
     return True
+
+
+def indexed(root: TreeNode, path: Sequence[str | int]) -> KeyPath:
+    """Return a path whose list indices, which count from 0, are numbers."""
+    found: KeyPath = ()
+    for key in path:
+        is_item = isinstance(at(root, found), SequenceNode) and str(key).isdecimal()
+        found = (*found, int(key) if is_item else key)
+    return found
 
 
 def shown(node: TreeNode) -> str:

@@ -27,7 +27,7 @@ from rbxcompose.missions.engine.value_text import show as show_value
 from rbxcompose.missions.program.machines import Input
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Serves, ServesAction, ServesTopic
 from rbxcompose.tools.inspection.diagram import does, keys_of, qos_of
-from rbxcompose.tools.inspection.origin import Origin, as_data, expand_below, origin_of, placed, shown
+from rbxcompose.tools.inspection.origin import Origin, as_data, expand_below, indexed, origin_of, placed, shown
 
 NO_SUCH_PATH = kind("RBX9011")
 
@@ -38,11 +38,7 @@ def path_of(robot: Robot, text: str) -> KeyPath:
     manifest = robot.manifest
     if names[0] not in robot_keys():
         names.insert(0, _section_of(manifest, str(names[0])))
-    for index, name in enumerate(names):
-        above = found_at(manifest, tuple(names[:index]))
-        if isinstance(above, SequenceNode) and str(name).isdecimal():
-            names[index] = int(name)
-    return tuple(names)
+    return indexed(tree_of(manifest, tuple(names)), names)
 
 
 def _section_of(manifest: RobotManifest, name: str) -> str:
