@@ -111,7 +111,7 @@ def send_all(remotes: Iterable[Remote], bundle: Bundle) -> dict[str, str | Findi
     away = [remote for remote in remotes if not remote.is_here]
     with ThreadPoolExecutor() as pool:
         found = pool.map(lambda remote: send(remote, bundle), away)
-        return {remote.name: one for remote, one in zip(away, found, strict=True)}
+        return {remote.name: result for remote, result in zip(away, found, strict=True)}
 
 
 class Running:

@@ -236,8 +236,8 @@ class _SystemChange:
         problems = [_refusal(key, entry) for key, entry in found.items() if isinstance(entry, str)]
         is_refused = bool(problems) and not arguments.partial
         if arguments.json:
-            told = [{"host": host, "robot": robot, "answer": entry} for (host, robot), entry in found.items()]
-            emit(json.dumps({"hosts": told}))
+            answers = [{"host": host, "robot": robot, "answer": entry} for (host, robot), entry in found.items()]
+            emit(json.dumps({"hosts": answers}))
         elif arguments.dry_run or not is_refused:
             self._show(found)
         for problem in problems:

@@ -148,10 +148,10 @@ def lines_of(picture: RobotPicture, width: int, height: int, *, colour: bool = F
 
 def _components(components: Sequence[ComponentPicture]) -> list[PictureLine]:
     rows = []
-    for one in components:
-        rate = "-" if one.rate is None else f"{one.rate:.1f}"
-        says = "" if one.level in (None, Level.OK) else f"{one.level.name}: {one.message}"
-        rows.append((one.name, one.type, one.state, one.process, str(one.restarts), rate, says))
+    for each in components:
+        rate = "-" if each.rate is None else f"{each.rate:.1f}"
+        says = "" if each.level in (None, Level.OK) else f"{each.level.name}: {each.message}"
+        rows.append((each.name, each.type, each.state, each.process, str(each.restarts), rate, says))
     return _table([("component", "type", "state", "process", "restarts", "msg/s", ""), *rows], map(_alarm, components))
 
 

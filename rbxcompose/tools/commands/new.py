@@ -31,16 +31,6 @@ _WIDEST = 4096  # characters per line, enough for any path
 ABOUT = "What is it for?"
 
 
-@dataclass(frozen=True, slots=True)
-class New:
-    """Files to write below a folder, and what a user may want to do next."""
-
-    folder: Path
-    files: Mapping[str, str]
-    then: Sequence[str]
-    entry: Callable[[], list[str]] | None = None  # called once the files exist; returns the lines that report it
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     name = argument("name", metavar="NAME", help="lower-case letters, digits, underscores")
@@ -70,23 +60,26 @@ def run(arguments: argparse.Namespace) -> int:
     """Ask, write the files, and report them."""
     asker = new_files.Asker(is_asking=not arguments.yes)
     try:
-        return _write(arguments.make(arguments, asker))
+        return int(arguments.make(arguments, asker))
     except new_files.CancelledError:
         return INTERRUPTED
 
 
-def _write(new: New) -> int:
-    finding = new_files.write_new(new.folder, new.files)
+def _write(folder: Path, files: Mapping[str, str], then: Sequence[str], entry: Callable[[], list[str]] = list) -> int:
+    """Write files below a folder, and show what a user may want to do next.
+
+    `entry` is called once the files exist, and returns the lines that report it.
+    """
+    finding = new_files.write_new(folder, files)
     if finding is not None:
         return refuse(finding)
-    lines = [f"wrote {shown_name(new.folder / file)}" for file in new.files]
-    lines += [] if new.entry is None else new.entry()
-    lines += ["then:", *(f"  {line}" for line in new.then)]
+    lines = [f"wrote {shown_name(folder / file)}" for file in files]
+    lines += [*entry(), "then:", *(f"  {line}" for line in then)]
     emit("\n".join(plain(line, _WIDEST) for line in lines))
     return 0
 
 
-def _robot(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
+def _robot(arguments: argparse.Namespace, asker: new_files.Asker) -> int:
     name = new_files.read_name(arguments.name, "the robot")
     about = asker.ask(ABOUT, new_files.read_text, scaffold.ROBOT_ABOUT, given=arguments.about)
     base = asker.ask("Which component drives it?", scaffold.read_base, scaffold.BASE, given=arguments.base)
@@ -102,36 +95,36 @@ def _robot(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
         f"rbxcompose up --rate 10x {path}",
         f"python -m pytest {_test(arguments, name)}",
     )
-    return New(arguments.into, files, then)
+    return _write(arguments.into, files, then)
 
 
 def _test(arguments: argparse.Namespace, name: str) -> str:
     return shown_name(arguments.into / f"tests/test_{name}.py")
 
 
-def _part(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
+def _part(arguments: argparse.Namespace, asker: new_files.Asker) -> int:
     name = new_files.read_name(arguments.name, "the part")
     about = asker.ask(ABOUT, new_files.read_text, scaffold.PART_ABOUT, given=arguments.about)
     then = (f"include it in a robot, as parts/{name}.yaml shows", f"python -m pytest {_test(arguments, name)}")
-    return New(arguments.into, scaffold.part_files(name, about), then)
+    return _write(arguments.into, scaffold.part_files(name, about), then)
 
 
-def _world(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
+def _world(arguments: argparse.Namespace, asker: new_files.Asker) -> int:
     name = new_files.read_name(arguments.name, "the world")
     about = asker.ask(ABOUT, new_files.read_text, scaffold.WORLD_ABOUT, given=arguments.about)
     path = shown_name(arguments.into / f"worlds/{name}.yaml")
     then = (f"rbxcompose world picture {path}", f"rbxcompose up ROBOT --world {path}")
-    return New(arguments.into, scaffold.world_files(name, about), then)
+    return _write(arguments.into, scaffold.world_files(name, about), then)
 
 
-def _component(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
+def _component(arguments: argparse.Namespace, asker: new_files.Asker) -> int:
     name = scaffold.read_component_name(arguments.name)
     folder = shown_name(arguments.into / name)
     then = (f"python -m pip install -e {folder}", f"python -m pytest {folder}", f"use it in a robot: type: {name}")
-    return New(arguments.into, scaffold.component_files(name), then)
+    return _write(arguments.into, scaffold.component_files(name), then)
 
 
-def _mission(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
+def _mission(arguments: argparse.Namespace, asker: new_files.Asker) -> int:
     home = find_home(arguments.robot)
     usual = home.usual(new_files.read_name(arguments.name, "the mission", home.robot.manifest.missions))
     answers = replace(usual, about=asker.ask(ABOUT, new_files.read_text, usual.about, given=arguments.about))
@@ -148,7 +141,7 @@ def _mission(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
         why = f"it could not be added to {file} safely; " if is_wanted else ""
         return [f"{why}write into {file}:", "  missions:", f"    {answers.name}: {answers.entry}"]
 
-    return New(home.project, scaffold.mission_files(answers), then, entry)
+    return _write(home.project, scaffold.mission_files(answers), then, entry)
 
 
 @dataclass(frozen=True, slots=True)

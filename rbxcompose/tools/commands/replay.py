@@ -336,26 +336,10 @@ def _instance(plan: Plan, name: str) -> Instance:
         names = [one.name for one in plan.instances]
         message = f"the robot '{plain(plan.robot)}' has no component '{plain(name, 60)}'"
         raise NotDoneError(codes.NOT_ENOUGH.at(None, message, help=suggest(name, names, "components")))
-    if HIDDEN in _settings(plan, instance):
+    if json.dumps(HIDDEN) in dump(Plan(plan.robot, plan.file, (instance,))):
         message = f"'{name}' has a secret, which a recording does not hold"
         raise NotDoneError(codes.NOT_ENOUGH.at(None, message, help="'--robot PATH' takes it from the robot's file"))
     return instance
-
-
-def _settings(plan: Plan, instance: Instance) -> list[object]:
-    """Return the values of a recorded configuration."""
-    whole = json.loads(dump(Plan(plan.robot, plan.file, (instance,))))
-    left: list[object] = [whole["instances"][0]["config"]]
-    found: list[object] = []
-    while left:
-        one = left.pop()
-        if isinstance(one, dict):
-            left += one.values()
-        elif isinstance(one, list):
-            left += one
-        else:
-            found.append(one)
-    return found
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from rbxcompose.base.findings import Report, Span
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.body.xml_reader import quoted
 from rbxcompose.manifest.files import shown_name
-from rbxcompose.manifest.reader import read_source, read_text
+from rbxcompose.manifest.reader import read_file
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.language.asked import expression_of
 from rbxcompose.missions.language.grammar import long_form
@@ -77,11 +77,7 @@ def exported(path: Path, report: Report, sources: MutableMapping[str, str]) -> d
 
 
 def _read(path: Path, report: Report, sources: MutableMapping[str, str]) -> MappingNode | None:
-    shown = shown_name(path)
-    text, findings = read_source(path, shown, sources)
-    root: TreeNode | None = None
-    if text is not None:
-        root, findings = read_text(text, shown)
+    root, findings = read_file(path, shown_name(path), sources)
     report.extend(findings)
     if isinstance(root, MappingNode):
         said = root.get("kind")

@@ -418,8 +418,8 @@ def save(live: LiveSettings, changes: Sequence[LiveChange], compiled: Compiled, 
             write(texts)
         places = sorted(str(edit.span) for edit in texts.fix.edits)
     if arguments.json:
-        told = {"places": places, "difference": lines, "hash": seen, "dry_run": arguments.dry_run}
-        emit(json.dumps({"saved": [_data(change) for change in changes], **told}))
+        written = {"places": places, "difference": lines, "hash": seen, "dry_run": arguments.dry_run}
+        emit(json.dumps({"saved": [_data(change) for change in changes], **written}))
         return 0
     for change in changes:
         emit(_change_text(change))

@@ -150,9 +150,9 @@ def param_ls(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
         emit(to_json([{key: data[key] for key in _KEYS} for data in map(_data, found)]))
         return 0
     rows = [("component", "parameter", "value", "", "about")]
-    for one in found:
-        is_live = "" if one.about.read_only else "live"
-        rows.append((one.node, one.about.name, one.text(one.value)[:_WIDEST], is_live, one.about.description))
+    for parameter in found:
+        about, value = parameter.about, parameter.text(parameter.value)[:_WIDEST]
+        rows.append((parameter.node, about.name, value, "" if about.read_only else "live", about.description))
     emit(table(rows))
     return 0
 
