@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
@@ -158,7 +158,7 @@ def _row(robot: str, shares: Sequence[ShareFacts]) -> dict[str, str]:
         "robot": robot,
         "host": ", ".join(host for _, host, _ in shares),
         "state": _UP if set(states) == {_UP} else ", ".join(text for text in wrong if not text.endswith(_UP)),
-        "mission": "; ".join(_missions(answers)),
+        "mission": "; ".join(str(facts["mission"]) for facts in answers if facts.get("mission")),
         "battery": ", ".join(text for facts in answers for text in facts.get("batteries", {}).values()),
     }
 
@@ -168,7 +168,3 @@ def _state(facts: Mapping[str, Any]) -> str:
         return str(facts["state"])
     off = [component["name"] for component in facts["components"] if component["state"] != "active"]
     return f"{', '.join(off)} not active" if off else _UP
-
-
-def _missions(answers: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    yield from (str(facts["mission"]) for facts in answers if facts.get("mission"))

@@ -48,12 +48,7 @@ def origin_of(manifest: RobotManifest, path: KeyPath, node: TreeNode) -> Origin:
 
 def is_leaf(node: TreeNode) -> bool:
     """Return whether a node has no children."""
-    match node:
-        case MappingNode(entries=entries):
-            return not entries
-        case SequenceNode(items=items):
-            return not items
-    return True
+    return not any(True for _ in children(node))
 
 
 def indexed(root: TreeNode, path: Sequence[str | int]) -> KeyPath:
