@@ -17,7 +17,7 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.body.picture import draw
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.tools.inspection.diagram import diagram_of, folded
-from rbxcompose.tools.inspection.graph_html import STYLE, html
+from rbxcompose.tools.inspection.pages import STYLE, html
 
 DOCS = Path(__file__).parent
 ROBOTS = DOCS.parent / "robots"

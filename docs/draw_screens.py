@@ -26,9 +26,8 @@ from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.testing.bench import Bench
 from rbxcompose.tools import mission_view as live_view
-from rbxcompose.tools.inspection.mission_html import STYLE, mission_html
 from rbxcompose.tools.inspection.mission_text import running_lines
-from rbxcompose.tools.top import ComponentPicture, RobotPicture, Tree
+from rbxcompose.tools.inspection.pages import MISSION_STYLE, mission_html
 from rbxcompose.tools.top import lines_of as lines_of_top
 
 DOCS = Path(__file__).parent
@@ -133,7 +132,7 @@ class Run:
         picture = picture_from_data(executive.picture(ShowPicture(MISSION)))
         page = mission_html(picture, status_list(self._seen(), picture.count))
         body = page.partition("<body>")[2].partition("</body>")[0]
-        return PAGE_FRAME.format(style=STYLE, body=body)
+        return PAGE_FRAME.format(style=MISSION_STYLE, body=body)
 
     def top(self) -> list[str]:
         """Return the lines of `top`, without the loads of processes."""
@@ -143,28 +142,43 @@ class Run:
         for instance in self.plan.instances:
             told = leaves.get(instance.name)
             rates = [len(self.heard[key]) - self.counts[key] for key in self.heard if key[0] == instance.name]
-            level = None if told is None else level_of(told.level)
-            message = "" if told is None else told.message
-            rate = float(sum(rates)) if any(rates) else None
             components.append(
-                ComponentPicture(instance.name, instance.type, "active", instance.process, 0, rate, level, message)
+                {
+                    "name": instance.name,
+                    "type": instance.type,
+                    "state": "active",
+                    "process": instance.process,
+                    "restarts": 0,
+                    "rate": float(sum(rates)) if any(rates) else None,
+                    "level": None if told is None else level_of(told.level).name,
+                    "message": "" if told is None else told.message,
+                }
             )
         groups = [status for status in statuses.values() if status.name.count("/") == 1]
-        health = [(group.name.lstrip("/"), level_of(group.level), group.message) for group in groups]
-        picture = RobotPicture(
-            self.plan.robot, True, None, "", self._charge(), components, (), health, (), self._trees()
-        )
+        picture = {
+            "robot": self.plan.robot,
+            "is_supervised": True,
+            "router": None,
+            "mission": "",
+            "missions": [self._running()],
+            "batteries": {"battery": f"{self.charge[-1].data:.1f} %"},
+            "components": components,
+            "processes": [],
+            "diagnostics": [
+                {"group": group.name.lstrip("/"), "level": level_of(group.level).name, "message": group.message}
+                for group in groups
+            ],
+            "warnings": [],
+        }
         lines = lines_of_top(picture, WIDTH, 100, colour=True)
         loads = next(turn for turn, line in enumerate(lines) if "process" in line and "memory" in line)
         return [*lines[: loads - 1], *lines[loads + 1 :]]
 
-    def _charge(self) -> list[tuple[str, str]]:
-        return [("battery", f"{self.charge[-1].data:.1f} %")]
-
-    def _trees(self) -> list[Tree]:
+    def _running(self) -> dict[str, Any]:
         seen = self._seen()
         picture = picture_from_data(self._executive().picture(ShowPicture(MISSION)))
-        return [Tree(MISSION, seen["state"], running_lines(picture, status_list(seen, picture.count), WIDTH))]
+        running = running_lines(picture, status_list(seen, picture.count), WIDTH)
+        return {"mission": MISSION, "state": seen["state"], "running": running}
 
     def _seen(self) -> Mapping[str, Any]:
         return joined({"statuses": {}, "data": {}}, self._executive().look_at(LookAtMission(MISSION)))

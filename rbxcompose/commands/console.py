@@ -104,9 +104,7 @@ def write_report(report: Report, sources: Sources) -> None:
 
 def refuse(finding: Finding) -> int:
     """Write one finding to stderr and return the exit code for it."""
-    report = Report()
-    report.add(finding)
-    write_report(report, {})
+    write_report(Report([finding]), {})
     return FINDINGS
 
 

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from functools import partial
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import TYPE_CHECKING, Any, Self
 
 import zenoh
@@ -104,9 +104,7 @@ class Guest:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         (self._bus or self.transport).close()
         self._selector.close()
         self._inbox.close()
@@ -276,17 +274,11 @@ def write_names(names: Sequence[GraphName], ends: tuple[str, str], arguments: ar
     if arguments.json:
         emit(json.dumps([_counted(name, ends) for name in listed]))
         return 0
-    rows = [
-        (
-            graph_name.name,
-            ", ".join(graph_name.types),
-            str(len(graph_name.givers)),
-            str(len(graph_name.takers)),
-            graph_name.clash and f"! {graph_name.clash}",
-        )
-        for graph_name in listed
-    ]
-    emit(table([("name", "type", *ends, ""), *rows]))
+    rows = [("name", "type", *ends, "")]
+    for name in listed:
+        clash = name.clash and f"! {name.clash}"
+        rows.append((name.name, ", ".join(name.types), str(len(name.givers)), str(len(name.takers)), clash))
+    emit(table(rows))
     return 0
 
 

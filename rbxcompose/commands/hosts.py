@@ -110,9 +110,8 @@ def send_all(remotes: Iterable[Remote], bundle: Bundle) -> dict[str, str | Findi
     """Bring a bundle to all hosts at once; return its folder on each, or why it is not there."""
     away = [remote for remote in remotes if not remote.is_here]
     with ThreadPoolExecutor() as pool:
-        return dict(
-            zip((remote.name for remote in away), pool.map(lambda remote: send(remote, bundle), away), strict=True)
-        )
+        found = pool.map(lambda remote: send(remote, bundle), away)
+        return {remote.name: result for remote, result in zip(away, found, strict=True)}
 
 
 class Running:
@@ -253,9 +252,8 @@ def remember(path: str, shares: Shares) -> None:
     """Keep where shares of a system are brought up, for `compiled`."""
     with suppress(OSError), alone_in(made_base()):  # without it they are stopped by their names
         models = {key: share.model.model_dump() for key, share in (recalled(path, None) | dict(shares)).items()}
-        replace_file(
-            system_record(path), json.dumps([(*key, model) for key, model in models.items()]).encode(), mode=0o600
-        )
+        text = json.dumps([(*key, model) for key, model in models.items()])
+        replace_file(system_record(path), text.encode(), mode=0o600)
 
 
 def reached(shares: Shares, bundle: Bundle, *, needs_all: bool = True) -> dict[str, str]:
@@ -314,12 +312,11 @@ def _show(label: str, line: str) -> None:
 
 def follow_all(shares: Shares, words: Callable[[str], Sequence[str]]) -> int:
     """Run a verb for each share, and show each line as it comes."""
-    return follow_commands(
-        {
-            label_of(shares, host, robot): remote.rbxcompose(words(robot), has_terminal=True)
-            for (host, robot), remote in shares.items()
-        }
-    )
+    commands = {
+        label_of(shares, host, robot): remote.rbxcompose(words(robot), has_terminal=True)
+        for (host, robot), remote in shares.items()
+    }
+    return follow_commands(commands)
 
 
 def ask_all(shares: Shares, words: Callable[[str], Sequence[str]], *, in_json: bool, tolerates: str = "") -> int:
@@ -334,11 +331,8 @@ def ask_all(shares: Shares, words: Callable[[str], Sequence[str]], *, in_json: b
     if in_json:
         emit(json.dumps({"hosts": [_data(label, entry) for label, entry in done.items()]}))
     else:
-        emit(
-            "\n\n".join(
-                "\n".join([f"{label}:", *(f"  {line}" for line in entry.lines)]) for label, entry in done.items()
-            )
-        )
+        texts = ["\n".join([f"{label}:", *(f"  {line}" for line in entry.lines)]) for label, entry in done.items()]
+        emit("\n\n".join(texts))
     return max(codes[label] for label in done)
 
 

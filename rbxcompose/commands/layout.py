@@ -25,10 +25,6 @@ MOST_EFFORT = 25_000  # takes about a second
 Edge = tuple[str, str]
 
 
-class NotDrawnError(NotDoneError):
-    """Raised if no picture could be drawn; the finding says why."""
-
-
 @dataclass(frozen=True, slots=True)
 class LayoutItem:
     """An item to be placed: its size [px], its group, if any, and whether its ends are round."""
@@ -65,11 +61,11 @@ def graphviz() -> Any:
     """Return the module that runs Graphviz.
 
     Raises:
-        NotDrawnError: if it is not installed.
+        NotDoneError: if it is not installed.
     """
     if find_spec("pygraphviz") is None:
         help_text = "install it with: pip install 'rbxcompose[graph]'"
-        raise NotDrawnError(NO_GRAPHVIZ.at(None, "a picture needs Graphviz, which is not installed", help=help_text))
+        raise NotDoneError(NO_GRAPHVIZ.at(None, "a picture needs Graphviz, which is not installed", help=help_text))
     import pygraphviz
 
     return pygraphviz
@@ -84,7 +80,7 @@ def lay_out(items: Sequence[LayoutItem], edges: Sequence[Edge]) -> Layout:
     """Return a position for each item and a path for each edge; the same input gives the same picture.
 
     Raises:
-        NotDrawnError: if Graphviz is not installed.
+        NotDoneError: if Graphviz is not installed.
     """
     graph = graphviz().AGraph(strict=False, directed=True, **_GRAPH)
     graph.node_attr.update(_NODE)

@@ -3,7 +3,6 @@
 import argparse
 import json
 import os
-from collections.abc import Iterable
 from contextlib import suppress
 from typing import TypeVar
 
@@ -23,6 +22,7 @@ WHICH = kind("RBX9003")
 REFUSED = kind("RBX9004")
 NO_ANSWER = kind("RBX9005")
 UNSAFE = kind("RBX9006")
+_ADDRESSED = "the robot, by name or file; or a system"
 NO_SUPERVISOR = "its supervisor has died"
 
 
@@ -31,10 +31,16 @@ def add_robot_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--robot", metavar="NAME", help="the robot, if several are up")
 
 
+def add_addressed_robot(parser: argparse.ArgumentParser, words: str = _ADDRESSED) -> None:
+    """Declare the robot as an argument, or as `--robot NAME`, either of which may be left out."""
+    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help=words)
+    add_robot_option(parser)
+    add_system_options(parser)
+
+
 def add_robot_argument(parser: argparse.ArgumentParser) -> None:
     """Declare the robot as the only argument, for what is typed in a hurry; `--robot` says the same."""
-    words = "the robot, by name or file; or a system"
-    parser.add_argument("robot", nargs="?", default=argparse.SUPPRESS, metavar="ROBOT|PATH", help=words)
+    parser.add_argument("robot", nargs="?", default=argparse.SUPPRESS, metavar="ROBOT|PATH", help=_ADDRESSED)
 
 
 def find_robot(wanted: str | None) -> RobotFolder:
@@ -53,8 +59,8 @@ def find_robot(wanted: str | None) -> RobotFolder:
         return next(iter(found.values()))
     if wanted in found:
         return found[wanted]
-    files = {_file_of(folder): folder for folder in found.values()}
-    for path in _possible_files(wanted):
+    files = {state.file: folder for folder in found.values() if (state := known_state(folder)) is not None}
+    for path in map(os.path.realpath, (wanted, os.path.join(wanted, "robot.yaml"))):
         if path in files:
             return files[path]
     raise NotDoneError(NOT_UP.at(None, f"no robot '{wanted}' is up", help=suggest(wanted, found, "robots that are up")))
@@ -70,16 +76,6 @@ def robots_up() -> list[RobotFolder]:
         return all_folders()
     except UnsafeFolderError as error:
         raise NotDoneError(UNSAFE.at(None, str(error))) from error
-
-
-def _file_of(folder: RobotFolder) -> str:
-    state = known_state(folder)
-    return state.file if state else ""
-
-
-def _possible_files(path: str) -> Iterable[str]:
-    yield os.path.realpath(path)
-    yield os.path.realpath(os.path.join(path, "robot.yaml"))
 
 
 def known_state(folder: RobotFolder) -> RobotState | None:

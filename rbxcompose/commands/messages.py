@@ -60,9 +60,7 @@ def message_from(message: type[M], text: str) -> M | None:
     if root is not None and not findings:
         made, findings = from_plain(message, _data(root), _Places(root))
     if findings:
-        report = Report()
-        report.extend(findings)
-        write_report(report, {_SHOWN: text})
+        write_report(Report([*findings]), {_SHOWN: text})
         return None
     return made
 
@@ -188,36 +186,25 @@ class EchoReader:
             return None
 
 
-class _Echo:
-    """Prints messages until there are enough."""
-
-    def __init__(self, topic: GraphName, arguments: argparse.Namespace) -> None:
-        self.reader = EchoReader(topic)
-        self._arguments, self._count = arguments, 0
-
-    @property
-    def is_over(self) -> bool:
-        """Return whether enough has been printed."""
-        return self._arguments.count is not None and self._count >= self._arguments.count
-
-    def received(self, received: ReceivedMessage) -> None:
-        """Print a message, unless it is one too many."""
-        message = None if self.is_over else self.reader.read(received)
-        if message is not None:
-            self._count += 1
-            text = shown(to_plain(message), self._arguments.json)
-            emit(text if self._arguments.json else f"{text}\n---")
-
-
 def echo(guest: Guest, arguments: argparse.Namespace) -> int:
-    """Print the messages of a topic."""
+    """Print the messages of a topic, until there are enough."""
     topic = wanted(guest.graph().topics, arguments.topic, "topic")
-    printer = _Echo(topic, arguments)
-    if printer.reader.is_useless:
+    reader = EchoReader(topic)
+    if reader.is_useless:
         return 1
-    guest.listen(topic, printer.received)
+    left = math.inf if arguments.count is None else arguments.count
+
+    def received(received: ReceivedMessage) -> None:
+        nonlocal left
+        message = reader.read(received) if left > 0 else None
+        if message is not None:
+            left -= 1
+            text = shown(to_plain(message), arguments.json)
+            emit(text if arguments.json else f"{text}\n---")
+
+    guest.listen(topic, received)
     dropped = 0
-    while not guest.run(lambda: printer.is_over, _PERIOD):
+    while not guest.run(lambda: left <= 0, _PERIOD):
         if guest.dropped > dropped:
             sys.stderr.write(f"left out: {guest.dropped - dropped} messages, which came too fast to show\n")
             dropped = guest.dropped

@@ -4,7 +4,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import ExitStack, suppress
 from io import TextIOWrapper
 from pathlib import Path
@@ -31,11 +31,15 @@ _YAML_WORDS = frozenset({"true", "false", "null"})  # as YAML values these are n
 EXISTS = kind("RBX9101")
 NOT_WRITTEN = kind("RBX9104")
 _PLAIN_TEXT = re.compile(r"[A-Za-z][A-Za-z0-9 ,.()/'-]*")
-_WORDS = frozenset({"true", "false", "null"})
 
 
 class AnswerError(NotDoneError):
     """Raised with the finding on an answer that cannot be used."""
+
+
+def wrong_answer(message: str, help_text: str = "") -> AnswerError:
+    """Return the error about an answer."""
+    return AnswerError(ANSWER.at(None, message, help=help_text))
 
 
 def read_name(text: str, what: str, taken: Collection[str] = ()) -> str:
@@ -71,7 +75,7 @@ def read_text(text: str) -> str:
     text = text.strip()
     if not text or len(text) > LONGEST_TEXT or FORBIDDEN.search(text) or set(text) & {"\t", "\n"}:
         why = f"a sentence on one line is needed, of at most {LONGEST_TEXT} characters"
-        raise AnswerError(ANSWER.at(None, f"'{plain(text, 40)}' cannot be used", help=why))
+        raise wrong_answer(f"'{plain(text, 40)}' cannot be used", why)
     return text
 
 
@@ -84,7 +88,7 @@ def read_yes(text: str) -> bool:
     word = text.strip().lower()
     if word and ("yes".startswith(word) or "no".startswith(word)):
         return word.startswith("y")
-    raise AnswerError(ANSWER.at(None, f"'{plain(text, 40)}' is neither yes nor no"))
+    raise wrong_answer(f"'{plain(text, 40)}' is neither yes nor no")
 
 
 def read_place(text: str, taken: Collection[str] = ()) -> Place:
@@ -97,18 +101,17 @@ def read_place(text: str, taken: Collection[str] = ()) -> Place:
     numbers = [number.strip() for number in pose.split(",")]
     if not equals or len(numbers) not in (2, 3):
         help_text = "write NAME=X,Y or NAME=X,Y,HEADING, such as 'table=2 m,50 cm,90 deg'"
-        raise AnswerError(ANSWER.at(None, f"'{plain(text, 40)}' is not a place", help=help_text))
+        raise wrong_answer(f"'{plain(text, 40)}' is not a place", help_text)
     name = read_name(name.strip(), "a place", taken)
     try:
         x, y = to_si(numbers[0], LENGTH), to_si(numbers[1], LENGTH)
         heading = to_si(numbers[2], ANGLE) if len(numbers) > 2 else 0.0
     except UnitError as error:
         detail = f" ({error.detail})" if error.detail else ""
-        message = f"the place '{name}': a number {error.message}{detail}"
-        raise AnswerError(ANSWER.at(None, message, help=error.help)) from None
+        raise wrong_answer(f"the place '{name}': a number {error.message}{detail}", error.help) from None
     if max(abs(x), abs(y)) > FARTHEST:
         help_text = f"use places within {FARTHEST:.0f} m, and move it in the file"
-        raise AnswerError(ANSWER.at(None, f"the place '{name}' is very far away", help=help_text))
+        raise wrong_answer(f"the place '{name}' is very far away", help_text)
     return Place(name, x, y, heading)
 
 
@@ -118,11 +121,8 @@ def taken(folder: Path, names: Iterable[str]) -> Finding | None:
 
 
 def _exists(path: Path) -> Finding:
-    return EXISTS.at(
-        None,
-        f"'{plain(shown_name(path))}' already exists; nothing was written",
-        help="choose another name, or another folder with '--into'",
-    )
+    message = f"'{plain(shown_name(path))}' already exists; nothing was written"
+    return EXISTS.at(None, message, help="choose another name, or another folder with '--into'")
 
 
 def robot_file(written: str) -> Path:
@@ -155,7 +155,7 @@ def _prepare(path: Path, text: str, undo: ExitStack) -> tuple[Path, Path]:
     """Write the text to a temporary file beside its destination."""
     if os.path.lexists(path):
         raise FileExistsError(0, "", str(path))
-    for folder in _missing_folders(path):
+    for folder in reversed([folder for folder in path.parents if not folder.exists()]):
         folder.mkdir(exist_ok=True)
         undo.callback(_remove_if_empty, folder)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
@@ -165,10 +165,6 @@ def _prepare(path: Path, text: str, undo: ExitStack) -> tuple[Path, Path]:
         file.flush()
         os.fsync(file.fileno())
     return temporary, path
-
-
-def _missing_folders(path: Path) -> Iterator[Path]:
-    yield from reversed([folder for folder in path.parents if not folder.exists()])
 
 
 def _remove_if_empty(folder: Path) -> None:
@@ -188,7 +184,7 @@ def render(template: str, **answers: object) -> str:
 def yaml_text(text: str) -> str:
     """Return a text as a YAML scalar of a Robot or Mission file: in quotes where needed, with dollars doubled."""
     text = text.replace("$", "$$")
-    if _PLAIN_TEXT.fullmatch(text) and text.lower() not in _WORDS:
+    if _PLAIN_TEXT.fullmatch(text) and text.lower() not in _YAML_WORDS:
         return text
     return json.dumps(text, ensure_ascii=False)
 

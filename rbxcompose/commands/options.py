@@ -2,9 +2,11 @@
 
 import argparse
 import json
+import math
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -52,21 +54,22 @@ def deferred(module: str, function: str) -> Callable[..., int]:
 
 
 def add_actions(
-    parser: argparse.ArgumentParser, actions: Iterable[Subcommand], *common: Declare, metavar: str = ""
+    parser: argparse.ArgumentParser, actions: Iterable[Subcommand], *common: Declare, metavar: str = "", usual: str = ""
 ) -> None:
     """Declare subcommands, each with its own arguments and then the `common` ones; `metavar` names them all.
 
-    The first one is the most common reading, and is meant if none is written.
+    The `usual` one, else the first, is the most common reading, and is meant if none is written.
     """
     made = parser.add_subparsers(dest="action", required=True)
     for subcommand in actions:
-        words = subcommand.help if made.choices else f"{subcommand.help} (the default)"
+        usual = usual or subcommand.name
+        words = f"{subcommand.help} (the default)" if subcommand.name == usual else subcommand.help
         action = made.add_parser(subcommand.name, help=words, description=subcommand.about)
         for declare in (*subcommand.declares, *common):
             declare(action)
         action.set_defaults(do=subcommand.do)
     made.metavar = metavar or "|".join(made.choices)
-    parser.set_defaults(action=next(iter(made.choices)))
+    parser.set_defaults(action=usual)
 
 
 def run_action(arguments: argparse.Namespace, *before: object) -> int:
@@ -113,24 +116,23 @@ def add_system_options(parser: argparse.ArgumentParser, *, has_profile: bool = F
     parser.add_argument("--ssh-config", metavar="FILE", help="of a system: ssh's configuration, instead of the user's")
 
 
+def _head_of(path: Path) -> bytes | None:
+    """Return the start of a file, None if it cannot be read."""
+    with suppress(OSError), open_regular(path) as file:
+        return file.read(_HEAD)
+    return None
+
+
 def kind_of(path: Path) -> str:
     """Return the kind that a manifest names; empty if it names none or cannot be read."""
-    try:
-        with open_regular(path) as file:
-            found = _KIND.search(file.read(_HEAD))
-    except OSError:
-        return ""
+    found = _KIND.search(_head_of(path) or b"")
     return found[1].decode() if found else ""
 
 
 def is_manifest(path: Path) -> bool:
     """Return whether a file without a kind is meant as a manifest, by its name or its keys."""
-    try:
-        with open_regular(path) as file:
-            head = file.read(_HEAD)
-    except OSError:
-        return True
-    if path.stem == "robot" or _MANIFEST.search(head):
+    head = _head_of(path)
+    if head is None or path.stem == "robot" or _MANIFEST.search(head):
         return True
     from rbxcompose.manifest.registry import robot_keys  # takes longer to import
 
@@ -185,6 +187,14 @@ def add_count_options(parser: argparse.ArgumentParser) -> None:
     counts = parser.add_mutually_exclusive_group()
     counts.add_argument("--once", dest="count", action="store_const", const=1, help="end after one")
     counts.add_argument("-n", "--count", type=count, metavar="N", help="end after this many")
+
+
+def speed_up(text: str, examples: str) -> float:
+    """Read `20x`, how much faster than real time something shall be."""
+    with suppress(ValueError):
+        if 0 < (factor := float(text.removesuffix("x"))) < math.inf:
+            return factor
+    raise argparse.ArgumentTypeError(f"'{text}' is not a rate; write {examples}")
 
 
 def seconds(text: str) -> float:

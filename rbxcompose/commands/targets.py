@@ -199,14 +199,8 @@ def add_layer_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--world", action="append", type=_world, dest="sets", metavar="FILE", help="put the simulated robot into it"
     )
-    parser.add_argument(
-        "--simulator",
-        action="append",
-        type=_simulator,
-        dest="sets",
-        metavar="NAME",
-        help="move it by this: ideal, or physics",
-    )
+    words = "move it by this: ideal, or physics"
+    parser.add_argument("--simulator", action="append", type=_simulator, dest="sets", metavar="NAME", help=words)
     parser.add_argument("--real", action="store_true", help="use the real devices; without it, they are simulated")
 
 

@@ -9,7 +9,7 @@ import termios
 import tty
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Self, TextIO
 
 from rbxcompose.base.findings import kind
@@ -75,9 +75,7 @@ class LiveScreen:
         self._stack.enter_context(raw(self.keyboard))
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stack.close()
 
     def _interrupted(self, number: int, frame: FrameType | None) -> None:

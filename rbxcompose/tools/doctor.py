@@ -126,11 +126,8 @@ class HostFacts:
     @property
     def robots(self) -> list[Robot]:
         """Return the robots that the files describe, of all that are examined."""
-        return [
-            robot
-            for robot in (self.file, *(running_robot.robot for running_robot in self.running))
-            if robot is not None
-        ]
+        described = (self.file, *(running.robot for running in self.running))
+        return [robot for robot in described if robot is not None]
 
 
 Examine = Callable[[HostFacts], Iterable[str | Finding]]
@@ -185,17 +182,18 @@ def has_errors(answers: Sequence[ExaminationResult]) -> bool:
     return any(result.level == Severity.ERROR.value for result in answers)
 
 
-def listeners(proc: Path = _PROC) -> dict[int, Listener]:
+def listeners() -> dict[int, Listener]:
     """Return the listeners at TCP ports."""
-    inodes = dict(_listening(proc))
-    owners = {inode: pid for inode, pid in _sockets(proc) if inode in inodes.values()}
-    return {port: _listener(owners.get(inode), proc) for port, inode in inodes.items()}
+    inodes = dict(_listening())
+    owners = {inode: pid for inode, pid in _sockets() if inode in inodes.values()}
+    found = {port: owners.get(inode) for port, inode in inodes.items()}
+    return {port: Listener(pid, "" if pid is None else _title(pid)) for port, pid in found.items()}
 
 
-def _listening(proc: Path) -> Iterator[tuple[int, str]]:
+def _listening() -> Iterator[tuple[int, str]]:
     for name in ("net/tcp", "net/tcp6"):
         try:
-            lines = (proc / name).read_text(encoding="ascii").splitlines()[1:]
+            lines = (_PROC / name).read_text(encoding="ascii").splitlines()[1:]
         except FileNotFoundError:
             continue  # a kernel without this address family
         for fields in map(str.split, lines):
@@ -203,9 +201,9 @@ def _listening(proc: Path) -> Iterator[tuple[int, str]]:
                 yield int(fields[_ADDRESS].rpartition(":")[2], 16), fields[_INODE]
 
 
-def _sockets(proc: Path) -> Iterator[tuple[str, int]]:
+def _sockets() -> Iterator[tuple[str, int]]:
     """Yield the sockets of all processes that we may inspect, by inode."""
-    for folder in (path for path in proc.iterdir() if path.name.isdigit()):
+    for folder in (path for path in _PROC.iterdir() if path.name.isdigit()):
         for link in _links(folder / "fd"):
             if found := _SOCKET.fullmatch(link):
                 yield found[1], int(folder.name)
@@ -223,20 +221,16 @@ def _links(folder: Path) -> Iterator[str]:
         return
 
 
-def _listener(pid: int | None, proc: Path) -> Listener:
-    return Listener(pid, "" if pid is None else _title(proc / str(pid)))
-
-
-def _title(folder: Path) -> str:
+def _title(pid: int) -> str:
     try:
-        return (folder / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
+        return (_PROC / str(pid) / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
     except (FileNotFoundError, ProcessLookupError):
         return "one that has ended"
 
 
 def processes() -> dict[Process, str]:
     """Return the processes of this user's robots with their titles."""
-    return {process: _title(_PROC / str(process.pid)) for process in titled(f"{NAME} ")}
+    return {process: _title(process.pid) for process in titled(f"{NAME} ")}
 
 
 def limits() -> ResourceLimits:
@@ -280,7 +274,8 @@ def _is_synchronised() -> bool | None:
 def versions() -> list[Version]:
     """Return the packages that rbxcompose needs; in a checkout, the lock file is beside the package."""
     lock = Path(rbxcompose.__file__).parents[1] / "requirements.lock"
-    locked = _locks(lock.read_text(encoding="utf-8")) if lock.is_file() else {}
+    lines = _LOCKED.findall(lock.read_text(encoding="utf-8")) if lock.is_file() else []
+    locked = {_normal(name): version for name, version in lines}
     return [Version(name, _installed(name), locked.get(_normal(name))) for name in sorted(_needed())]
 
 
@@ -297,10 +292,6 @@ def _installed(name: str) -> str | None:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return None
-
-
-def _locks(text: str) -> Mapping[str, str]:
-    return {_normal(name): version for name, version in _LOCKED.findall(text)}
 
 
 def _normal(name: str) -> str:

@@ -39,11 +39,9 @@ class LiveRules:
         known = {(finding.code, finding.span) for finding in self._checks.report(before)}
         found = self._checks.report(after)
         broken = next((finding for finding in found if (finding.code, finding.span) not in known), None)
-        return (
-            None
-            if broken is None
-            else ChangeRefusal(f"{broken.message} ({broken.code})", broken.help, breaks_rule=True)
-        )
+        if broken is None:
+            return None
+        return ChangeRefusal(f"{broken.message} ({broken.code})", broken.help, breaks_rule=True)
 
 
 def compiled_with(file: str, layers: ChosenLayers, unsaved: Mapping[Path, str] = MappingProxyType({})) -> Compilation:

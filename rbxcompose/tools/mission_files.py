@@ -39,8 +39,8 @@ from rbxcompose.missions.sources import SkillSource, SkillWay
 from rbxcompose.missions.view.picture import MissionPicture, picture_from_data, picture_of
 from rbxcompose.missions.view.replica import joined, status_list
 from rbxcompose.sdk.skills import skill_names
-from rbxcompose.tools.inspection.mission_html import mission_html
 from rbxcompose.tools.inspection.mission_text import mission_dot, mission_mermaid, mission_sentences, mission_text
+from rbxcompose.tools.inspection.pages import mission_html
 from rbxcompose.tools.mission_tests.explorer import ExplorationLimits, text_of
 from rbxcompose.tools.mission_tests.explorer import explore as explore_program
 
@@ -71,15 +71,11 @@ def robot_of(path: str | None) -> Robot:
         ReportedError: if it has errors.
     """
     if path is None:
-        path = _running_file() or robot_path(None, may_run=False)
+        found = robots_up()
+        state = known_state(found[0]) if len(found) == 1 else None
+        path = state.file if state is not None else robot_path(None, may_run=False)
     robot, _ = without_errors(compile_robot(path, environment=os.environ))
     return robot
-
-
-def _running_file() -> str | None:
-    found = robots_up()
-    state = known_state(found[0]) if len(found) == 1 else None
-    return state.file if state is not None else None
 
 
 def show(arguments: argparse.Namespace) -> int:
@@ -127,14 +123,8 @@ def mission_in(robot: Robot, name: str) -> Any:
 def skills(arguments: argparse.Namespace) -> int:
     """List all skills that a robot's missions may use."""
     robot = robot_of(arguments.path)
-    found = dict(
-        sorted(
-            {
-                **{python_skill.skill.name: python_skill for python_skill in python_skills(skill_names())},
-                **robot.skills,
-            }.items()
-        )
-    )
+    in_python = {source.skill.name: source for source in python_skills(skill_names())}
+    found = dict(sorted({**in_python, **robot.skills}.items()))
     if arguments.json:
         emit(json.dumps([_data(entry) for entry in found.values()]))
         return 0

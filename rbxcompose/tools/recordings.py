@@ -50,9 +50,7 @@ def recover_in(folder: Path) -> None:
 
 def warn(finding: Finding) -> None:
     """Report a finding that does not end the command."""
-    report = Report()
-    report.add(finding)
-    write_report(report, {})
+    write_report(Report([finding]), {})
 
 
 def warn_of_unmatched(patterns: Iterable[str], names: Iterable[str]) -> None:
@@ -64,10 +62,13 @@ def warn_of_unmatched(patterns: Iterable[str], names: Iterable[str]) -> None:
         warn(replace(finding, severity=Severity.WARNING))
 
 
+def sorted_counts(counts: Mapping[RecordedTopic, int]) -> list[tuple[RecordedTopic, int]]:
+    """Return the topics by name and type, each with its number of messages."""
+    return sorted(by_name(counts).items(), key=lambda item: (item[0].name, item[0].type))
+
+
 def count_table(counts: Mapping[RecordedTopic, int]) -> str:
     """Return one line for each topic: name, type, class, number of messages."""
-    rows = [("topic", "type", "class", "messages")]
-    together = by_name(counts)
-    topics = sorted(together, key=lambda topic: (topic.name, topic.type))
-    rows += [(topic.name, topic.type or "-", topic.qos.value, f"{together[topic]:,}") for topic in topics]
-    return table(rows)
+    counted = sorted_counts(counts)
+    rows = [(topic.name, topic.type or "-", topic.qos.value, f"{number:,}") for topic, number in counted]
+    return table([("topic", "type", "class", "messages"), *rows])

@@ -63,9 +63,8 @@ class _Watch:
             while True:
                 records = self._records()
                 report = self._started.wait_for_report(0.0 if records else _LOOK)
-                exit_code = (
-                    self._tell(report) if isinstance(report, launch.Up) else None
-                )  # before the records that follow
+                # Before the records that follow.
+                exit_code = self._tell(report) if isinstance(report, launch.Up) else None
                 self._tell_story([*records, *self._records()])
                 if self._reload is not None and self._is_up and exit_code is None:
                     self._reload.look()
@@ -128,13 +127,8 @@ class _Watch:
 
 def is_fit(robot: Robot, sources: Mapping[str, str]) -> bool:
     """Tell what is wrong with this machine for a robot, and return whether it may start."""
-    report = Report(
-        [
-            *missing_extras(robot),
-            *port_findings(robot, serial_ports(), look_at),
-            *program_findings(robot, os.environ, ask_for_real),
-        ]
-    )
+    report = Report([*missing_extras(robot), *port_findings(robot, serial_ports(), look_at)])
+    report.extend(program_findings(robot, os.environ, ask_for_real))
     write_report(report, sources)
     return not report.has_errors
 

@@ -17,7 +17,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.values import FUNCTIONS
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.plugins import BrokenPluginError
-from rbxcompose.commands.new_files import ANSWER, NAME, AnswerError, class_name, read_name, read_place, render
+from rbxcompose.commands.new_files import NAME, AnswerError, class_name, read_name, read_place, render, wrong_answer
 from rbxcompose.missions.program.registry import kinds, modifier_keys
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.sdk.capabilities import Drives
@@ -62,36 +62,21 @@ def world_files(name: str, about: str = WORLD_ABOUT) -> dict[str, str]:
     }
 
 
-@dataclass(frozen=True, slots=True)
-class RobotAnswers:
-    """What must be known about a new robot; the dock is always at the origin."""
-
-    name: str
-    about: str = ROBOT_ABOUT
-    base: str = BASE
-    places: Sequence[Place] = PLACES
-
-
-def robot_files(answers: RobotAnswers) -> dict[str, str]:
-    """Return the texts of the robot's file, its mission and its test, by path."""
-    places = [DOCK, *answers.places]
+def robot_files(
+    name: str, about: str = ROBOT_ABOUT, base: str = BASE, goals: Sequence[Place] = PLACES
+) -> dict[str, str]:
+    """Return the texts of the robot's file, its mission and its test, by path; the dock is always at the origin."""
+    places = [DOCK, *goals]
     longest = max(math.hypot(place.x - other.x, place.y - other.y) for place, other in combinations(places, 2)) / _SPEED
     timeout = 10 * math.ceil((2 * longest + 20) / 10)  # [s], with time to turn
     minutes = max(10, math.ceil(8 * longest / 60))  # so that the last third of the charge is enough for the way home
-    names = [place.name for place in answers.places]
-    said = {"name": answers.name, "timeout": f"{timeout} s"}
+    names = [place.name for place in goals]
+    said = {"name": name, "timeout": f"{timeout} s"}
+    whole = {**said, "about": about, "places": places, "base": base, "base_settings": _base_settings(base)}
     return {
-        f"robots/{answers.name}/robot.yaml": render(
-            "robot.yaml.j2",
-            **said,
-            about=answers.about,
-            places=places,
-            base=answers.base,
-            base_settings=_base_settings(answers.base),
-            runtime=f"{minutes} min",
-        ),
-        f"missions/{answers.name}.yaml": render("robot_mission.yaml.j2", **said, places=names),
-        f"tests/test_{answers.name}.py": render(
+        f"robots/{name}/robot.yaml": render("robot.yaml.j2", **whole, runtime=f"{minutes} min"),
+        f"missions/{name}.yaml": render("robot_mission.yaml.j2", **said, places=names),
+        f"tests/test_{name}.py": render(
             "robot_test.py.j2",
             **said,
             tour=", ".join(f'"{name}"' for name in (*names, DOCK.name)),
@@ -118,9 +103,9 @@ def read_next_place(text: str, before: Sequence[Place]) -> Place:
     place = read_place(text, taken)
     for other in (DOCK, *before):
         if math.hypot(place.x - other.x, place.y - other.y) < 0.1:  # [m], twice the tolerance of `go_to`
-            raise AnswerError(ANSWER.at(None, f"the place '{place.name}' is where '{other.name}' is", help="move it"))
+            raise wrong_answer(f"the place '{place.name}' is where '{other.name}' is", "move it")
     if len(before) >= MOST_PLACES:
-        raise AnswerError(ANSWER.at(None, f"more than {MOST_PLACES} places", help="add the others in the file"))
+        raise wrong_answer(f"more than {MOST_PLACES} places", "add the others in the file")
     return place
 
 
@@ -131,21 +116,19 @@ def read_base(name: str) -> str:
         AnswerError: if there is no such type, or it cannot be the base.
     """
     if name not in component_names():
-        help_text = suggest(name, component_names(), "component types")
-        raise AnswerError(ANSWER.at(None, f"there is no component type '{name}'", help=help_text))
+        hint = suggest(name, component_names(), "component types")
+        raise wrong_answer(f"there is no component type '{name}'", hint)
     try:
         base = component_type(name)
     except BrokenPluginError as error:
-        raise AnswerError(ANSWER.at(None, str(error), help=f"take '{BASE}'")) from error
+        raise wrong_answer(str(error), f"take '{BASE}'") from error
     try:
         drives = _drives(base)
     except ValidationError:
         help_text = f"take '{BASE}', and write the other one into the file"
-        raise AnswerError(ANSWER.at(None, f"'{name}' needs settings of its own", help=help_text)) from None
+        raise wrong_answer(f"'{name}' needs settings of its own", help_text) from None
     if drives is None:
-        raise AnswerError(
-            ANSWER.at(None, f"'{name}' is not a base: it does not follow 'cmd_vel'", help=f"take '{BASE}'")
-        )
+        raise wrong_answer(f"'{name}' is not a base: it does not follow 'cmd_vel'", f"take '{BASE}'")
     return name
 
 

@@ -173,10 +173,8 @@ def planned(system: System, robot: PlacedRobot, host: str) -> Plan:
 
 
 def _certificate_findings(plan: Plan, system: System, host: str, path: str) -> Report:
-    report = Report()
-    if tls := (plan.share and plan.share.tls) or (plan.exchange and plan.exchange.tls):
-        report.extend(certificate_findings(tls, common_name(system.name, host), path))
-    return report
+    tls = (plan.share and plan.share.tls) or (plan.exchange and plan.exchange.tls)
+    return Report([*certificate_findings(tls, common_name(system.name, host), path)]) if tls else Report()
 
 
 def _address_problem(plan: Plan, host: str) -> Finding | None:
@@ -206,8 +204,7 @@ def apply_system(path: str, arguments: argparse.Namespace) -> int:
         return _apply_here(system, arguments)
     hosts.require_reachable(system)
     shares = _shares(system, arguments)
-    change = _SystemChange(path, system, shares, arguments)
-    return change.run()
+    return _SystemChange(path, system, shares, arguments).run()
 
 
 def _apply_here(system: System, arguments: argparse.Namespace) -> int:
@@ -239,11 +236,8 @@ class _SystemChange:
         problems = [_refusal(key, entry) for key, entry in found.items() if isinstance(entry, str)]
         is_refused = bool(problems) and not arguments.partial
         if arguments.json:
-            emit(
-                json.dumps(
-                    {"hosts": [{"host": key[0], "robot": key[1], "answer": entry} for key, entry in found.items()]}
-                )
-            )
+            answers = [{"host": host, "robot": robot, "answer": entry} for (host, robot), entry in found.items()]
+            emit(json.dumps({"hosts": answers}))
         elif arguments.dry_run or not is_refused:
             self._show(found)
         for problem in problems:

@@ -3,8 +3,8 @@
 import json
 from collections import Counter, deque
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
 from functools import partial
+from itertools import repeat
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
@@ -35,8 +35,7 @@ MOST_WARNINGS = 5
 _GAP = "  "
 _RESET = "\x1b[0m"
 BOLD, FAINT, YELLOW, RED, _MAGENTA = "\x1b[1m", "\x1b[2m", "\x1b[33m", "\x1b[31m", "\x1b[35m"
-COLOURS = {Level.OK: "", Level.WARN: YELLOW, Level.ERROR: RED, Level.STALE: _MAGENTA}
-ALARMS = {level.name: text for level, text in COLOURS.items()}
+ALARMS = {Level.OK.name: "", Level.WARN.name: YELLOW, Level.ERROR.name: RED, Level.STALE.name: _MAGENTA}
 _FAILED = frozenset({"failed", "dead", "lost"})
 _MOST_OF_NAMES = 24  # columns
 SILENT = 3.0  # [s] after which a host does not answer
@@ -46,74 +45,10 @@ _WIDEST = 200  # columns per line of a mission
 _PATH = "missions"
 
 
-@dataclass(frozen=True, slots=True)
-class ComponentPicture:
-    """A component: the rate of its outgoing messages [1/s] and its diagnostics; None where unknown."""
-
-    name: str
-    type: str
-    state: str
-    process: str
-    restarts: int
-    rate: float | None = None
-    level: Level | None = None
-    message: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Load:
-    """A process: its share of one processor, None if not known yet, and its memory [B]."""
-
-    process: str
-    pid: int
-    cpu: float | None
-    memory: int
-
-
-@dataclass(frozen=True, slots=True)
-class Tree:
-    """A running mission: its name, its state, and its running nodes as lines, from the outside in."""
-
-    mission: str
-    state: str
-    running: Sequence[str]
-
-
-@dataclass(frozen=True, slots=True)
-class RobotPicture:
-    """Everything shown: `health` has the level and text of each group of the diagnostics."""
-
-    robot: str
-    is_supervised: bool
-    router: str | None
-    mission: str
-    batteries: Sequence[tuple[str, str]]
-    components: Sequence[ComponentPicture]
-    loads: Sequence[Load]
-    health: Sequence[tuple[str, Level, str]]
-    warnings: Sequence[Record]
-    trees: Sequence[Tree] = ()
-
-    def to_data(self) -> dict[str, Any]:
-        """Return the picture for JSON, with levels by name."""
-        return {
-            "robot": self.robot,
-            "is_supervised": self.is_supervised,
-            "router": self.router,
-            "mission": self.mission,
-            "missions": [asdict(tree) for tree in self.trees],
-            "batteries": dict(self.batteries),
-            "components": [
-                {**asdict(component), "level": None if component.level is None else component.level.name}
-                for component in self.components
-            ],
-            "processes": [asdict(load) for load in self.loads],
-            "diagnostics": [{"group": name, "level": level.name, "message": text} for name, level, text in self.health],
-            "warnings": [
-                {"time": warning.time, "level": warning.level.name, "source": warning.source, "text": warning.text}
-                for warning in self.warnings
-            ],
-        }
+Picture = Mapping[str, Any]
+"""All that is shown of a robot, as `--json` writes it, with levels by name: `processes` with their shares of one
+processor and their memory [B], `diagnostics` by group, `missions` that run with their running nodes as lines from the
+outside in, and of each component the rate of its outgoing messages [1/s]; None where unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,89 +59,89 @@ class PictureLine:
     colour: str = ""
 
 
-def lines_of(picture: RobotPicture, width: int, height: int, *, colour: bool = False) -> list[str]:
+def lines_of(picture: Picture, width: int, height: int, *, colour: bool = False) -> list[str]:
     """Return at most `height` lines of at most `width` columns; count what does not fit.
 
     Missions get the room that all else leaves; components go last.
     """
-    supervisor = "" if picture.is_supervised else "; its supervisor is dead, 'rbxcompose down' ends what is left"
-    lines = [PictureLine(f"{plain(picture.robot)}: router {plain(picture.router or 'none')}{supervisor}", BOLD)]
-    if picture.mission:
-        lines.append(PictureLine(f"mission: {plain(picture.mission)}"))
-    if picture.batteries:
-        lines.append(PictureLine(_GAP.join(f"{plain(name)}: {plain(text)}" for name, text in picture.batteries)))
+    supervisor = "" if picture["is_supervised"] else "; its supervisor is dead, 'rbxcompose down' ends what is left"
+    lines = [PictureLine(f"{plain(picture['robot'])}: router {plain(picture['router'] or 'none')}{supervisor}", BOLD)]
+    if picture["mission"]:
+        lines.append(PictureLine(f"mission: {plain(picture['mission'])}"))
+    if batteries := picture["batteries"]:
+        lines.append(PictureLine(_GAP.join(f"{plain(name)}: {plain(text)}" for name, text in batteries.items())))
     head = [*lines, PictureLine("")]
-    loads = [PictureLine(""), *_loads(picture.loads)]
-    tail = [*_health(picture.health), *_warnings(picture.warnings)]
+    loads = [PictureLine(""), *_loads(picture["processes"])]
+    tail = [*_health(picture["diagnostics"]), *_warnings(picture["warnings"])]
     room = max(2, height - len(head) - len(loads) - len(tail))
-    components = shortened(_components(picture.components), room)
+    components = shortened(_components(picture["components"]), room)
     left = height - len(head) - len(components) - len(loads) - len(tail)
-    shown = [*head, *components, *loads, *_trees(picture.trees, left), *tail][:height]
+    shown = [*head, *components, *loads, *_missions(picture["missions"], left), *tail][:height]
     return [painted(line, width, colour) for line in shown]
 
 
-def _components(components: Sequence[ComponentPicture]) -> list[PictureLine]:
-    rows = [
-        (
-            component.name,
-            component.type,
-            component.state,
-            component.process,
-            str(component.restarts),
-            "-" if component.rate is None else f"{component.rate:.1f}",
-            "" if component.level in (None, Level.OK) else f"{component.level.name}: {component.message}",
-        )
-        for component in components
-    ]
-    head, *lines = table_of([("component", "type", "state", "process", "restarts", "msg/s", ""), *rows])
-    return [
-        PictureLine(head, FAINT),
-        *(PictureLine(line, _alarm(component)) for line, component in zip(lines, components, strict=True)),
-    ]
+def _components(components: Sequence[Picture]) -> list[PictureLine]:
+    rows = [(each["name"], each["type"], each["state"], each["process"], *_facts(each)) for each in components]
+    return _table([("component", "type", "state", "process", "restarts", "msg/s", ""), *rows], map(_alarm, components))
 
 
-def _alarm(component: ComponentPicture) -> str:
-    if component.state in _FAILED:
+def _facts(component: Picture) -> tuple[str, str, str]:
+    """Return how often it was restarted, the rate of its messages, and what is wrong with it, in words."""
+    rate = "-" if component["rate"] is None else f"{component['rate']:.1f}"
+    is_fine = component["level"] in (None, Level.OK.name)
+    return str(component["restarts"]), rate, "" if is_fine else f"{component['level']}: {component['message']}"
+
+
+def _alarm(component: Picture) -> str:
+    if component["state"] in _FAILED:
         return RED
-    return YELLOW if component.state != "active" else COLOURS[component.level or Level.OK]
+    return YELLOW if component["state"] != "active" else ALARMS.get(component["level"], "")
 
 
-def _loads(loads: Sequence[Load]) -> list[PictureLine]:
-    rows = [
-        (load.process, str(load.pid), "-" if load.cpu is None else f"{load.cpu:.1%}", f"{load.memory / 1e6:.0f} MB")
-        for load in loads
-    ]
-    head, *lines = table_of([("process", "pid", "cpu", "memory"), *rows])
-    return [PictureLine(head, FAINT), *map(PictureLine, lines)]
+def _loads(loads: Sequence[Picture]) -> list[PictureLine]:
+    rows = []
+    for load in loads:
+        cpu = "-" if load["cpu"] is None else f"{load['cpu']:.1%}"
+        rows.append((load["process"], str(load["pid"]), cpu, f"{load['memory'] / 1e6:.0f} MB"))
+    return _table([("process", "pid", "cpu", "memory"), *rows], repeat(""))
 
 
-def _trees(trees: Sequence[Tree], room: int) -> list[PictureLine]:
-    lines = [line for tree in trees for line in _tree(tree)]
+def _missions(missions: Sequence[Picture], room: int) -> list[PictureLine]:
+    lines = []
+    for mission in missions:
+        lines.append(PictureLine(f"mission {plain(mission['mission'])}: {plain(mission['state'])}", FAINT))
+        lines += [PictureLine(plain(line)) for line in mission["running"]]
     return [PictureLine(""), *shortened(lines, room - 1)] if lines and room > 1 else []
 
 
-def _tree(tree: Tree) -> list[PictureLine]:
-    head = PictureLine(f"mission {plain(tree.mission)}: {plain(tree.state)}", FAINT)
-    return [head, *(PictureLine(plain(line)) for line in tree.running)]
-
-
-def _health(health: Sequence[tuple[str, Level, str]]) -> list[PictureLine]:
-    fine = [plain(name) for name, level, _ in health if level is Level.OK]
+def _health(groups: Sequence[Picture]) -> list[PictureLine]:
+    fine = [plain(group["group"]) for group in groups if group["level"] == Level.OK.name]
     lines = [
-        PictureLine(f"{level.name} {plain(name)}: {plain(text)}", COLOURS[level])
-        for name, level, text in health
-        if level is not Level.OK
+        PictureLine(f"{group['level']} {plain(group['group'])}: {plain(group['message'])}", ALARMS[group["level"]])
+        for group in groups
+        if group["level"] != Level.OK.name
     ]
     lines += [PictureLine(f"OK {', '.join(fine)}")] if fine else []
+    return _apart(lines)
+
+
+def _warnings(warnings: Sequence[Picture]) -> list[PictureLine]:
+    lines = []
+    for warning in warnings[-MOST_WARNINGS:]:
+        text = f"{warning['time']:8.1f}  {plain(warning['source'])}: {plain(warning['text'])}"
+        lines.append(PictureLine(text, ALARMS[warning["level"]]))
+    return _apart(lines)
+
+
+def _apart(lines: Sequence[PictureLine]) -> list[PictureLine]:
+    """Return lines below an empty one, if there are any."""
     return [PictureLine(""), *lines] if lines else []
 
 
-def _warnings(warnings: Sequence[Record]) -> list[PictureLine]:
-    lines = [
-        PictureLine(f"{warning.time:8.1f}  {plain(warning.source)}: {plain(warning.text)}", COLOURS[warning.level])
-        for warning in warnings[-MOST_WARNINGS:]
-    ]
-    return [PictureLine(""), *lines] if lines else []
+def _table(rows: Sequence[Iterable[str]], colours: Iterable[str]) -> list[PictureLine]:
+    """Return a head, and rows below it in these colours."""
+    head, *lines = table_of(rows)
+    return [PictureLine(head, FAINT), *map(PictureLine, lines, colours)]
 
 
 def shortened(lines: Sequence[PictureLine], room: int) -> list[PictureLine]:
@@ -238,7 +173,7 @@ class ShareView:
 
     robot: str
     host: str
-    answer: Mapping[str, Any] | None
+    answer: Picture | None
     age: float
     problem: str = ""
 
@@ -279,50 +214,27 @@ def _shares(shares: Sequence[ShareView]) -> list[PictureLine]:
         use = (f"{cpu:.0%}", f"{memory:.0f} MB") if loads else ("-", "-")
         batteries = ", ".join(map(str, answer.get("batteries", {}).values()))
         rows.append((share.robot, share.host, *use, batteries, str(answer.get("mission") or ""), share.state))
-    head, *lines = table_of([("robot", "host", "cpu", "memory", "battery", "mission", "state"), *rows])
     colours = (RED if view.is_silent else "" if view.state == "up" else YELLOW for view in shares)
-    return [PictureLine(head, FAINT), *map(PictureLine, lines, colours)]
+    return _table([("robot", "host", "cpu", "memory", "battery", "mission", "state"), *rows], colours)
 
 
 def _share_components(shares: Sequence[ShareView]) -> list[PictureLine]:
     rows, colours = [], []
     for share in shares:
         for component in share.answer["components"] if share.answer is not None and not share.is_silent else ():
-            level, rate = component["level"], component["rate"]
-            says = "" if level in (None, Level.OK.name) else f"{level}: {component['message']}"
-            times = "-" if rate is None else f"{rate:.1f}"
-            rows.append(
-                (
-                    share.robot,
-                    share.host,
-                    component["name"],
-                    component["state"],
-                    str(component["restarts"]),
-                    times,
-                    says,
-                )
-            )
-            colours.append(ALARMS.get(level, "") if component["state"] == "active" else YELLOW)
-    head, *lines = table_of([("robot", "host", "component", "state", "restarts", "msg/s", ""), *rows])
-    return [PictureLine(head, FAINT), *map(PictureLine, lines, colours)]
+            rows.append((share.robot, share.host, component["name"], component["state"], *_facts(component)))
+            colours.append(ALARMS.get(component["level"], "") if component["state"] == "active" else YELLOW)
+    return _table([("robot", "host", "component", "state", "restarts", "msg/s", ""), *rows], colours)
 
 
 def _share_warnings(shares: Sequence[ShareView]) -> list[PictureLine]:
     """Return the last warnings of each share: their times count from its own start, so they are not mixed."""
-    found = [
-        (share, warning)
-        for share in shares
-        if share.answer and not share.is_silent
-        for warning in share.answer["warnings"][-MOST_WARNINGS:]
-    ]
-    lines = [
-        PictureLine(
-            plain(f"{share.robot} {share.host} {entry['time']:8.1f}  {entry['source']}: {entry['text']}"),
-            ALARMS.get(entry["level"], ""),
-        )
-        for share, entry in found
-    ]
-    return [PictureLine(""), *lines] if lines else []
+    lines = []
+    for share in shares:
+        for entry in share.answer["warnings"][-MOST_WARNINGS:] if share.answer and not share.is_silent else ():
+            text = f"{share.robot} {share.host} {entry['time']:8.1f}  {entry['source']}: {entry['text']}"
+            lines.append(PictureLine(plain(text), ALARMS.get(entry["level"], "")))
+    return _apart(lines)
 
 
 class Sampler:
@@ -356,7 +268,7 @@ class Sampler:
         is_charged = self._charges.keys() >= self._gauges.keys() & self._listened
         return is_healthy and is_charged and (self._missions is None or self._missions.is_complete)
 
-    def sample(self) -> RobotPicture | None:
+    def sample(self) -> Picture | None:
         """Return the current picture, or None if the robot is down."""
         now, state = self._guest.clock.now(), known_state(self._folder)
         if state is None:
@@ -373,7 +285,7 @@ class Sampler:
         self._warnings.extend(record for record in self._follower.read() if record.level is not Level.OK)
         return self._picture(state, self._rates(graph, elapsed), self._loads(state, elapsed))
 
-    def _trees(self, state: RobotState) -> list[Tree]:
+    def _running(self, state: RobotState) -> list[Picture]:
         """Follow the missions, if the robot has any, and return the running ones while their process lives."""
         alive = state.alive()
         if not any(component.name == state.executive and component.process in alive for component in state.components):
@@ -382,7 +294,7 @@ class Sampler:
             self._missions = MissionsSeen(self._guest, state.robot)
         self._missions.look()
         active = {name: seen for name, seen in self._missions.by_name.items() if seen["state"] in ACTIVE}
-        return [_running_tree(name, seen) for name, seen in sorted(active.items())]
+        return [_running_mission(name, seen) for name, seen in sorted(active.items())]
 
     def _receive(self, topic: str, received: ReceivedMessage) -> None:
         self._counts[received.sender] += 1
@@ -412,46 +324,50 @@ class Sampler:
         self._counts.clear()
         return rates
 
-    def _loads(self, state: RobotState, elapsed: float | None) -> list[Load]:
-        loads, times = [], {}
+    def _loads(self, state: RobotState, elapsed: float | None) -> list[Picture]:
+        loads, times = list[Picture](), {}
         for name, process in {_SUPERVISOR: state.supervisor, **state.processes}.items():
             usage = process.usage
             if usage is not None:
                 times[process], memory = usage
                 before = self._times.get(process)
                 cpu = None if elapsed is None or before is None else (times[process] - before) / elapsed
-                loads.append(Load(name, process.pid, cpu, memory))
+                loads.append({"process": name, "pid": process.pid, "cpu": cpu, "memory": memory})
         self._times = times
         return loads
 
-    def _picture(self, state: RobotState, rates: Mapping[str, float], loads: list[Load]) -> RobotPicture:
+    def _picture(self, state: RobotState, rates: Mapping[str, float], loads: list[Picture]) -> Picture:
         leaves = {name.rpartition("/")[2]: status for name, status in self._statuses.items() if name.count("/") > 1}
         alive = state.alive()
         components = [
             _picture_of(component, component.process in alive, rates, leaves.get(component.name))
             for component in state.components
         ]
-        missions = [
-            component.message for component in components if component.name == state.executive and component.message
-        ]
-        batteries = [
-            (name, f"{100 * self._charges[battery.topic]:.1f} %")
+        missions = [each["message"] for each in components if each["name"] == state.executive and each["message"]]
+        batteries = {
+            name: f"{100 * self._charges[battery.topic]:.1f} %"
             for name, battery in state.batteries.items()
             if battery.topic in self._charges
-        ]
+        }
         groups = [status for status in self._statuses.values() if status.name.count("/") == 1]
-        return RobotPicture(
-            robot=state.robot,
-            is_supervised=state.is_supervised,
-            router=state.router if "router" in alive or "router" not in state.processes else None,
-            mission=missions[0] if missions else "",
-            batteries=batteries,
-            components=components,
-            loads=loads,
-            health=[(group.name.lstrip("/"), level_of(group.level), group.message) for group in groups],
-            warnings=list(self._warnings),
-            trees=self._trees(state),
-        )
+        return {
+            "robot": state.robot,
+            "is_supervised": state.is_supervised,
+            "router": state.router if "router" in alive or "router" not in state.processes else None,
+            "mission": missions[0] if missions else "",
+            "missions": self._running(state),
+            "batteries": batteries,
+            "components": components,
+            "processes": loads,
+            "diagnostics": [
+                {"group": group.name.lstrip("/"), "level": level_of(group.level).name, "message": group.message}
+                for group in groups
+            ],
+            "warnings": [
+                {"time": warning.time, "level": warning.level.name, "source": warning.source, "text": warning.text}
+                for warning in self._warnings
+            ],
+        }
 
 
 def _is_light(topic: GraphName) -> bool:
@@ -471,24 +387,25 @@ def _charge(gauge: Gauge, received: ReceivedMessage) -> float | None:
     return unit.to_si(values[0]) if unit else float(values[0])
 
 
-def _running_tree(name: str, seen: Mapping[str, Any]) -> Tree:
+def _running_mission(name: str, seen: Mapping[str, Any]) -> Picture:
     picture = picture_from_data(seen["picture"])
-    return Tree(name, seen["state"], running_lines(picture, status_list(seen, picture.count), _WIDEST))
+    running = running_lines(picture, status_list(seen, picture.count), _WIDEST)
+    return {"mission": name, "state": seen["state"], "running": running}
 
 
 def _picture_of(
-    component_state: ComponentState, is_alive: bool, rates: Mapping[str, float], status: DiagnosticStatus | None
-) -> ComponentPicture:
-    return ComponentPicture(
-        component_state.name,
-        component_state.type,
-        component_state.state if is_alive else "dead",
-        component_state.process,
-        component_state.restarts,
-        rates.get(component_state.name) if is_alive else None,
-        None if status is None else level_of(status.level),
-        "" if status is None else status.message,
-    )
+    state: ComponentState, is_alive: bool, rates: Mapping[str, float], status: DiagnosticStatus | None
+) -> Picture:
+    return {
+        "name": state.name,
+        "type": state.type,
+        "state": state.state if is_alive else "dead",
+        "process": state.process,
+        "restarts": state.restarts,
+        "rate": rates.get(state.name) if is_alive else None,
+        "level": None if status is None else level_of(status.level).name,
+        "message": "" if status is None else status.message,
+    }
 
 
 class MissionsSeen:
@@ -497,7 +414,7 @@ class MissionsSeen:
     def __init__(self, guest: Guest, robot: str) -> None:
         self._guest, self._robot = guest, robot
         self._replicas: dict[str, Replica] = {}
-        self._asked: set[str] = set()  # paths with a pending answer
+        self._asked: dict[str, object] = {}  # the query whose answer is awaited, by path
         self._is_listed = False
         news: Inbox[bytes] = Inbox(VISITOR, LONGEST_QUEUE, self._receive, guest.scheduler.post)
         transport = guest.transport
@@ -523,18 +440,18 @@ class MissionsSeen:
     def _ask(self, path: str) -> None:
         if path in self._asked:
             return
-        self._asked.add(path)
-        transport, answers = self._guest.transport, _Answers(self, path)
-        inbox: Inbox[TransportReply] = Inbox(VISITOR, None, answers.take, self._guest.scheduler.post)
+        query = self._asked[path] = object()
+        answered, transport = partial(self._answered, path, query), self._guest.transport
+        inbox: Inbox[TransportReply] = Inbox(VISITOR, None, answered, self._guest.scheduler.post)
         take, key = lambda answer: inbox.put(answer, transport.wake), admin_key(self._robot, path)
         transport.ask(key, b"", b"", take, of_all=True, within=LONGEST_WAIT)
 
-    def answered(self, path: str, answer: TransportReply) -> None:
-        """Apply the first answer to a query."""
-        self._asked.discard(path)
-        if answer.error:
+    def _answered(self, path: str, query: object, answer: TransportReply) -> None:
+        """Apply the first answer to a query, which ends with an error even after one."""
+        if self._asked.get(path) is not query:
             return
-        if (message := _read(answer.payload)) is None:
+        del self._asked[path]
+        if answer.error or (message := _read(answer.payload)) is None:
             return
         if path == _PATH:
             self._is_listed = True
@@ -558,16 +475,3 @@ def _read(payload: bytes) -> dict[str, Any] | None:
     """Return a message, or None if the robot runs another version with another format."""
     message: dict[str, Any] = json.loads(payload)
     return message if message.get("schema") == SCHEMA else None
-
-
-class _Answers:
-    """The answers to one query: it ends with an error even after an answer, so only the first counts."""
-
-    def __init__(self, asking: MissionsSeen, path: str) -> None:
-        self._asking, self._path = asking, path
-        self._is_over = False
-
-    def take(self, answer: TransportReply) -> None:
-        if not self._is_over:
-            self._is_over = True
-            self._asking.answered(self._path, answer)

@@ -14,7 +14,7 @@ from rbxcompose.runtime.folder import Gauge
 from rbxcompose.runtime.supervision.supervisor import gauges_of
 from rbxcompose.sdk import Drains, Setting
 from rbxcompose.testing import check_text
-from rbxcompose.tools.scaffold import RobotAnswers, read_base, robot_files
+from rbxcompose.tools.scaffold import read_base, robot_files
 from tests.checks import strangers
 from tests.misconfig.corpus import Case, cases, run
 
@@ -146,7 +146,7 @@ def test_the_battery_of_a_stranger_has_a_gauge(tmp_path: Path) -> None:
 
 
 def test_a_new_robot_may_have_a_strangers_base() -> None:
-    text = robot_files(RobotAnswers("cart", base=read_base("toy_wheels")))["robots/cart/robot.yaml"]
+    text = robot_files("cart", base=read_base("toy_wheels"))["robots/cart/robot.yaml"]
     assert "    type: toy_wheels\n    fastest: 0.5 m/s\n    spin: 90 deg/s\n    patience: 0.5 s\n" in text
     with pytest.raises(AnswerError, match="does not follow 'cmd_vel'"):
         read_base("toy_pilot")

@@ -21,7 +21,8 @@ from rbxcompose.runtime.folder import NO_LAYERS, ChosenLayers, RobotState
 from rbxcompose.runtime.processes import Process
 from rbxcompose.sdk import Component, Live, component
 from rbxcompose.sdk.parameters import settings
-from rbxcompose.tools.parameters.files import LiveSettings, NewTexts, compiled_as_it_runs, files_with, write
+from rbxcompose.tools.live_rules import compiled_with
+from rbxcompose.tools.parameters.files import LiveSettings, NewTexts, files_with, write
 from tests.conftest import ROOT
 from tests.soak import rare
 
@@ -118,7 +119,7 @@ def project(folder: Path, robot: str = ROBOT) -> None:
 
 def live(state: RobotState, **values: Any) -> LiveSettings:
     """Return a robot that runs, with values such as `battery__runtime` that somebody has set."""
-    found = compiled_as_it_runs(state)
+    found = compiled_with(state.file, state.layers)
     assert found.robot is not None
     assert found.plan is not None, list(found.report)
     now: dict[str, Config] = {name: robot_component.config for name, robot_component in found.robot.components.items()}
@@ -132,7 +133,7 @@ def saved(folder: Path, layers: ChosenLayers = NO_LAYERS, **values: Any) -> Mapp
     """Save values; return the changed lines of each file, after the robot was compiled again with the new values."""
     state = state_of(folder, layers)
     before = live(state, **values)
-    texts = files_with(before, list(before.changes), partial(compiled_as_it_runs, state))
+    texts = files_with(before, list(before.changes), partial(compiled_with, state.file, state.layers))
     write(texts)
     assert list(replace(live(state), now=before.now).changes) == []
     return {path.name: lines(texts, path) for path in texts.after}
@@ -247,7 +248,7 @@ def test_a_value_that_others_follow_without_being_written_is_saved(tmp_path: Pat
     project(tmp_path, ROBOT + "console: {}\n")
     state = state_of(tmp_path, ChosenLayers())
     before = live(state, base__max_speed=0.4)
-    (text,) = files_with(before, list(before.changes), partial(compiled_as_it_runs, state)).after.values()
+    (text,) = files_with(before, list(before.changes), partial(compiled_with, state.file, state.layers)).after.values()
     assert b"base: {type: diff_drive_sim, max_speed: 0.4}" in text
 
 
@@ -255,7 +256,7 @@ def test_a_file_that_changes_before_it_is_written_stays(tmp_path: Path) -> None:
     project(tmp_path)
     state = state_of(tmp_path, ChosenLayers())
     before = live(state, battery__runtime=30.0)
-    texts = files_with(before, list(before.changes), partial(compiled_as_it_runs, state))
+    texts = files_with(before, list(before.changes), partial(compiled_with, state.file, state.layers))
     project(tmp_path, ROBOT.replace("45 s", "50 s"))
     with pytest.raises(NotDoneError, match="it has changed meanwhile"):
         write(texts)
@@ -277,7 +278,7 @@ def test_every_live_setting_of_shipped_robots_is_saved_in_one_line_or_refused(ro
 
 def lines_or_code(live: LiveSettings, state: RobotState) -> int | str:
     try:
-        texts = files_with(live, list(live.changes), partial(compiled_as_it_runs, state))
+        texts = files_with(live, list(live.changes), partial(compiled_with, state.file, state.layers))
     except NotDoneError as error:
         return error.finding.code
     return sum(len(lines(texts, path)) for path in texts.after)
@@ -289,8 +290,8 @@ def test_a_setting_of_a_library_part_is_refused_with_its_cure(tmp_path: Path) ->
     state = state_of(tmp_path / "robots/rooms", ChosenLayers())
     before = live(state, base_wheels__acceleration=0.5)
     with pytest.raises(NotDoneError) as refused:
-        files_with(before, list(before.changes), partial(compiled_as_it_runs, state))
+        files_with(before, list(before.changes), partial(compiled_with, state.file, state.layers))
     assert "components: {base_wheels: {acceleration: ...}}" in refused.value.finding.help
     before = live(state, base_wheels__max_speed=0.6)
     with pytest.raises(NotDoneError, match="the part 'base' has its own default for the argument 'max_speed'"):
-        files_with(before, list(before.changes), partial(compiled_as_it_runs, state))
+        files_with(before, list(before.changes), partial(compiled_with, state.file, state.layers))

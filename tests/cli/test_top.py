@@ -13,7 +13,6 @@ import tempfile
 import termios
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +22,8 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import FORBIDDEN, columns
-from rbxcompose.runtime.log import Record
 from rbxcompose.testing.golden import Golden
-from rbxcompose.tools.top import ComponentPicture, Load, RobotPicture, Tree, lines_of
+from rbxcompose.tools.top import Picture, lines_of
 from tests.commands import command
 from tests.forked import RBXCOMPOSE, Forked, run_command
 from tests.soak import rare
@@ -34,27 +32,52 @@ from tests.third_party.places import put
 ROOT = Path(__file__).parents[2]
 STRANGERS = Path(__file__).parents[1] / "checks" / "strangers.py"
 PATIENCE = 20.0  # [s]
-COMPONENTS = (
-    ComponentPicture("battery", "battery_sim", "active", "world", 0, 1.0, Level.WARN, "Medium battery"),
-    ComponentPicture("base", "diff_drive_sim", "active", "world", 0, 99.8, Level.OK, "active"),
-    ComponentPicture("go_to", "go_to", "dead", "robot", 3),
-    ComponentPicture("mission", "mission", "active", "mission", 0, 0.0, Level.OK, "running patrol"),
-)
-PICTURE = RobotPicture(
-    robot="turtlebot",
-    is_supervised=True,
-    router="tcp/127.0.0.1:7447",
-    mission="running patrol",
-    batteries=(("battery", "48.2 %"),),
-    components=COMPONENTS,
-    loads=(Load("supervisor", 100, 0.001, 33_000_000), Load("world", 104, None, 58_000_000)),
-    health=(("power", Level.WARN, "battery: Medium battery"), ("motion", Level.OK, "OK"), ("Other", Level.OK, "OK")),
-    trees=(Tree("patrol", "running", ("▶ repeat", "  ▶ for corner in $route", "    ▶ go_to $corner  (retry 2)")),),
-    warnings=(Record(61.25, Level.WARN, "battery", "Medium battery: 50 %"), Record(70.0, Level.ERROR, "go_to", "died")),
-)
 
 
-def text_of(picture: RobotPicture, width: int, height: int) -> str:
+def component(name: str, type_: str, state: str, process: str, restarts: int, *heard: Any) -> Picture:
+    rate, level, message = heard or (None, None, "")
+    facts = {"process": process, "restarts": restarts, "rate": rate, "level": level, "message": message}
+    return {"name": name, "type": type_, "state": state, **facts}
+
+
+def group(name: str, level: str, message: str) -> Picture:
+    return {"group": name, "level": level, "message": message}
+
+
+COMPONENTS = [
+    component("battery", "battery_sim", "active", "world", 0, 1.0, "WARN", "Medium battery"),
+    component("base", "diff_drive_sim", "active", "world", 0, 99.8, "OK", "active"),
+    component("go_to", "go_to", "dead", "robot", 3),
+    component("mission", "mission", "active", "mission", 0, 0.0, "OK", "running patrol"),
+]
+LOADS = [
+    {"process": "supervisor", "pid": 100, "cpu": 0.001, "memory": 33_000_000},
+    {"process": "world", "pid": 104, "cpu": None, "memory": 58_000_000},
+]
+RUNNING = ["▶ repeat", "  ▶ for corner in $route", "    ▶ go_to $corner  (retry 2)"]
+PICTURE: Picture = {
+    "robot": "turtlebot",
+    "is_supervised": True,
+    "router": "tcp/127.0.0.1:7447",
+    "mission": "running patrol",
+    "missions": [{"mission": "patrol", "state": "running", "running": RUNNING}],
+    "batteries": {"battery": "48.2 %"},
+    "components": COMPONENTS,
+    "processes": LOADS,
+    "diagnostics": [
+        group("power", "WARN", "battery: Medium battery"),
+        group("motion", "OK", "OK"),
+        group("Other", "OK", "OK"),
+    ],
+    "warnings": [
+        {"time": 61.25, "level": "WARN", "source": "battery", "text": "Medium battery: 50 %"},
+        {"time": 70.0, "level": "ERROR", "source": "go_to", "text": "died"},
+    ],
+}
+DEAD: Picture = {"is_supervised": False, "router": None, "mission": "", "batteries": {}, "diagnostics": []}
+
+
+def text_of(picture: Picture, width: int, height: int) -> str:
     return "".join(f"{line}\n" for line in lines_of(picture, width, height))
 
 
@@ -62,34 +85,28 @@ def text_of(picture: RobotPicture, width: int, height: int) -> str:
     ("name", "picture"),
     [
         ("top.txt", PICTURE),
-        ("top_missions.txt", replace(PICTURE, components=COMPONENTS[:1], loads=PICTURE.loads[:1], warnings=())),
+        ("top_missions.txt", {**PICTURE, "components": COMPONENTS[:1], "processes": LOADS[:1], "warnings": []}),
         (
             "top_many.txt",
-            replace(PICTURE, components=[replace(COMPONENTS[1], name=f"wheel_{index}") for index in range(40)]),
+            {**PICTURE, "components": [{**COMPONENTS[1], "name": f"wheel_{index}"} for index in range(40)]},
         ),
-        ("top_dead.txt", replace(PICTURE, is_supervised=False, router=None, mission="", batteries=(), health=())),
+        ("top_dead.txt", {**PICTURE, **DEAD}),
     ],
 )
-def test_a_picture_is_its_golden_text(name: str, picture: RobotPicture, golden: Golden) -> None:
+def test_a_picture_is_its_golden_text(name: str, picture: Picture, golden: Golden) -> None:
     golden.check(name, text_of(picture, 80, 24))
 
 
 words = st.text(max_size=30)
 components = st.builds(
-    ComponentPicture, words, words, words, words, st.integers(0, 9), st.none() | st.floats(0, 1e6), st.none(), words
+    component, words, words, words, words, st.integers(0, 9), st.none() | st.floats(0, 1e6), st.none(), words
 )
+groups = st.builds(group, words, st.sampled_from([level.name for level in Level]), words)
 
 
-@given(
-    st.lists(components, max_size=8),
-    st.lists(st.tuples(words, st.sampled_from(Level), words), max_size=4),
-    st.integers(4, 200),
-    st.integers(1, 60),
-)
-def test_a_picture_fits_whatever_it_shows(
-    shown: list[ComponentPicture], health: list[tuple[str, Level, str]], width: int, height: int
-) -> None:
-    lines = lines_of(replace(PICTURE, components=shown, health=health), width, height)
+@given(st.lists(components, max_size=8), st.lists(groups, max_size=4), st.integers(4, 200), st.integers(1, 60))
+def test_a_picture_fits_whatever_it_shows(shown: list[Picture], health: list[Picture], width: int, height: int) -> None:
+    lines = lines_of({**PICTURE, "components": shown, "diagnostics": health}, width, height)
     assert len(lines) <= height
     assert all(columns(line) <= width for line in lines)
     assert not any(FORBIDDEN.search(line) for line in lines)

@@ -6,7 +6,7 @@ import pytest
 
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.tools.inspection.diagram import MANY, BoxShape, Diagram, diagram_of, folded
-from rbxcompose.tools.inspection.graph_html import html
+from rbxcompose.tools.inspection.pages import html
 from tests.conftest import ROOT
 
 

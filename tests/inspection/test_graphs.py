@@ -16,7 +16,7 @@ from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.sdk import Component, Config, Serves, ServesAction, component
 from rbxcompose.testing import Golden, check_text
 from rbxcompose.tools.inspection.diagram import BoxShape, Diagram, WireContent, diagram_of, dot, mermaid
-from rbxcompose.tools.inspection.graph_html import html
+from rbxcompose.tools.inspection.pages import html
 from tests.conftest import ROOT
 from tests.shipped import robot_and_plan
 from tests.soak import Soak

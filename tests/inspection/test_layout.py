@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.commands import layout as module
-from rbxcompose.commands.layout import Edge, Layout, LayoutItem, NotDrawnError, Rect, lay_out
+from rbxcompose.commands.console import NotDoneError
+from rbxcompose.commands.layout import Edge, Layout, LayoutItem, Rect, lay_out
 
 GRAPHS = st.integers(1, 14).flatmap(
     lambda count: st.tuples(
@@ -78,6 +79,6 @@ def test_nothing_at_all_has_a_layout() -> None:
 
 def test_without_graphviz_it_is_told_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "find_spec", lambda name: None)
-    with pytest.raises(NotDrawnError, match="needs Graphviz") as caught:
+    with pytest.raises(NotDoneError, match="needs Graphviz") as caught:
         lay_out([], [])
     assert caught.value.finding.help == "install it with: pip install 'rbxcompose[graph]'"

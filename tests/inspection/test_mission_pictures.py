@@ -7,13 +7,13 @@ from html.parser import HTMLParser
 
 import pytest
 
-from rbxcompose.commands.layout import NotDrawnError
+from rbxcompose.commands.console import NotDoneError
 from rbxcompose.missions.program.outcomes import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
 from rbxcompose.missions.program.program import RobotNames
 from rbxcompose.missions.view.picture import MissionPicture, picture_from_data, picture_of, picture_to_data
 from rbxcompose.testing.golden import Golden
-from rbxcompose.tools.inspection.mission_html import mission_html
 from rbxcompose.tools.inspection.mission_text import mission_dot, mission_lines, mission_mermaid, mission_text
+from rbxcompose.tools.inspection.pages import mission_html
 from tests.executive.fake_robot import program_of
 from tests.inspection.pictures import undrawn
 
@@ -141,8 +141,8 @@ def machine(count: int) -> MissionPicture:
 
 
 def test_a_machine_that_nobody_could_follow_is_not_laid_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rbxcompose.tools.inspection.mission_html.lay_out", None)
-    with pytest.raises(NotDrawnError, match="mission 'web' has too many transitions for a picture") as caught:
+    monkeypatch.setattr("rbxcompose.tools.inspection.pages.lay_out", None)
+    with pytest.raises(NotDoneError, match="mission 'web' has too many transitions for a picture") as caught:
         mission_html(machine(200))
     assert caught.value.finding.code == "RBX9014"
     assert "s199" in mission_text(machine(200))

@@ -43,8 +43,8 @@ from rbxcompose.missions.sdk import (
     started,
 )
 from rbxcompose.missions.view.picture import picture_of
-from rbxcompose.tools.inspection.mission_html import mission_html
 from rbxcompose.tools.inspection.mission_text import mission_sentences, mission_text
+from rbxcompose.tools.inspection.pages import mission_html
 from rbxcompose.tools.mission_tests.coverage import Coverage, SeenWays
 from rbxcompose.tools.mission_tests.explorer import ExplorationLimits, explore
 from tests.missions.simulated import ROBOT, Simulated, program_of, tree

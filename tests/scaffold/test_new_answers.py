@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.commands.new_files import AnswerError, read_name, read_place, read_text, read_yes
 from rbxcompose.testing import check_file
-from rbxcompose.tools.scaffold import RobotAnswers, read_base, read_component_name, robot_files
+from rbxcompose.tools.scaffold import read_base, read_component_name, robot_files
 from tests.loops import for_all
 
 WRONG_NAMES = ["", "Cart", "my-cart", "1st", "_x", "a b", "../x", "a/b", "a" * 61, "ä", "a\n", "true", "null"]
@@ -81,7 +81,7 @@ def test_every_sentence_comes_out_of_the_robot_as_it_went_in(tmp_path: Path, tex
         about = read_text(text)
     except AnswerError:
         return
-    for name, content in robot_files(RobotAnswers("cart", about)).items():
+    for name, content in robot_files("cart", about).items():
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(content, encoding="utf-8")

@@ -14,7 +14,7 @@ from rbxcompose.compiler.composition.robot_file import RESERVED
 from rbxcompose.manifest.registry import robot_keys
 from rbxcompose.missions.program.registry import kinds, modifier_keys
 from rbxcompose.testing import Checked, Golden, check_file, run_robot
-from rbxcompose.tools.scaffold import DOCK, MOST_PLACES, RobotAnswers, read_places, robot_files
+from rbxcompose.tools.scaffold import DOCK, MOST_PLACES, read_places, robot_files
 from tests.soak import rare
 
 WORDS = ["and", "or", "not", "in", "is", "lambda", "do", "then", "else", "when", "m"]
@@ -23,7 +23,7 @@ number = st.floats(-50, 50).map(lambda x: f"{x:.2f}")
 
 
 def written(folder: Path, *places: str) -> Checked:
-    for name, text in robot_files(RobotAnswers("cart", places=read_places(places))).items():
+    for name, text in robot_files("cart", goals=read_places(places)).items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
@@ -39,7 +39,7 @@ def findings(folder: Path, *places: str) -> str:
 
 
 def test_it_is_written_as_people_would_write_it(golden: Golden) -> None:
-    for name, text in robot_files(RobotAnswers("cart")).items():
+    for name, text in robot_files("cart").items():
         golden.check(f"robot/{name}.txt", text)
 
 

@@ -34,12 +34,4 @@ def _fix(fix: Fix) -> dict[str, object]:
 
 
 def _place(span: Span | None) -> dict[str, object]:
-    if span is None:
-        return dict.fromkeys(("file", "line", "column", "end_line", "end_column"))
-    return {
-        "file": span.file,
-        "line": span.line,
-        "column": span.column,
-        "end_line": span.end_line,
-        "end_column": span.end_column,
-    }
+    return dict.fromkeys(Span._fields) if span is None else span._asdict()

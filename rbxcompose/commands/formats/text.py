@@ -1,6 +1,6 @@
 """Findings for people: the message, the place, the line with a caret, what to do."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from rbxcompose.base.findings import Finding, Related, Report, Severity, Sources, Span
 from rbxcompose.base.fixes import safe_fixes
@@ -16,14 +16,12 @@ _RESET = "\x1b[0m"
 _COLOURS = {"error": "\x1b[1;31m", "warning": "\x1b[1;33m", "gutter": "\x1b[1;34m", "bold": "\x1b[1m"}
 
 
-class _Painter:
-    """Paints pieces of text, or leaves them as they are."""
+Paint = Callable[[str, str], str]
+"""Paints a piece of text in a style, or leaves it as it is."""
 
-    def __init__(self, colour: bool) -> None:
-        self.colour = colour
 
-    def __call__(self, style: str, text: str) -> str:
-        return f"{_COLOURS[style]}{text}{_RESET}" if self.colour and text else text
+def _painted(style: str, text: str) -> str:
+    return f"{_COLOURS[style]}{text}{_RESET}" if text else text
 
 
 @output_format("text")
@@ -32,7 +30,7 @@ def render_text(report: Report, sources: Sources, colour: bool = False) -> str:
     findings = list(report)
     if not findings:
         return ""
-    paint = _Painter(colour)
+    paint: Paint = _painted if colour else lambda style, text: text
     lines = [line for finding in findings[:MOST_SHOWN] for line in _finding(finding, sources, paint)]
     if len(findings) > MOST_SHOWN:
         lines.append(f"... and {len(findings) - MOST_SHOWN} more")
@@ -51,7 +49,7 @@ def summary(findings: list[Finding], fixes: int) -> str:
     return f"{counted}; {which} can be fixed with 'check --fix'"
 
 
-def _finding(finding: Finding, sources: Sources, paint: _Painter) -> Iterator[str]:
+def _finding(finding: Finding, sources: Sources, paint: Paint) -> Iterator[str]:
     head = paint(finding.severity, f"{finding.severity}[{finding.code}]")
     yield f"{head}: {paint('bold', plain(finding.message, _WORDS))}"
     width = 1
@@ -87,7 +85,7 @@ def _source_line(span: Span, sources: Sources) -> str | None:
     return lines[span.line - 1] if span.file in sources and span.line <= len(lines) else None
 
 
-def _caret(span: Span, source: str, label: str, severity: Severity, paint: _Painter) -> Iterator[str]:
+def _caret(span: Span, source: str, label: str, severity: Severity, paint: Paint) -> Iterator[str]:
     start = min(span.column - 1, len(source))
     end = span.end_column - 1 if span.end_line == span.line else len(source.rstrip())
     first = start - _BEFORE_CARET if len(source) > _LINE_CELLS and start > _BEFORE_CARET else 0

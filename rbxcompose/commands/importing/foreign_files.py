@@ -136,26 +136,16 @@ class ForeignMap:
     def number(self, key: str) -> Given[float] | None:
         """Return a number of a size that manifests have."""
         found = self._scalar(key, float, "a number")
-        if found is not None and not abs(found.value) < MOST:
-            self.add(validate.OUT_OF_RANGE.at(found.span, f"'{key}' of {self.what} must be below {MOST:g}"))
-            return None
-        return found
+        return self._within(key, found, lambda value: abs(value) < MOST, f"below {MOST:g}")
 
     def above_zero(self, key: str) -> Given[float] | None:
         """Return a number greater than 0."""
-        found = self.number(key)
-        if found is not None and not found.value > 0:
-            self.add(validate.OUT_OF_RANGE.at(found.span, f"'{key}' of {self.what} must be greater than 0"))
-            return None
-        return found
+        return self._within(key, self.number(key), lambda value: value > 0, "greater than 0")
 
     def whole(self, key: str, least: int, most: int) -> Given[int] | None:
         """Return a whole number within a range."""
         found = self._scalar(key, int, "a whole number")
-        if found is not None and not least <= found.value <= most:
-            self.add(validate.OUT_OF_RANGE.at(found.span, f"'{key}' of {self.what} must be {least} to {most}"))
-            return None
-        return found
+        return self._within(key, found, lambda value: least <= value <= most, f"{least} to {most}")
 
     def flag(self, key: str) -> Given[bool] | None:
         """Return whether something is so, in the words of YAML 1.1."""
@@ -237,6 +227,12 @@ class ForeignMap:
             self._wrong(key, node, what)
             return None
         return Given(value, node.span)
+
+    def _within(self, key: str, found: Given[T] | None, is_within: Callable[[T], bool], words: str) -> Given[T] | None:
+        if found is None or is_within(found.value):
+            return found
+        self.add(validate.OUT_OF_RANGE.at(found.span, f"'{key}' of {self.what} must be {words}"))
+        return None
 
     def _wrong(self, key: str, node: TreeNode, what: str) -> None:
         if isinstance(node, ScalarNode) and (number_trouble(node) or _is_refused(node.text)):

@@ -9,8 +9,9 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import field, replace
+from functools import partial
 from pathlib import Path
 
 from rbxcompose.base.dataclass import dataclass
@@ -119,18 +120,14 @@ def _check_tests(tests: list[str], arguments: argparse.Namespace, checked: Check
 
 
 def _check_system(path: str, arguments: argparse.Namespace, checked: CheckedRobots) -> None:
-    from rbxcompose.compiler.systems.model import System
     from rbxcompose.compiler.systems.reader import compile_system
     from rbxcompose.tools.inspection.plan_text import system_extent  # only needed for systems
 
-    def compiled_with(profiles: Sequence[str]) -> System:
-        return compile_system(
-            path, environment=os.environ, real=arguments.real, profiles=profiles, unsaved=unsaved_of(arguments)
-        )
-
-    system = compiled_with(arguments.profile)
-    tried = [] if arguments.profile else [(name,) for name in system.known_profiles]
-    all_ = [system, *map(compiled_with, tried)]
+    unsaved = unsaved_of(arguments)
+    compiled_with = partial(compile_system, path, environment=os.environ, real=arguments.real, unsaved=unsaved)
+    system = compiled_with(profiles=arguments.profile)
+    tried = () if arguments.profile else system.known_profiles
+    all_ = [system, *(compiled_with(profiles=(name,)) for name in tried)]
     for one in all_:
         checked.report.extend(_new(one.report, checked.report))
         checked.sources.update(one.sources)

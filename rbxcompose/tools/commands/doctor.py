@@ -14,9 +14,9 @@ from rbxcompose.base.findings import Finding, Report
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, has_colour, write_report
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.commands.guest import Guest, ReceivedMessage
-from rbxcompose.commands.lookup import add_robot_option, find_robot, place_of, robots_up
+from rbxcompose.commands.lookup import add_addressed_robot, find_robot, place_of, robots_up
 from rbxcompose.commands.messages import to_json
-from rbxcompose.commands.options import EACH, add_json_option, add_system_options
+from rbxcompose.commands.options import EACH, add_json_option
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.devices.serial_ports import latency_timers, serial_ports
@@ -33,9 +33,7 @@ _NANOSECONDS = 1e9
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="only this robot, by name or file; or a system")
-    add_robot_option(parser)
-    add_system_options(parser)
+    add_addressed_robot(parser, "only this robot, by name or file; or a system")
     add_json_option(parser)
 
 
@@ -129,6 +127,5 @@ def _text(answers: list[ExaminationResult]) -> str:
     lines = [
         f"ok  {result.examination:<{width}}  {result.answer}" for result in answers if isinstance(result.answer, str)
     ]
-    report = Report()
-    report.extend(result.answer for result in answers if isinstance(result.answer, Finding))
+    report = Report([result.answer for result in answers if isinstance(result.answer, Finding)])
     return "\n".join([*lines, render_text(report, {}, has_colour(sys.stdout))]).rstrip("\n")

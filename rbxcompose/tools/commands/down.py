@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from rbxcompose.base.requests import Refused
 from rbxcompose.commands.console import NotDoneError, emit
-from rbxcompose.commands.lookup import NO_ANSWER, NOT_UP, add_robot_option, find_robot, known_state
-from rbxcompose.commands.options import EACH, add_system_options
+from rbxcompose.commands.lookup import NO_ANSWER, NOT_UP, add_addressed_robot, find_robot, known_state
+from rbxcompose.commands.options import EACH
 from rbxcompose.runtime.control import NoAnswerError, ask, supervisor_of
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, wait_until_ended
@@ -28,9 +28,7 @@ _ORDERLY = 3.0  # [s] for a supervisor to bring everything down, after it has co
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="the robot, by name or file; or a system")
-    add_robot_option(parser)
-    add_system_options(parser)
+    add_addressed_robot(parser)
     parser.add_argument("--json", action="store_true", help="answer in JSON")
 
 

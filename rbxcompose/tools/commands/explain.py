@@ -5,6 +5,7 @@ Exit codes: 0 fine, 2 there is no such code.
 
 import argparse
 import json
+from itertools import groupby
 
 from rbxcompose.base.findings import FindingKind, suggest
 from rbxcompose.commands.console import emit, misused
@@ -41,12 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _listed(kinds: dict[str, FindingKind]) -> str:
     lines = []
-    family = ""
-    for kind in kinds.values():
-        if family_of(kind) != family:
-            family = family_of(kind)
-            lines += ["", f"{family}:"]
-        lines.append(f"  {kind.code}  {title_of(kind)}")
+    for family, each in groupby(kinds.values(), family_of):
+        lines += ["", f"{family}:", *(f"  {kind.code}  {title_of(kind)}" for kind in each)]
     return "\n".join(lines[1:])
 
 

@@ -15,6 +15,7 @@ import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 from rbxcompose import __version__
 from rbxcompose.base.findings import Finding, Report
@@ -70,10 +71,10 @@ def run(arguments: argparse.Namespace) -> int:
         message = f"the system has no host '{arguments.host}'"
         return refuse(NOT_EXPORTED.misspelt(None, message, arguments.host, system.hosts, "hosts"))
     try:
-        made = _made(system, arguments)
+        texts, files = _made(system, arguments)
     except ValueError as error:
         return refuse(NOT_EXPORTED.at(None, f"'{system.name}' cannot be exported: {error}"))
-    return _finish(arguments, made)
+    return _finish(arguments, texts, files)
 
 
 def _export_robots(arguments: argparse.Namespace, made: Callable[[Sequence[Plan]], dict[str, str]]) -> int:
@@ -84,10 +85,13 @@ def _export_robots(arguments: argparse.Namespace, made: Callable[[Sequence[Plan]
     else:
         _, plan = without_errors(compile_robot(arguments.path, real=arguments.real, environment=os.environ))
         plans = [plan]
-    return _finish(arguments, _encoded(made(plans)))
+    return _finish(arguments, made(plans))
 
 
-def _finish(arguments: argparse.Namespace, made: Mapping[str, BundledFile]) -> int:
+def _finish(
+    arguments: argparse.Namespace, texts: Mapping[str, str], files: Mapping[str, BundledFile] = MappingProxyType({})
+) -> int:
+    made = {**{name: BundledFile(text.encode()) for name, text in texts.items()}, **files}
     if (problem := _write(Path(arguments.out), made)) is not None:
         return refuse(problem)
     for name in made:
@@ -103,7 +107,7 @@ def _export_robot(arguments: argparse.Namespace) -> int:
     made = exported(manifest.contents, manifest.name)
     if not made:
         return refuse(NOT_EXPORTED.at(None, f"'{manifest.name}' has no body"))
-    return _finish(arguments, _encoded(made))
+    return _finish(arguments, made)
 
 
 def _export_mission(arguments: argparse.Namespace) -> int:
@@ -112,10 +116,11 @@ def _export_mission(arguments: argparse.Namespace) -> int:
     report, sources = Report(), dict[str, str]()
     made = exported(Path(arguments.path), report, sources)
     write_report(report, sources)
-    return _finish(arguments, _encoded(made)) if made else FINDINGS
+    return _finish(arguments, made) if made else FINDINGS
 
 
-def _made(system: System, arguments: argparse.Namespace) -> dict[str, BundledFile]:
+def _made(system: System, arguments: argparse.Namespace) -> tuple[dict[str, str], dict[str, BundledFile]]:
+    """Return the texts of a system, and files beside them, by name."""
     found, (file, files) = list(shares.shares(system, arguments.host)), files_of(system)
     match arguments.program:
         case "systemd":
@@ -124,19 +129,14 @@ def _made(system: System, arguments: argparse.Namespace) -> dict[str, BundledFil
                 "file": arguments.file or str(system.path),
                 "user": arguments.user or getpass.getuser(),
             }
-            made = {shares.unit_name(item): shares.unit(item, **words) for item in found}
+            return {shares.unit_name(item): shares.unit(item, **words) for item in found}, {}
         case "compose":
             text = shares.compose_file(found, system=system.name, file=file)
             needed = requirements([placed.robot for placed in system.robots.values()], __version__)
-            made = {"Dockerfile": shares.dockerfile(needed), "compose.yaml": text}
-            return {**_encoded(made), **{f"project/{name}": one for name, one in files.items()}}
-        case _:
-            made = shares.kubernetes_manifests(found, system=system.name, file=file, files=files, image=arguments.image)
-    return _encoded(made)
-
-
-def _encoded(texts: Mapping[str, str]) -> dict[str, BundledFile]:
-    return {name: BundledFile(text.encode()) for name, text in texts.items()}
+            beside = {f"project/{name}": one for name, one in files.items()}
+            return {"Dockerfile": shares.dockerfile(needed), "compose.yaml": text}, beside
+    name, image = system.name, arguments.image
+    return shares.kubernetes_manifests(found, system=name, file=file, files=files, image=image), {}
 
 
 def _write(folder: Path, made: Mapping[str, BundledFile]) -> Finding | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
@@ -18,7 +18,14 @@ from rbxcompose.base.levels import LOG_LEVELS
 from rbxcompose.commands import hosts
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, table
 from rbxcompose.commands.lookup import NO_ANSWER, NO_SUPERVISOR, NOT_UP
-from rbxcompose.commands.options import add_system_options, count_from_zero
+from rbxcompose.commands.options import (
+    Subcommand,
+    add_actions,
+    add_system_options,
+    argument,
+    count_from_zero,
+    run_action,
+)
 from rbxcompose.missions.execution.requests import MISSION
 
 GROUP = "system"
@@ -33,24 +40,22 @@ _STATES = {NOT_UP.code: "down", NO_SUPERVISOR: "supervisor dead", NO_ANSWER.code
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="ls|run|logs", required=True)
-    parser.set_defaults(action="ls")
-    ls = actions.add_parser("ls", help="list robots: hosts, state, mission, batteries (the default)")
-    run_ = actions.add_parser("run", help="start a mission on each")
-    run_.add_argument("mission", metavar="MISSION", help="which one")
-    run_.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")
-    logs = actions.add_parser("logs", help="show the logs of all, each line with its robot")
-    logs.add_argument("--level", choices=LOG_LEVELS, default="info", help="the lowest level to show")
-    logs.add_argument("-f", "--follow", action="store_true", help="follow new records, until interrupted")
-    logs.add_argument("-n", "--lines", type=count_from_zero, metavar="N", help="start with the last N records of each")
-    for subparser in (ls, run_, logs):
-        subparser.add_argument("paths", metavar="SYSTEM", nargs="*", help="files of systems")
-        subparser.add_argument(
-            "--label", action="append", default=[], dest="labels", metavar="L", help="only robots with it"
-        )
-        add_system_options(subparser)
-    for subparser in (ls, run_):
-        subparser.add_argument("--json", action="store_true", help="answer in JSON")
+    paths = argument("paths", metavar="SYSTEM", nargs="*", help="files of systems")
+    label = argument("--label", action="append", default=[], dest="labels", metavar="L", help="only robots with it")
+    chosen = (paths, label, add_system_options)
+    json_ = argument("--json", action="store_true", help="answer in JSON")
+    mission = argument("mission", metavar="MISSION", help="which one")
+    sets = argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")
+    level = argument("--level", choices=LOG_LEVELS, default="info", help="the lowest level to show")
+    follow = argument("-f", "--follow", action="store_true", help="follow new records, until interrupted")
+    words = "start with the last N records of each"
+    lines = argument("-n", "--lines", type=count_from_zero, metavar="N", help=words)
+    actions = (
+        Subcommand("ls", "list robots: hosts, state, mission, batteries", _list, (*chosen, json_)),
+        Subcommand("run", "start a mission on each", _run, (mission, sets, *chosen, json_)),
+        Subcommand("logs", "show the logs of all, each line with its robot", _follow, (level, follow, lines, *chosen)),
+    )
+    add_actions(parser, actions)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -61,15 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.paths and len(paths) != 1:
         message = f"no system is named, and this folder has {', '.join(paths) if paths else 'none'}"
         return refuse(UNNAMED.at(None, message, help="give the path of one"))
-    fleet = Fleet.of(paths, arguments)
-    match arguments.action:
-        case "ls":
-            return fleet.list_robots(in_json=arguments.json)
-        case "run":
-            return fleet.run(arguments.mission, arguments.sets, in_json=arguments.json)
-        case _:
-            lines = ["-n", str(arguments.lines)] if arguments.lines is not None else []
-            return fleet.follow(["--level", arguments.level, *(["-f"] if arguments.follow else []), *lines])
+    return run_action(arguments, Fleet.of(paths, arguments))
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,31 +107,32 @@ class Fleet:
             raise NotDoneError(NO_LABEL.misspelt(None, message, wrong, sorted(known), "labels"))
         return cls(shares, executives)
 
-    def list_robots(self, *, in_json: bool) -> int:
-        """List the robots; return the exit code, which is that of findings if a share cannot be reached or is down."""
-        asked = hosts.on_all(
-            {" ".join(key): share.rbxcompose(["top", key[1], "--json"]) for key, share in self.shares.items()}
-        )
-        found = sorted((robot, host, _facts(asked[f"{host} {robot}"])) for host, robot in self.shares)
-        rows = [_row(robot, list(shares)) for robot, shares in groupby(found, key=lambda row: row[0])]
-        if in_json:
-            emit(json.dumps({"robots": rows}))
-        else:
-            emit(table([_COLUMNS, *([str(row[column]) for column in _COLUMNS] for row in rows)]))
-        return FINDINGS if any(row["state"] != _UP for row in rows) else 0
 
-    def run(self, mission: str, sets: Sequence[str], *, in_json: bool) -> int:
-        """Start a mission on each robot that has missions."""
-        words = [mission, *(word for set_ in sets for word in ("--set", set_)), *(["--json"] if in_json else [])]
-        if not self.executives:
-            return refuse(NO_LABEL.at(None, "none of these robots runs missions"))
-        return hosts.ask_all(
-            self.executives, lambda robot: ["mission", "run", *words, "--robot", robot], in_json=in_json
-        )
+def _list(fleet: Fleet, arguments: argparse.Namespace) -> int:
+    """List the robots; return the exit code, which is that of findings if a share cannot be reached or is down."""
+    commands = {" ".join(key): share.rbxcompose(["top", key[1], "--json"]) for key, share in fleet.shares.items()}
+    asked = hosts.on_all(commands)
+    found = sorted((robot, host, _facts(asked[f"{host} {robot}"])) for host, robot in fleet.shares)
+    rows = [_row(robot, list(shares)) for robot, shares in groupby(found, key=lambda row: row[0])]
+    shown = table([_COLUMNS, *([row[column] for column in _COLUMNS] for row in rows)])
+    emit(json.dumps({"robots": rows}) if arguments.json else shown)
+    return FINDINGS if any(row["state"] != _UP for row in rows) else 0
 
-    def follow(self, options: Sequence[str]) -> int:
-        """Show the logs of all."""
-        return hosts.follow_all(self.shares, lambda robot: ["logs", robot, *options])
+
+def _run(fleet: Fleet, arguments: argparse.Namespace) -> int:
+    """Start a mission on each robot that has missions."""
+    if not fleet.executives:
+        return refuse(NO_LABEL.at(None, "none of these robots runs missions"))
+    words = [arguments.mission, *(word for set_ in arguments.sets for word in ("--set", set_))]
+    words += ["--json", "--robot"] if arguments.json else ["--robot"]
+    return hosts.ask_all(fleet.executives, lambda robot: ["mission", "run", *words, robot], in_json=arguments.json)
+
+
+def _follow(fleet: Fleet, arguments: argparse.Namespace) -> int:
+    """Show the logs of all."""
+    options = ["--level", arguments.level, *(["-f"] if arguments.follow else [])]
+    options += ["-n", str(arguments.lines)] if arguments.lines is not None else []
+    return hosts.follow_all(fleet.shares, lambda robot: ["logs", robot, *options])
 
 
 def _facts(one: hosts.Running) -> dict[str, Any]:
@@ -160,7 +158,7 @@ def _row(robot: str, shares: Sequence[ShareFacts]) -> dict[str, str]:
         "robot": robot,
         "host": ", ".join(host for _, host, _ in shares),
         "state": _UP if set(states) == {_UP} else ", ".join(text for text in wrong if not text.endswith(_UP)),
-        "mission": "; ".join(_missions(answers)),
+        "mission": "; ".join(str(facts["mission"]) for facts in answers if facts.get("mission")),
         "battery": ", ".join(text for facts in answers for text in facts.get("batteries", {}).values()),
     }
 
@@ -170,7 +168,3 @@ def _state(facts: Mapping[str, Any]) -> str:
         return str(facts["state"])
     off = [component["name"] for component in facts["components"] if component["state"] != "active"]
     return f"{', '.join(off)} not active" if off else _UP
-
-
-def _missions(answers: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    yield from (str(facts["mission"]) for facts in answers if facts.get("mission"))

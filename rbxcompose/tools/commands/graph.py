@@ -11,7 +11,7 @@ from rbxcompose.commands.console import FINDINGS, emit, misused, write_report
 from rbxcompose.commands.options import out_option
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, compiled, robot_path
 from rbxcompose.tools.inspection.diagram import MANY, diagram_of, dot, folded, mermaid
-from rbxcompose.tools.inspection.graph_html import html
+from rbxcompose.tools.inspection.pages import html
 
 GROUP = "look"
 TEXTS = {"mermaid": mermaid, "dot": dot}

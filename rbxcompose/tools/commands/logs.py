@@ -31,12 +31,8 @@ _PAUSE = 0.05  # [s] between checks for new records
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument(
-        "names",
-        nargs="*",
-        metavar="ROBOT|PATH|COMPONENT",
-        help="the robot, by name or file, or a system; then components",
-    )
+    words = "the robot, by name or file, or a system; then components"
+    parser.add_argument("names", nargs="*", metavar="ROBOT|PATH|COMPONENT", help=words)
     add_robot_option(parser)
     add_system_options(parser)
     parser.add_argument("--level", choices=LOG_LEVELS, default="info", help="the lowest level to show")

@@ -254,15 +254,12 @@ def _status(arguments: argparse.Namespace) -> int:
     if arguments.json:
         emit(json.dumps(seen))
         return 0
-    emit("\n".join(_drawn(name, arguments.robot, seen, 120)))
-    return 0
-
-
-def _drawn(name: str, robot: str | None, seen: requests.Seen, width: int, *, colour: bool = False) -> list[str]:
     from rbxcompose.missions.view.picture import picture_from_data
     from rbxcompose.tools.mission_view import lines_of
 
-    return lines_of(picture_from_data(ask(robot, requests.ShowPicture(name))), seen, width, colour=colour)
+    picture = picture_from_data(ask(arguments.robot, requests.ShowPicture(name)))
+    emit("\n".join(lines_of(picture, seen, 120)))
+    return 0
 
 
 def _watch(arguments: argparse.Namespace) -> int:

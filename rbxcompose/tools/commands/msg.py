@@ -17,6 +17,7 @@ from rbxcompose.base.findings import kind
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, table, write_report
 from rbxcompose.commands.messages import NO_TYPE, to_json
 from rbxcompose.commands.new_files import NAME, write_new
+from rbxcompose.commands.options import Subcommand, add_actions, argument, run_action
 from rbxcompose.commands.targets import add_path_argument, robot_path
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.message_texts import wrong_package, wrong_type
@@ -29,6 +30,7 @@ from rbxcompose.msgs.packages import OWN, all_names, own_packages, package_files
 GROUP = "data"
 LICENCE = "Apache-2.0"
 NO_OWN = kind("RBX9049")
+_NAMES = "such as my_msgs/Grasp, my_msgs/srv/Open or my_msgs/action/Close"
 _BEGUN = {
     "msg": """# What it tells, with units.
 std_msgs/Header header
@@ -53,39 +55,30 @@ float64 width  # so far [m]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="ls|show|new|stubs|export", required=True)
-    parser.set_defaults(action="show")
-    ls = actions.add_parser("ls", help="list all types, those of the robot first")
-    show = actions.add_parser(
-        "show", help="print a definition with all types that it uses, and its type hash (the default)"
+    json_ = argument("--json", action="store_true", help="answer in JSON")
+    known = argument("type", metavar="TYPE", help="such as geometry_msgs/Twist")
+    own = argument("type", metavar="TYPE", help=_NAMES)
+    msgs = argument("--into", metavar="DIR", type=Path, default=Path("msgs"), help="the folder of packages (msgs)")
+    typings = argument("--into", metavar="DIR", type=Path, default=Path("typings"), help="the folder (typings)")
+    folder = argument("folder", metavar="DIR", type=Path, help="the folder in which to create the packages")
+    robot = argument("path", nargs="?", metavar="PATH", help="the robot whose own packages are written, too")
+    printed = "print a definition with all types that it uses, and its type hash"
+    begun = "write a type of your own to start from, and the folders of its package"
+    stubbed = "write the classes of the robot's types for editors and type checkers"
+    exported = f"write {OWN}, and a robot's own packages, for a ROS 2 workspace"
+    actions = (
+        Subcommand("ls", "list all types, those of the robot first", _ls, (add_path_argument,)),
+        Subcommand("show", printed, _show, (known, add_path_argument)),
+        Subcommand("new", begun, _new, (own, msgs)),
+        Subcommand("stubs", stubbed, _stubs, (typings, add_path_argument)),
+        Subcommand("export", exported, _export, (folder, robot)),
     )
-    show.add_argument("type", metavar="TYPE", help="such as geometry_msgs/Twist")
-    new = actions.add_parser("new", help="write a type of your own to start from, and the folders of its package")
-    new.add_argument("type", metavar="TYPE", help="such as my_msgs/Grasp, my_msgs/srv/Open or my_msgs/action/Close")
-    new.add_argument("--into", metavar="DIR", type=Path, default=Path("msgs"), help="the folder of packages (msgs)")
-    stubs = actions.add_parser("stubs", help="write the classes of the robot's types for editors and type checkers")
-    stubs.add_argument("--into", metavar="DIR", type=Path, default=Path("typings"), help="the folder (typings)")
-    for subparser in (ls, show, stubs):
-        add_path_argument(subparser)
-    export = actions.add_parser("export", help=f"write {OWN}, and a robot's own packages, for a ROS 2 workspace")
-    export.add_argument("folder", metavar="DIR", type=Path, help="the folder in which to create the packages")
-    export.add_argument("path", nargs="?", metavar="PATH", help="the robot whose own packages are written, too")
-    for subparser in (ls, show, new, stubs, export):
-        subparser.add_argument("--json", action="store_true", help="answer in JSON")
+    add_actions(parser, actions, json_, usual="show")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Carry out the chosen action."""
-    match arguments.action:
-        case "export":
-            return _export(arguments)
-        case "new":
-            return _new(arguments)
-        case "show":
-            return _show(arguments)
-        case "ls":
-            return _ls(arguments)
-    return _stubs(arguments)
+    return run_action(arguments)
 
 
 def _choose_robot(path: str | None) -> int:
@@ -124,10 +117,8 @@ def _show(arguments: argparse.Namespace) -> int:
         words = f"unknown type '{wanted}'"
         return refuse(NO_TYPE.misspelt(None, words, wanted, [*names, *map(short, names)], "known types"))
     hashed, text = type_hash(name, registry.chosen().structures), whole_text(name)
-    if arguments.json:
-        emit(to_json({"type": name, "hash": hashed, "text": text, "parts": parts_of(name)}))
-    else:
-        emit(f"# {name}\n# {hashed}\n{text}".rstrip("\n"))
+    data = {"type": name, "hash": hashed, "text": text, "parts": parts_of(name)}
+    emit(to_json(data) if arguments.json else f"# {name}\n# {hashed}\n{text}".rstrip("\n"))
     return 0
 
 
@@ -136,7 +127,7 @@ def _new(arguments: argparse.Namespace) -> int:
     kind_ = kinds[0] if kinds else "msg"
     if len(kinds) > 1 or kind_ not in KINDS:
         words = f"'{arguments.type}' is no name of a type"
-        return refuse(NAME.at(None, words, help="such as my_msgs/Grasp, my_msgs/srv/Open or my_msgs/action/Close"))
+        return refuse(NAME.at(None, words, help=_NAMES))
     name = f"{package}/{kind_}/{bare}"
     if why := wrong_package(package) or wrong_type(bare):
         return refuse(NAME.at(None, why))
@@ -145,12 +136,9 @@ def _new(arguments: argparse.Namespace) -> int:
     path = f"{name}.{kind_}"
     if finding := write_new(arguments.into, {path: _BEGUN[kind_]}):
         return refuse(finding)
-    if arguments.json:
-        emit(to_json({"type": name, "file": str(arguments.into / path)}))
-    else:
-        emit(
-            f"{shown_name(arguments.into / path)} is written; name '{arguments.into}' in the section 'msgs' of a robot"
-        )
+    file = arguments.into / path
+    text = f"{shown_name(file)} is written; name '{arguments.into}' in the section 'msgs' of a robot"
+    emit(to_json({"type": name, "file": str(file)}) if arguments.json else text)
     return 0
 
 
@@ -167,10 +155,8 @@ def _stubs(arguments: argparse.Namespace) -> int:
     for package, file in files.items():
         file.parent.mkdir(parents=True, exist_ok=True)
         replace_file(file, texts[package].encode())
-    if arguments.json:
-        emit(to_json({package: str(file) for package, file in files.items()}))
-    else:
-        emit("\n".join(f"{shown_name(file)} is written" for file in files.values()))
+    text = "\n".join(f"{shown_name(file)} is written" for file in files.values())
+    emit(to_json({package: str(file) for package, file in files.items()}) if arguments.json else text)
     return 0
 
 

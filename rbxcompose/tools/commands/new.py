@@ -14,9 +14,10 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
 from rbxcompose.base.printable import plain
 from rbxcompose.commands import new_files
-from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
+from rbxcompose.commands.console import ReportedError, emit, refuse, write_report
 from rbxcompose.commands.interrupts import INTERRUPTED
-from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.commands.options import argument
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.model.skills import navigator_of, top_speed
 from rbxcompose.manifest.files import PREFIX, find, project_of, shown_name
@@ -30,70 +31,55 @@ _WIDEST = 4096  # characters per line, enough for any path
 ABOUT = "What is it for?"
 
 
-@dataclass(frozen=True, slots=True)
-class New:
-    """Files to write below a folder, and what a user may want to do next."""
-
-    folder: Path
-    files: Mapping[str, str]
-    then: Sequence[str]
-    entry: Callable[[], list[str]] | None = None  # called once the files exist; returns the lines that report it
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
+    name = argument("name", metavar="NAME", help="lower-case letters, digits, underscores")
+    yes = argument("--yes", action="store_true", help="ask nothing; use the defaults where there is no option")
+    words = "the project's folder (default: this one)"
+    into = argument("--into", metavar="DIR", type=Path, default=Path(), help=words)
+    said = argument("--about", metavar="TEXT", help="what it is for, in a sentence")
+    base = argument("--base", metavar="TYPE", help=f"the component that drives ({scaffold.BASE})")
+    place = argument("--place", metavar="NAME=X,Y", action="append", help="a place to go to, besides the dock at 0,0")
+    robot = argument("--robot", metavar="PATH", default="", help="the robot, if there is more than one")
+    bare = argument("--no-add", action="store_true", help="do not change the robot's file; show what to add")
     kinds = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
-    for what, about in (
-        ("robot", "a robot that drives, with its mission"),
-        ("mission", "one more mission for a robot"),
-        ("part", "a part that robots can include"),
-        ("world", "a world for simulated robots, with a map"),
-        ("component", "a component type in Python, as a package to install"),
+    for what, about, make, own in (
+        ("robot", "a robot that drives, with its mission", _robot, (into, said, base, place)),
+        ("mission", "one more mission for a robot", _mission, (said, robot, bare)),
+        ("part", "a part that robots can include", _part, (into, said)),
+        ("world", "a world for simulated robots, with a map", _world, (into, said)),
+        ("component", "a component type in Python, as a package to install", _component, (into,)),
     ):
         subparser = kinds.add_parser(what, help=about, description=f"Write {about}.", allow_abbrev=False)
-        subparser.add_argument("name", metavar="NAME", help="lower-case letters, digits, underscores")
-        subparser.add_argument(
-            "--yes", action="store_true", help="ask nothing; use the defaults where there is no option"
-        )
-        if what != "mission":
-            subparser.add_argument(
-                "--into", metavar="DIR", type=Path, default=Path(), help="the project's folder (default: this one)"
-            )
-        if what != "component":
-            subparser.add_argument("--about", metavar="TEXT", help="what it is for, in a sentence")
-    new_robot, new_mission = kinds.choices["robot"], kinds.choices["mission"]
-    new_robot.add_argument("--base", metavar="TYPE", help=f"the component that drives ({scaffold.BASE})")
-    new_robot.add_argument(
-        "--place", metavar="NAME=X,Y", action="append", help="a place to go to, besides the dock at 0,0"
-    )
-    new_mission.add_argument("--robot", metavar="PATH", default="", help="the robot, if there is more than one")
-    new_mission.add_argument("--no-add", action="store_true", help="do not change the robot's file; show what to add")
+        subparser.set_defaults(make=make)
+        for declare in (name, yes, *own):
+            declare(subparser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Ask, write the files, and report them."""
     asker = new_files.Asker(is_asking=not arguments.yes)
     try:
-        return _write(_MAKERS[arguments.what](arguments, asker))
-    except MistakenRobotError as error:
-        write_report(error.compilation.report, error.compilation.sources)
-        return FINDINGS
+        return int(arguments.make(arguments, asker))
     except new_files.CancelledError:
         return INTERRUPTED
 
 
-def _write(new: New) -> int:
-    finding = new_files.write_new(new.folder, new.files)
+def _write(folder: Path, files: Mapping[str, str], then: Sequence[str], entry: Callable[[], list[str]] = list) -> int:
+    """Write files below a folder, and show what a user may want to do next.
+
+    `entry` is called once the files exist, and returns the lines that report it.
+    """
+    finding = new_files.write_new(folder, files)
     if finding is not None:
         return refuse(finding)
-    lines = [f"wrote {shown_name(new.folder / file)}" for file in new.files]
-    lines += [] if new.entry is None else new.entry()
-    lines += ["then:", *(f"  {line}" for line in new.then)]
+    lines = [f"wrote {shown_name(folder / file)}" for file in files]
+    lines += [*entry(), "then:", *(f"  {line}" for line in then)]
     emit("\n".join(plain(line, _WIDEST) for line in lines))
     return 0
 
 
-def _robot(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
+def _robot(arguments: argparse.Namespace, asker: new_files.Asker) -> int:
     name = new_files.read_name(arguments.name, "the robot")
     about = asker.ask(ABOUT, new_files.read_text, scaffold.ROBOT_ABOUT, given=arguments.about)
     base = asker.ask("Which component drives it?", scaffold.read_base, scaffold.BASE, given=arguments.base)
@@ -102,43 +88,43 @@ def _robot(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
         places = tuple(asker.ask_several(question, scaffold.read_next_place)) or scaffold.PLACES
     else:
         places = scaffold.read_places(arguments.place)
-    files = scaffold.robot_files(scaffold.RobotAnswers(name, about, base, places))
+    files = scaffold.robot_files(name, about, base, places)
     path = shown_name(arguments.into / f"robots/{name}")
     then = (
         f"rbxcompose check {path}",
         f"rbxcompose up --rate 10x {path}",
         f"python -m pytest {_test(arguments, name)}",
     )
-    return New(arguments.into, files, then)
+    return _write(arguments.into, files, then)
 
 
 def _test(arguments: argparse.Namespace, name: str) -> str:
     return shown_name(arguments.into / f"tests/test_{name}.py")
 
 
-def _part(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
+def _part(arguments: argparse.Namespace, asker: new_files.Asker) -> int:
     name = new_files.read_name(arguments.name, "the part")
     about = asker.ask(ABOUT, new_files.read_text, scaffold.PART_ABOUT, given=arguments.about)
     then = (f"include it in a robot, as parts/{name}.yaml shows", f"python -m pytest {_test(arguments, name)}")
-    return New(arguments.into, scaffold.part_files(name, about), then)
+    return _write(arguments.into, scaffold.part_files(name, about), then)
 
 
-def _world(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
+def _world(arguments: argparse.Namespace, asker: new_files.Asker) -> int:
     name = new_files.read_name(arguments.name, "the world")
     about = asker.ask(ABOUT, new_files.read_text, scaffold.WORLD_ABOUT, given=arguments.about)
     path = shown_name(arguments.into / f"worlds/{name}.yaml")
     then = (f"rbxcompose world picture {path}", f"rbxcompose up ROBOT --world {path}")
-    return New(arguments.into, scaffold.world_files(name, about), then)
+    return _write(arguments.into, scaffold.world_files(name, about), then)
 
 
-def _component(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
+def _component(arguments: argparse.Namespace, asker: new_files.Asker) -> int:
     name = scaffold.read_component_name(arguments.name)
     folder = shown_name(arguments.into / name)
     then = (f"python -m pip install -e {folder}", f"python -m pytest {folder}", f"use it in a robot: type: {name}")
-    return New(arguments.into, scaffold.component_files(name), then)
+    return _write(arguments.into, scaffold.component_files(name), then)
 
 
-def _mission(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
+def _mission(arguments: argparse.Namespace, asker: new_files.Asker) -> int:
     home = find_home(arguments.robot)
     usual = home.usual(new_files.read_name(arguments.name, "the mission", home.robot.manifest.missions))
     answers = replace(usual, about=asker.ask(ABOUT, new_files.read_text, usual.about, given=arguments.about))
@@ -155,24 +141,7 @@ def _mission(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
         why = f"it could not be added to {file} safely; " if is_wanted else ""
         return [f"{why}write into {file}:", "  missions:", f"    {answers.name}: {answers.entry}"]
 
-    return New(home.project, scaffold.mission_files(answers), then, entry)
-
-
-_MAKERS: dict[str, Callable[[argparse.Namespace, new_files.Asker], New]] = {
-    "robot": _robot,
-    "mission": _mission,
-    "part": _part,
-    "world": _world,
-    "component": _component,
-}
-
-
-class MistakenRobotError(Exception):
-    """Raised with the compiler's result when the robot itself has mistakes."""
-
-    def __init__(self, compilation: Compilation) -> None:
-        super().__init__("the robot has errors")
-        self.compilation = compilation
+    return _write(home.project, scaffold.mission_files(answers), then, entry)
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,21 +185,20 @@ def find_home(written: str) -> MissionHome:
 
     Raises:
         AnswerError: if there is no such robot, if there are several, or if it belongs to the library.
-        MistakenRobotError: if it has mistakes.
+        ReportedError: if it has mistakes.
     """
     file = _file(written)
     out = compile_robot(str(file), environment=os.environ)
     if out.robot is None or out.report.has_errors:
-        raise MistakenRobotError(out)
+        write_report(out.report, out.sources)
+        raise ReportedError
     return MissionHome(out.robot, file, project_of(file))
 
 
 def _file(written: str) -> Path:
     if written.startswith(PREFIX):
-        help_text = "create your own with 'rbxcompose new robot NAME'"
-        raise new_files.AnswerError(
-            new_files.ANSWER.at(None, f"'{written}' is a robot of the library, which stays as it is", help=help_text)
-        )
+        message = f"'{written}' is a robot of the library, which stays as it is"
+        raise new_files.wrong_answer(message, "create your own with 'rbxcompose new robot NAME'")
     path = find(written or _only())
     if isinstance(path, Path):
         return path
@@ -243,9 +211,5 @@ def _only() -> str:
         return str(files[0])
     if files:
         names = ", ".join(shown_name(file.parent) for file in files)
-        raise new_files.AnswerError(
-            new_files.ANSWER.at(None, "which robot is the mission for?", help=f"name it with '--robot': {names}")
-        )
-    raise new_files.AnswerError(
-        new_files.ANSWER.at(None, "there is no robot below 'robots/'", help="name one with '--robot PATH'")
-    )
+        raise new_files.wrong_answer("which robot is the mission for?", f"name it with '--robot': {names}")
+    raise new_files.wrong_answer("there is no robot below 'robots/'", "name one with '--robot PATH'")

@@ -8,8 +8,8 @@ from typing import Any
 
 from rbxcompose.base.requests import to_data
 from rbxcompose.commands.console import NotDoneError, emit, refuse, table
-from rbxcompose.commands.lookup import NO_SUPERVISOR, add_robot_option, answer_of, find_robot, known_state, robots_up
-from rbxcompose.commands.options import EACH, add_system_options
+from rbxcompose.commands.lookup import NO_SUPERVISOR, add_addressed_robot, answer_of, find_robot, known_state, robots_up
+from rbxcompose.commands.options import EACH
 from rbxcompose.runtime.folder import SUSPENDED, ClockOffset, ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import RobotStatus
@@ -25,9 +25,7 @@ _BLOCKED = "blocked"  # the state of a component that runs but cannot do its wor
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="only this robot, by name or file; or a system")
-    add_robot_option(parser)
-    add_system_options(parser)
+    add_addressed_robot(parser, "only this robot, by name or file; or a system")
     parser.add_argument("--json", action="store_true", help="answer in JSON; several robots are a list 'robots'")
 
 

@@ -21,7 +21,7 @@ from dataclasses import replace
 from datetime import datetime
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rbxcompose.base.findings import clauses
 from rbxcompose.base.printable import plain
@@ -173,15 +173,9 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: b
     warn_of_unmatched(tap.unmatched, tap.others)
     counts = recorder.counts
     if is_json:
-        emit(
-            json.dumps(
-                {
-                    "files": [str(path) for path in recorder.paths],
-                    "messages": {topic.name: number for topic, number in counts.items()},
-                    "unmatched": tap.unmatched,
-                }
-            )
-        )
+        messages = {topic.name: number for topic, number in counts.items()}
+        files = [str(path) for path in recorder.paths]
+        emit(json.dumps({"files": files, "messages": messages, "unmatched": tap.unmatched}))
         return 0
     paths = ", ".join(map(str, recorder.paths))
     emit(f"{count_table(counts)}\nrecorded {counts.total():,} messages to {paths}")
@@ -230,24 +224,10 @@ def _rate(text: str) -> int:
 
 def add_selection_options(parser: argparse.ArgumentParser) -> None:
     """Declare `--topics` and `--class`."""
-    parser.add_argument(
-        "--topics",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="PATTERN",
-        help="only these, such as odom '/camera/*'",
-    )
-    parser.add_argument(
-        "--class",
-        nargs="+",
-        action="extend",
-        default=[],
-        dest="classes",
-        type=_class,
-        metavar="CLASS",
-        help=f"only these classes: {', '.join(Qos)}",
-    )
+    several: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
+    parser.add_argument("--topics", metavar="PATTERN", help="only these, such as odom '/camera/*'", **several)
+    words = f"only these classes: {', '.join(Qos)}"
+    parser.add_argument("--class", dest="classes", type=_class, metavar="CLASS", help=words, **several)
 
 
 def selection_of(arguments: argparse.Namespace) -> Selection:

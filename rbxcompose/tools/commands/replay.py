@@ -11,7 +11,6 @@ its recorded inputs, and compares its outputs with the recording. The settings a
 
 import argparse
 import json
-import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -31,7 +30,7 @@ from rbxcompose.bus.zenoh_session import open_router
 from rbxcompose.commands.console import NotDoneError, emit, misused, refuse, write_report
 from rbxcompose.commands.guest import NO_ROUTER, Guest
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place, robots_up
-from rbxcompose.commands.options import seconds
+from rbxcompose.commands.options import seconds, speed_up
 from rbxcompose.commands.targets import add_layer_options, compiled
 from rbxcompose.compiler.plan.dump import PlanTextError, dump, load
 from rbxcompose.compiler.plan.model import Instance, Plan
@@ -39,11 +38,11 @@ from rbxcompose.runtime.recording import topics as codes
 from rbxcompose.runtime.recording.files import PART, Recorder, write_problem
 from rbxcompose.runtime.recording.reader import RecordingReader, RecordingSummary, playlist, summary_of
 from rbxcompose.runtime.recording.tape import PLAN
-from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, by_name, is_replayable, matches
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, is_replayable, matches
 from rbxcompose.runtime.replay import ReplayResult, RunDifference, missing_topics, replayed
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.tools.commands.record import add_selection_options, selection_of
-from rbxcompose.tools.recordings import count_table, opened, recover_in, warn, warn_of_unmatched
+from rbxcompose.tools.recordings import count_table, opened, recover_in, sorted_counts, warn, warn_of_unmatched
 
 GROUP = "data"
 _MATCHING = 1.0  # [s] maximum wait until subscribers have found a new publisher
@@ -97,11 +96,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--namespace", type=_namespace, metavar="NAME", help="put it before all topics")
     parser.add_argument("--over", action="store_true", help="also topics that are being published now")
     parser.add_argument("--loop", action="store_true", help="start again at the end, until Ctrl-C")
-    parser.add_argument(
-        "--into",
-        metavar="COMPONENT",
-        help="run one component of a recorded run again, as it was or as in --robot PATH, and compare",
-    )
+    words = "run one component of a recorded run again, as it was or as in --robot PATH, and compare"
+    parser.add_argument("--into", metavar="COMPONENT", help=words)
     parser.add_argument("--write", type=Path, metavar="FILE", help="with --into: keep what it sends now")
     add_layer_options(parser)
     parser.add_argument("--info", action="store_true", help="only show topics, types, counts and duration")
@@ -237,7 +233,7 @@ def _fields(summary: RecordingSummary, damage: str) -> dict[str, object]:
             "encoding": topic.encoding,
             "messages": number,
         }
-        for topic, number in sorted(by_name(summary.counts).items(), key=lambda item: (item[0].name, item[0].type))
+        for topic, number in sorted_counts(summary.counts)
     ]
     return {
         "messages": summary.messages,
@@ -259,13 +255,7 @@ def _namespace(text: str) -> str:
 
 def _rate(text: str) -> float:
     """Read `2x`."""
-    try:
-        rate = float(text.removesuffix("x"))
-    except ValueError:
-        rate = math.nan
-    if not 0 < rate < math.inf:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a rate; write '2x' or '0.5x'")
-    return rate
+    return speed_up(text, "'2x' or '0.5x'")
 
 
 @contextmanager
@@ -346,26 +336,10 @@ def _instance(plan: Plan, name: str) -> Instance:
         names = [one.name for one in plan.instances]
         message = f"the robot '{plain(plan.robot)}' has no component '{plain(name, 60)}'"
         raise NotDoneError(codes.NOT_ENOUGH.at(None, message, help=suggest(name, names, "components")))
-    if HIDDEN in _settings(plan, instance):
+    if json.dumps(HIDDEN) in dump(Plan(plan.robot, plan.file, (instance,))):
         message = f"'{name}' has a secret, which a recording does not hold"
         raise NotDoneError(codes.NOT_ENOUGH.at(None, message, help="'--robot PATH' takes it from the robot's file"))
     return instance
-
-
-def _settings(plan: Plan, instance: Instance) -> list[object]:
-    """Return the values of a recorded configuration."""
-    whole = json.loads(dump(Plan(plan.robot, plan.file, (instance,))))
-    left: list[object] = [whole["instances"][0]["config"]]
-    found: list[object] = []
-    while left:
-        one = left.pop()
-        if isinstance(one, dict):
-            left += one.values()
-        elif isinstance(one, list):
-            left += one
-        else:
-            found.append(one)
-    return found
 
 
 @contextmanager

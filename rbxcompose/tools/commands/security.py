@@ -18,7 +18,7 @@ from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import Finding, Report, Severity, kind
 from rbxcompose.base.requests import to_data
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
-from rbxcompose.commands.options import add_system_options, is_system
+from rbxcompose.commands.options import Subcommand, add_actions, add_system_options, argument, is_system, run_action
 from rbxcompose.commands.targets import system_without_errors
 from rbxcompose.compiler.plan.model import LinkTls
 from rbxcompose.compiler.systems import certificates
@@ -39,27 +39,20 @@ SOON_EXPIRED = kind("RBX6144", Severity.WARNING)
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="init|audit", required=True)
-    parser.set_defaults(action="audit")
-    for name, about in (
-        ("init", "make certificates for all hosts"),
-        ("audit", "list what listens, and who may reach it (the default)"),
-    ):
-        action = actions.add_parser(name, help=about)
-        action.add_argument("path", metavar="SYSTEM", help="the file of the system")
-        add_system_options(action)
-        if name == "audit":
-            action.add_argument("--json", action="store_true", help="answer in JSON")
+    system = (argument("path", metavar="SYSTEM", help="the file of the system"), add_system_options)
+    json_ = argument("--json", action="store_true", help="answer in JSON")
+    actions = (
+        Subcommand("init", "make certificates for all hosts", _init, system),
+        Subcommand("audit", "list what listens, and who may reach it", _audit, (*system, json_)),
+    )
+    add_actions(parser, actions, usual="audit")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
     if not is_system(arguments.path):
         return refuse(NOT_MADE.at(None, f"'{arguments.path}' is not the file of a system"))
-    system = system_without_errors(arguments.path, arguments.profile)
-    if arguments.action == "init":
-        return _init(system, arguments)
-    return _audit(system, arguments.path, in_json=arguments.json)
+    return run_action(arguments, system_without_errors(arguments.path, arguments.profile))
 
 
 def _init(system: System, arguments: argparse.Namespace) -> int:
@@ -96,16 +89,11 @@ def _bring(system: System, host: str, folder: Path, arguments: argparse.Namespac
     return NOT_MADE.at(None, f"'{host}' cannot be given its certificate: {reason[0]}")
 
 
-def _audit(system: System, path: str, *, in_json: bool) -> int:
+def _audit(system: System, arguments: argparse.Namespace) -> int:
     endpoints, keys = list(listeners(system)), list(reachable_keys(system))
-    report = Report()
-    report.extend(_certificates(system, path))
-    if in_json:
-        emit(
-            json.dumps(
-                {"listeners": [to_data(endpoint) for endpoint in endpoints], "keys": [to_data(key) for key in keys]}
-            )
-        )
+    report = Report([*_certificates(system, arguments.path)])
+    if arguments.json:
+        emit(json.dumps({"listeners": to_data(endpoints), "keys": to_data(keys)}))
     else:
         for end in endpoints:
             warning = "  OPEN TO STRANGERS" if end.is_open else ""

@@ -8,19 +8,17 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Mapping
 from functools import partial
-from typing import Any
 
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import NotDoneError, emit, has_colour
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.hosts import Remote, Running, Shares, SystemCommand
-from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, place_of
+from rbxcompose.commands.lookup import NOT_UP, add_addressed_robot, find_robot, place_of
 from rbxcompose.commands.messages import to_json
-from rbxcompose.commands.options import EACH, add_json_option, add_system_options
+from rbxcompose.commands.options import EACH, add_json_option
 from rbxcompose.commands.terminal import LiveScreen, is_terminal
-from rbxcompose.tools.top import RobotPicture, Sampler, ShareView, lines_of, system_lines
+from rbxcompose.tools.top import Picture, Sampler, ShareView, lines_of, system_lines
 
 GROUP = "look"
 IS_COMMON = True
@@ -33,9 +31,7 @@ _AGAIN = 3.0  # [s] after a command has ended until it is started again
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="the robot, by name or file; or a system")
-    add_robot_option(parser)
-    add_system_options(parser)
+    add_addressed_robot(parser)
     parser.add_argument("--once", action="store_true", help="watch for a second, print the result, and end")
     add_json_option(parser)
     parser.add_argument("--follow", action="store_true", help="with --json: a line each second, until interrupted")
@@ -70,7 +66,7 @@ def _once(guest: Guest, sampler: Sampler, as_json: bool) -> int:
     guest.run(lambda: sampler.is_complete, _PERIOD)  # the awaited messages come once in a period
     picture = _sampled(sampler)
     colour = has_colour(sys.stdout)
-    emit(to_json(picture.to_data()) if as_json else "\n".join(lines_of(picture, _WIDTH, _HEIGHT, colour=colour)))
+    emit(to_json(picture) if as_json else "\n".join(lines_of(picture, _WIDTH, _HEIGHT, colour=colour)))
     return 0
 
 
@@ -78,7 +74,7 @@ def _follow(guest: Guest, sampler: Sampler) -> int:
     """Tell a picture as a line of JSON once a second."""
     with guest.interruptible():
         while True:
-            emit(to_json(_sampled(sampler).to_data()))
+            emit(to_json(_sampled(sampler)))
             sys.stdout.flush()
             if guest.run(lambda: guest.is_interrupted, _PERIOD):
                 return 0
@@ -94,7 +90,7 @@ def _live(guest: Guest, sampler: Sampler) -> int:
                 return 0
 
 
-def _sampled(sampler: Sampler) -> RobotPicture:
+def _sampled(sampler: Sampler) -> Picture:
     picture = sampler.sample()
     if picture is None:
         raise NotDoneError(NOT_UP.at(None, "the robot is down"))
@@ -107,7 +103,7 @@ class LiveShare:
     def __init__(self, host: str, robot: str, remote: Remote) -> None:
         self._host, self._robot = host, robot
         self._command = remote.rbxcompose(["top", robot, "--json", "--follow"])
-        self._answer: Mapping[str, Any] | None = None
+        self._answer: Picture | None = None
         self._since = time.monotonic()
         self._ended: float | None = None
         self._problem = self._last = ""

@@ -46,15 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     sent = (topic, type_, message, rate, most, timeout, options.add_json_option)
     # Only the functions that use messages import what those need: a list takes half the time without it.
     echo, publish = (options.deferred("rbxcompose.commands.messages", name) for name in ("echo", "publish"))
+    shown = (options.add_json_option, topic)
     actions = (
         options.Subcommand("ls", "list the topics with their types", _ls, (options.add_ls_options,)),
-        options.Subcommand("show", "show publishers and subscribers", _show, (options.add_json_option, topic)),
-        options.Subcommand(
-            "echo", "print the messages", echo, (options.add_count_options, options.add_json_option, topic)
-        ),
-        options.Subcommand(
-            "hz", "measure how often messages arrive", measure, (window, duration, options.add_json_option, topic)
-        ),
+        options.Subcommand("show", "show publishers and subscribers", _show, shown),
+        options.Subcommand("echo", "print the messages", echo, (options.add_count_options, *shown)),
+        options.Subcommand("hz", "measure how often messages arrive", measure, (window, duration, *shown)),
         options.Subcommand("pub", "publish a message, by default once", publish, sent),
     )
     options.add_actions(parser, actions, add_bus_options, options.add_system_options)

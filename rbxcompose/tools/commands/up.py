@@ -5,14 +5,13 @@ Exit codes: 0 fine, 1 findings, 2 wrong usage, 3 the mission failed, 4 the robot
 """
 
 import argparse
-import math
 from pathlib import Path
 
 from rbxcompose.base.units import TIME, UnitError, to_si
 from rbxcompose.commands import targets
 from rbxcompose.commands.console import FINDINGS, misused, refuse
 from rbxcompose.commands.formats.json_ import render_json
-from rbxcompose.commands.options import add_system_options, is_system
+from rbxcompose.commands.options import add_system_options, is_system, speed_up
 from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.recording.topics import UNWRITABLE
 from rbxcompose.tools.live_rules import LiveRules
@@ -52,7 +51,9 @@ def run(arguments: argparse.Namespace) -> int:
         return misused("up", f"--watch is for the foreground in real time, without {other}")
     path = targets.robot_path(arguments.path, may_run=False)
     if is_system(path):
-        return _run_share(path, arguments)
+        from rbxcompose.tools.system_runs import run_share  # only needed for systems
+
+        return run_share(path, arguments, _options(arguments))
     if arguments.host or arguments.robot:
         return misused("up", "--host and --robot are for systems")
     compilation = targets.compiled(path, arguments)
@@ -90,12 +91,6 @@ def _options(arguments: argparse.Namespace) -> RunOptions:
     )
 
 
-def _run_share(path: str, arguments: argparse.Namespace) -> int:
-    from rbxcompose.tools.system_runs import run_share  # only needed for systems
-
-    return run_share(path, arguments, _options(arguments))
-
-
 def _write_problem(path: Path) -> str:
     from rbxcompose.runtime.recording.files import write_problem  # imports MCAP, which only a recorded run needs
 
@@ -106,12 +101,7 @@ def _rate(text: str) -> RunOptions:
     """Read `20x`, `max` or `1x`."""
     if text == "max":
         return RunOptions(is_stepped=True)
-    try:
-        rate = float(text.removesuffix("x"))
-    except ValueError:
-        rate = math.nan
-    if not 0 < rate < math.inf:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a rate; write '20x', '1x' or 'max'")
+    rate = speed_up(text, "'20x', '1x' or 'max'")
     return RunOptions() if rate == 1 else RunOptions(is_stepped=True, rate=rate)
 
 

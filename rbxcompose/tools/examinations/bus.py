@@ -37,13 +37,11 @@ def ports(facts: HostFacts) -> Iterator[str | Finding]:
         wanted = [] if needs_none else [bus.port]
     for port in wanted:
         taken = facts.listeners.get(port)
-        yield (
-            f"port {port} is free"
-            if taken is None
-            else PORT_TAKEN.at(
-                None, f"port {port} is taken by {_who(taken)}", help="choose another one with '--set bus.port=N'"
-            )
-        )
+        if taken is None:
+            yield f"port {port} is free"
+        else:
+            words = f"port {port} is taken by {_who(taken)}"
+            yield PORT_TAKEN.at(None, words, help="choose another one with '--set bus.port=N'")
 
 
 def _router(robot: RunningRobot, facts: HostFacts) -> Iterator[str | Finding]:
@@ -60,11 +58,8 @@ def _router(robot: RunningRobot, facts: HostFacts) -> Iterator[str | Finding]:
         yield f"port {port}: router of {robot.name}, open to every user of this machine"
         return
     words = "nothing listens there" if taken is None else f"{_who(taken)} listens there"
-    yield NO_LISTENER.at(
-        None,
-        f"the router of '{robot.name}' should listen at port {port}, but {words}",
-        help=f"rbxcompose down {robot.name}",
-    )
+    message = f"the router of '{robot.name}' should listen at port {port}, but {words}"
+    yield NO_LISTENER.at(None, message, help=f"rbxcompose down {robot.name}")
 
 
 def _who(taken: Listener) -> str:
@@ -89,13 +84,11 @@ def clocks(facts: HostFacts) -> Iterator[str | Finding]:
     """Compare the wall clock with a time surely past, with the monotonic clock, and with the stamps of others."""
     clock = facts.clocks
     if clock.wall < clock.oldest:
-        yield WRONG_CLOCK.at(
-            None, "the clock of this machine is before the time at which rbxcompose was made", help=_HELP
-        )
+        words = "the clock of this machine is before the time at which rbxcompose was made"
+        yield WRONG_CLOCK.at(None, words, help=_HELP)
     elif abs(clock.step) > MOST_STEP:
-        yield WRONG_CLOCK.at(
-            None, f"the clock of this machine moved by {clock.step:+.3f} s while we looked", help=_HELP
-        )
+        words = f"the clock of this machine moved by {clock.step:+.3f} s while we looked"
+        yield WRONG_CLOCK.at(None, words, help=_HELP)
     else:
         yield f"the wall clock runs evenly{_server(clock.is_synchronised)}"
     for robot in facts.running:

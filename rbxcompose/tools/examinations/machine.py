@@ -135,10 +135,7 @@ def extras(facts: HostFacts) -> Iterator[str | Finding]:
         yield from missing
         needed = sorted({needed.extra.value for _, needed in robot.declared(NeedsExtra)})
         if not missing:
-            yield (
-                f"{robot.manifest.name}: {', '.join(needed)} installed"
-                if needed
-                else f"{robot.manifest.name} needs none"
-            )
+            installed = f"{robot.manifest.name}: {', '.join(needed)} installed"
+            yield installed if needed else f"{robot.manifest.name} needs none"
     if not facts.robots:
         yield "no robot was examined that may need one"

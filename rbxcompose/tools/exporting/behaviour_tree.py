@@ -14,8 +14,8 @@ from rbxcompose.base.findings import Report, Span
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.body.xml_reader import quoted
 from rbxcompose.manifest.files import shown_name
-from rbxcompose.manifest.reader import read_source, read_text
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.reader import read_file
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.language.grammar import long_form
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.parts import expression_of
@@ -76,11 +76,7 @@ def exported(path: Path, report: Report, sources: MutableMapping[str, str]) -> d
 
 
 def _read(path: Path, report: Report, sources: MutableMapping[str, str]) -> MappingNode | None:
-    shown = shown_name(path)
-    text, findings = read_source(path, shown, sources)
-    root: TreeNode | None = None
-    if text is not None:
-        root, findings = read_text(text, shown)
+    root, findings = read_file(path, shown_name(path), sources)
     report.extend(findings)
     if isinstance(root, MappingNode):
         said = root.get("kind")
@@ -112,6 +108,10 @@ class _CannotError(ValueError):
 
 def _text(node: TreeNode | None) -> str:
     return node.text if isinstance(node, ScalarNode) else ""
+
+
+def _entries(node: TreeNode | None) -> Mapping[str, Entry]:
+    return node.entries if isinstance(node, MappingNode) else {}
 
 
 def _tree(node: TreeNode) -> syntax.ExpressionNode:
@@ -148,9 +148,7 @@ class _Exporter:
         for key, why in (("interrupts", "an interrupt"), ("machine", "a machine")):
             if key in root:
                 help_text = "a '<ReactiveSequence>' does a part of what they do; start from a reactive 'sequence'"
-                self.cannot(
-                    _CannotError(root.entries[key].key.span, f"BehaviorTree.CPP has nothing for {why}", help_text)
-                )
+                self.cannot(root.entries[key].key.span, f"BehaviorTree.CPP has nothing for {why}", help_text)
         found = MadeElement("BehaviorTree", {"ID": name})
         for key, attribute in (("about", nodes.ABOUT), ("rate", nodes.RATE)):
             if text := _text(root.get(key)):
@@ -158,8 +156,7 @@ class _Exporter:
         body = root.get("do")
         if body is not None:
             found.children.append(self.step(body))
-            data = root.get("data")
-            if isinstance(data, MappingNode) and data.entries:
+            if data := _entries(root.get("data")):
                 found.children = [MadeElement("Sequence", {nodes.DATA: "true"}, [self.data(data), *found.children])]
         self.interface(name, root)
         return found
@@ -167,37 +164,35 @@ class _Exporter:
     def interface(self, name: str, root: MappingNode) -> None:
         """Declare the inputs and outputs of a mission as ports of its tree."""
         ports: list[MadeElement] = []
-        inputs, outputs = root.get("inputs"), root.get("outputs")
-        for key, entry in inputs.entries.items() if isinstance(inputs, MappingNode) else ():
-            given = entry.value if isinstance(entry.value, MappingNode) else MappingNode()
+        for key, entry in _entries(root.get("inputs")).items():
             port = MadeElement("input_port", {"name": key, f"{TWIN}input": _flow(entry.value)})
-            if default := _text(given.get("default")):
+            given = _entries(entry.value).get("default")
+            if given is not None and (default := _text(given.value)):
                 port.attributes["default"] = default
             ports.append(port)
-        for key, entry in outputs.entries.items() if isinstance(outputs, MappingNode) else ():
+        for key, entry in _entries(root.get("outputs")).items():
             if _text(entry.value) != f"${key}":
                 help_text = f"'set' the data '{key}' in the mission, and write '{key}: ${key}'"
-                self.cannot(
-                    _CannotError(entry.key.span, f"the output '{key}' must be the data of that name", help_text)
-                )
+                self.cannot(entry.key.span, f"the output '{key}' must be the data of that name", help_text)
             ports.append(MadeElement("output_port", {"name": key}))
         if ports:
             self.models[name] = MadeElement("SubTree", {"ID": name}, ports)
 
-    def data(self, data: MappingNode) -> MadeElement:
+    def data(self, data: Mapping[str, Entry]) -> MadeElement:
         """Return the script that sets the data at the start."""
         codes = []
-        for name, entry in data.entries.items():
+        for name, entry in data.items():
             try:
                 code = script_of(_tree(entry.value))
             except (ScriptError, _CannotError):
                 code = f"'{_text(entry.value)}'" if "'" not in _text(entry.value) else "''"
             codes.append(f"{name} := {code}")
-        written = json.dumps({name: _flow(entry.value) for name, entry in data.entries.items()}, ensure_ascii=False)
+        written = json.dumps({name: _flow(entry.value) for name, entry in data.items()}, ensure_ascii=False)
         return MadeElement("Script", {"code": "; ".join(codes), nodes.DATA: written})
 
-    def cannot(self, error: _CannotError) -> MadeElement:
-        self.report.add(CANNOT_EXPORT.at(error.span, str(error), help=error.help))
+    def cannot(self, span: Span, message: str, help_text: str = _HELP) -> MadeElement:
+        """Report what is no tree, and return an element in its place."""
+        self.report.add(CANNOT_EXPORT.at(span, message, help=help_text))
         return MadeElement("AlwaysFailure")
 
     # steps
@@ -214,9 +209,9 @@ class _Exporter:
                 found.attributes["name"] = name
             return self.modified(mapping, found)
         except _CannotError as error:
-            return self.cannot(error)
+            return self.cannot(error.span, str(error), error.help)
         except ScriptError as error:
-            return self.cannot(_CannotError(span, f"'{plain(key, 60)}' cannot be exported: {error}"))
+            return self.cannot(span, f"'{plain(key, 60)}' cannot be exported: {error}")
 
     def core(self, mapping: MappingNode, key: str) -> MadeElement:
         """Return the element for a step without its modifiers."""
@@ -294,11 +289,9 @@ class _Exporter:
 
     def hook(self, mapping: MappingNode, key: str) -> MappingNode:
         """Return what a hook sets; it must not do anything else."""
-        hook = mapping.get(key)
-        if isinstance(hook, MappingNode) and hook.entries.keys() == {"set"}:
-            assigned = hook.get("set")
-            if isinstance(assigned, MappingNode):
-                return assigned
+        hook = _entries(mapping.get(key))
+        if hook.keys() == {"set"} and isinstance(assigned := hook["set"].value, MappingNode):
+            return assigned
         words = f"'{key}' can only 'set' in a tree of BehaviorTree.CPP"
         raise _CannotError(mapping.entries[key].key.span, words)
 
@@ -395,8 +388,8 @@ class _Exporter:
         return MadeElement("AlwaysSuccess", {"_skipIf": "true"}) if other is None else self.step(other)
 
     def choose(self, mapping: MappingNode) -> MadeElement:
-        value, cases = mapping.entries["choose"].value, mapping.get("cases")
-        tree, entries = _tree(value), cases.entries if isinstance(cases, MappingNode) else {}
+        value, entries = mapping.entries["choose"].value, _entries(mapping.get("cases"))
+        tree = _tree(value)
         if not isinstance(tree, syntax.Variable):
             raise _CannotError(value.span, "BehaviorTree.CPP chooses by an entry", "'set' a datum to it first")
         if not 2 <= len(entries) <= 6:
@@ -492,8 +485,7 @@ class _Exporter:
     def use(self, mapping: MappingNode) -> MadeElement:
         self.options(mapping)
         found = MadeElement("SubTree", {"ID": _text(mapping.get("use"))})
-        given = mapping.get("with")
-        for name, entry in given.entries.items() if isinstance(given, MappingNode) else ():
+        for name, entry in _entries(mapping.get("with")).items():
             found.attributes[name] = self.value(entry.value)
         self.outputs(mapping, found, ("on_success", "on_failure"))
         return found

@@ -241,10 +241,8 @@ def _clicks(plan: Plan) -> dict[str, Any]:
 def _pictures(plan: Plan) -> Iterator[Panel]:
     for topic in sent(plan).values():
         if topic.type in _PICTURES:
-            yield (
-                f"Image!{_id(topic.name)}",
-                {"imageMode": {"imageTopic": topic.name}, "foxglovePanelTitle": topic.name},
-            )
+            mode = {"imageTopic": topic.name}
+            yield f"Image!{_id(topic.name)}", {"imageMode": mode, "foxglovePanelTitle": topic.name}
 
 
 def _rest(plan: Plan) -> Iterator[Panel]:

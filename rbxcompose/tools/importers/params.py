@@ -180,11 +180,8 @@ def _component_rows(components: Iterable[KnownComponent]) -> Iterator[Row]:
         if is_first:
             yield row(0, "components:")
         is_first = False
-        yield row(
-            1,
-            f"{names.take(component.name, component.type)}:",
-            f"{place(component.span)}: '{plain(component.node, 60)}'",
-        )
+        origin = f"{place(component.span)}: '{plain(component.node, 60)}'"
+        yield row(1, f"{names.take(component.name, component.type)}:", origin)
         yield row(2, f"type: {component.type}", "the settings are those of this type")
         for setting, (text, span) in component.settings.items():
             yield row(2, f"{setting}: {text}", place(span))

@@ -58,24 +58,20 @@ def qos_of(port: Port[Any]) -> str:
     return str(port.qos) if isinstance(port, In | Out) else ""
 
 
+_DOES = {  # the first one that a port is counts
+    Out: "sends",
+    ServesTopic: "carries out",
+    In: "takes",
+    Serves: "answers",
+    ServesAction: "carries out",
+    CallsAction: "asks for",
+    Calls: "calls",
+}
+
+
 def does(port: Port[Any]) -> str:
     """Return the verb phrase for what a component does at a port."""
-    match port:
-        case Out():
-            return "sends"
-        case ServesTopic():
-            return "carries out"
-        case In():
-            return "takes"
-        case Serves():
-            return "answers"
-        case ServesAction():
-            return "carries out"
-        case CallsAction():
-            return "asks for"
-        case Calls():
-            return "calls"
-    return "looks up"
+    return next((words for kind, words in _DOES.items() if isinstance(port, kind)), "looks up")
 
 
 class BoxShape(StrEnum):
@@ -96,6 +92,11 @@ class WireContent(StrEnum):
     TRIGGER = "trigger"
 
 
+_CARRIED: dict[WireContent, tuple[type[Port[Any]], ...]] = {  # between these ports
+    WireContent.TOPIC: (Out, In),
+    WireContent.SERVICE: (Serves, Calls),
+    WireContent.ACTION: (ServesAction, CallsAction),
+}
 # How a mission reaches its skills; those in Python run inside it.
 _LINES = {SkillWay.ACTION: WireContent.ACTION, SkillWay.SERVICE: WireContent.SERVICE, SkillWay.TOPIC: WireContent.TOPIC}
 
@@ -209,7 +210,6 @@ def _open(wires: Sequence[DiagramWire]) -> DiagramWire:
 class _Open:
     """A wire under construction."""
 
-    kind: WireContent
     type: str
     qos: str = ""
     sources: list[Tip] = field(default_factory=list)
@@ -271,24 +271,13 @@ def _wires(robot: Robot) -> Iterator[DiagramWire]:
 
 
 def _add(robot: Robot, component: RobotComponent, end: PortEnd, found: dict[tuple[WireContent, str], _Open]) -> None:
-    kind = _kind(end)
+    kind = next((kind for kind, ends in _CARRIED.items() if isinstance(end.port, ends)), None)
     if kind is None:
         return
-    wire = found.setdefault((kind, end.topic), _Open(kind, end.type_name))
+    wire = found.setdefault((kind, end.topic), _Open(end.type_name))
     wire.qos = wire.qos or qos_of(end.port)
     tips = wire.sources if isinstance(end.port, Out | Calls | CallsAction) else wire.targets
     tips.append(Tip(component.name, _note(robot, component, end)))
-
-
-def _kind(end: PortEnd) -> WireContent | None:
-    match end.port:
-        case Out() | In():
-            return WireContent.TOPIC
-        case Serves() | Calls():
-            return WireContent.SERVICE
-        case ServesAction() | CallsAction():
-            return WireContent.ACTION
-    return None
 
 
 def _note(robot: Robot, component: RobotComponent, end: PortEnd) -> str:
@@ -305,10 +294,10 @@ def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tupl
     """Add the actions, services and topics that a mission uses. A skill in Python runs in the mission itself."""
 
     def lead(kind: WireContent, topic: str, type_name: str) -> None:
-        found.setdefault((kind, topic), _Open(kind, type_name)).sources.append(Tip(key))
+        found.setdefault((kind, topic), _Open(type_name)).sources.append(Tip(key))
 
     def receive(topic: str, type_name: str, note: str) -> None:
-        found.setdefault((WireContent.TOPIC, topic), _Open(WireContent.TOPIC, type_name)).targets.append(Tip(key, note))
+        found.setdefault((WireContent.TOPIC, topic), _Open(type_name)).targets.append(Tip(key, note))
 
     for skill in sorted({node.skill for node in mission.program.nodes} & robot.skills.keys()):
         source = robot.skills[skill]
@@ -334,13 +323,13 @@ def _add_trigger(robot: Robot, trigger: Trigger, found: dict[tuple[WireContent, 
     key = key_of(trigger.mission)
     sources = [Tip(key_of(trigger.ends))] if trigger.ends else []
     note = f"priority {trigger.priority}" if trigger.priority else ""
-    line = _Open(WireContent.TRIGGER, trigger.cause, sources=sources, targets=[Tip(key, note)])
+    line = _Open(trigger.cause, sources=sources, targets=[Tip(key, note)])
     found[WireContent.TRIGGER, trigger.name] = line
     needed = [(robot.values[name].topic, robot.values[name].message) for name in sorted(trigger.reads)]
     if trigger.topic:
         needed.append((resolve(trigger.topic, robot.manifest.bus.namespace or ""), trigger.message))
     for topic, message in needed:
-        wire = found.setdefault((WireContent.TOPIC, topic), _Open(WireContent.TOPIC, message))
+        wire = found.setdefault((WireContent.TOPIC, topic), _Open(message))
         if key not in [tip.box for tip in wire.targets]:
             wire.targets.append(Tip(key, f"trigger {trigger.name}"))
 

@@ -1,6 +1,6 @@
 """The composed robot as one manifest, with the origin of each value: its place, its layer, and how it was written."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rbxcompose.base.config import HIDDEN, Secret
@@ -20,6 +20,7 @@ from rbxcompose.manifest.tree import (
     ScalarNode,
     SequenceNode,
     TreeNode,
+    at,
     children,
     plain_value,
 )
@@ -57,12 +58,16 @@ def origin_of(manifest: RobotManifest, path: KeyPath, node: TreeNode) -> Origin:
 
 def is_leaf(node: TreeNode) -> bool:
     """Return whether a node has no children."""
-    match node:
-        case MappingNode(entries=entries):
-            return not entries
-        case SequenceNode(items=items):
-            return not items
-    return True
+    return not any(True for _ in children(node))
+
+
+def indexed(root: TreeNode, path: Sequence[str | int]) -> KeyPath:
+    """Return a path whose list indices, which count from 0, are numbers."""
+    found: KeyPath = ()
+    for key in path:
+        is_item = isinstance(at(root, found), SequenceNode) and str(key).isdecimal()
+        found = (*found, int(key) if is_item else key)
+    return found
 
 
 def shown(node: TreeNode) -> str:
@@ -133,18 +138,17 @@ def aligned(text: str) -> str:
 
 def expand_data(manifest: RobotManifest) -> dict[str, Any]:
     """Return the robot as data: its values as in a manifest, and the origin of each by its dotted path."""
-    origins = {
-        ".".join(map(str, path)): {
-            "file": origin.span.file,
-            "line": origin.span.line,
-            "column": origin.span.column,
-            "layer": origin.layer,
-            **({"written": origin.written} if origin.written else {}),
-        }
-        for path, node in leaves(manifest.root)
-        for origin in [origin_of(manifest, path, node)]
-    }
+    origins = {}
+    for path, node in leaves(manifest.root):
+        origin = origin_of(manifest, path, node)
+        written = {"written": origin.written} if origin.written else {}
+        origins[".".join(map(str, path))] = {**placed(origin.span), "layer": origin.layer, **written}
     return {"robot": as_data(manifest.root), "origins": origins}
+
+
+def placed(span: Span) -> dict[str, Any]:
+    """Return where a place begins, as data."""
+    return {"file": span.file, "line": span.line, "column": span.column}
 
 
 def leaves(node: TreeNode, path: KeyPath = ()) -> Iterator[tuple[KeyPath, TreeNode]]:

@@ -19,10 +19,11 @@ from rbxcompose.compiler.systems.exchange import exchange_of, shared_crossings
 from rbxcompose.compiler.systems.model import PlacedRobot, System
 from rbxcompose.compiler.systems.share import hosts_of, robots_on, share_of
 from rbxcompose.compiler.systems.traffic import Crossing
-from rbxcompose.manifest.tree import KeyPath, SequenceNode, TreeNode, at, key_span, value_span
+from rbxcompose.manifest.tree import KeyPath, TreeNode, at, key_span, value_span
 from rbxcompose.sdk.ports import Looks, Port
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.tools.inspection.diagram import does, keys_of, qos_of
+from rbxcompose.tools.inspection.origin import indexed
 
 _NUMBER = 4  # width of a position in the start order
 LONGEST = 6  # reasons shown for one component
@@ -95,13 +96,10 @@ def _wire(wire: Wire, port: Port[Any]) -> str:
 
 def with_places(found: Mapping[str, Any], robot: Robot) -> dict[str, Any]:
     """Return the difference, with the place of each new value that is written in the robot's files."""
-    components = [
-        {
-            **component,
-            "reasons": [{**each, "place": _place(robot, component["name"], each)} for each in component["reasons"]],
-        }
-        for component in found["components"]
-    ]
+    components = []
+    for component in found["components"]:
+        reasons = [{**each, "place": _place(robot, component["name"], each)} for each in component["reasons"]]
+        components.append({**component, "reasons": reasons})
     return {**found, "components": components}
 
 
@@ -137,7 +135,7 @@ def _place(robot: Robot, component: str, reason: Mapping[str, str | None]) -> st
     if component not in robot.components or reason["after"] is None:
         return ""
     root, path, least = _source(robot, component, key)
-    path = _indexed(root, path)
+    path = indexed(root, path)
     if at(root, path[:least]) is None:
         return ""
     span: Span = value_span(root, path) if at(root, path) is not None else key_span(root, path)
@@ -158,15 +156,6 @@ def _source(robot: Robot, component: str, key: str) -> tuple[TreeNode, KeyPath, 
         case ("inputs", name, *rest):
             return root, ("missions", name, "with", *rest), 3
     return root, keys, 1
-
-
-def _indexed(root: TreeNode, path: KeyPath) -> KeyPath:
-    """Return a path whose list indices are numbers."""
-    found: KeyPath = ()
-    for key in path:
-        is_item = isinstance(at(root, found), SequenceNode) and str(key).isdigit()
-        found = (*found, int(key) if is_item else key)
-    return found
 
 
 def system_extent(system: System) -> str:

@@ -27,7 +27,7 @@ from rbxcompose.missions.engine.world import show as show_value
 from rbxcompose.missions.program.parts import Input
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Serves, ServesAction, ServesTopic
 from rbxcompose.tools.inspection.diagram import does, keys_of, qos_of
-from rbxcompose.tools.inspection.origin import Origin, as_data, expand_below, origin_of, shown
+from rbxcompose.tools.inspection.origin import Origin, as_data, expand_below, indexed, origin_of, placed, shown
 
 NO_SUCH_PATH = kind("RBX9011")
 
@@ -38,11 +38,7 @@ def path_of(robot: Robot, text: str) -> KeyPath:
     manifest = robot.manifest
     if names[0] not in robot_keys():
         names.insert(0, _section_of(manifest, str(names[0])))
-    for index, name in enumerate(names):
-        above = found_at(manifest, tuple(names[:index]))
-        if isinstance(above, SequenceNode) and str(name).isdecimal():
-            names[index] = int(name)
-    return tuple(names)
+    return indexed(tree_of(manifest, tuple(names)), names)
 
 
 def _section_of(manifest: RobotManifest, name: str) -> str:
@@ -202,7 +198,7 @@ class PathAnswer:
                 {
                     "name": source.name,
                     "value": source.value,
-                    **(_placed(source.origin.span) if source.origin else {}),
+                    **(placed(source.origin.span) if source.origin else {}),
                     "below": _as_data(source.below),
                 }
                 for source in self.sources
@@ -212,15 +208,11 @@ class PathAnswer:
 
 
 def _as_data(layers: tuple[Layer, ...]) -> list[dict[str, Any]]:
-    return [{"layer": layer.name, "value": layer.value, **_placed(layer.span)} for layer in layers]
+    return [{"layer": layer.name, "value": layer.value, **placed(layer.span)} for layer in layers]
 
 
 def _where(layer: Layer) -> str:
     return ", ".join(part for part in (layer.place, layer.name if layer.name != ROBOT_LAYER else "") if part)
-
-
-def _placed(span: Span) -> dict[str, Any]:
-    return {"file": span.file, "line": span.line, "column": span.column}
 
 
 def si_unit(dimension: Dimension) -> str:

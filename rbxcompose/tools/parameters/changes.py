@@ -306,41 +306,28 @@ def param_undo(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     except NothingToUndoError as error:
         return refuse(NO_NAME.at(None, str(error), help="'rbxcompose param history' lists the changes"))
     wanted: dict[str, list[rcl_interfaces.Parameter]] = {}
-    for change in sorted(found, key=lambda each: each.component):  # processes report a change in any order
-        wanted.setdefault(homes[change.component], []).append(rcl_interfaces.Parameter(change.name, change.before))
     expected: dict[str, list[rcl_interfaces.Parameter]] = {}
-    for change in found:
-        expected.setdefault(homes[change.component], []).append(rcl_interfaces.Parameter(change.name, change.after))
-    change_values(
-        nodes,
-        wanted,
-        "undo",
-        {homes[parameter_change.component]: _first(parameter_change, found) for parameter_change in found},
-        expected,
-    )
+    undoes: dict[str, int] = {}
+    for change in sorted(found, key=lambda each: each.component):  # processes report a change in any order
+        node = homes[change.component]
+        wanted.setdefault(node, []).append(rcl_interfaces.Parameter(change.name, change.before))
+        expected.setdefault(node, []).append(rcl_interfaces.Parameter(change.name, change.after))
+        undoes[node] = min(change.number, undoes.get(node, change.number))
+    change_values(nodes, wanted, "undo", undoes, expected)
     return write_values(nodes, wanted, arguments)
-
-
-def _first(change: ParameterChange, found: Sequence[ParameterChange]) -> int:
-    return min(each.number for each in found if each.component == change.component)
 
 
 def assignments(words: Sequence[str]) -> list[tuple[str, str, str]]:
     """Return component, parameter and value of each change that the words of `param set` mean; none if they do not."""
     if len(words) == _WORDS and "=" not in words[0]:
         return [(words[0], words[1], words[2])]
-    return [_pair(word) for word in words] if all(map(_is_pair, words)) else []
-
-
-def _is_pair(word: str) -> bool:
-    path, equals, _ = word.partition("=")
-    return bool(equals) and SEPARATOR in path
-
-
-def _pair(word: str) -> tuple[str, str, str]:
-    path, _, value = word.partition("=")
-    component, _, name = path.partition(SEPARATOR)
-    return component, name, value
+    found = []
+    for path, equals, value in (word.partition("=") for word in words):
+        component, separator, name = path.partition(SEPARATOR)
+        if not equals or not separator:
+            return []
+        found.append((component, name, value))
+    return found
 
 
 def message_of(value: object) -> rcl_interfaces.ParameterValue:

@@ -8,13 +8,12 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from rbxcompose.base.config import Config, key_of, leaves, value_at, with_values
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
-from rbxcompose.base.findings import Finding, Fix, Related, Span, kind
+from rbxcompose.base.findings import Fix, Related, Span, kind
 from rbxcompose.base.fixes import apply
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import Dimension
@@ -34,7 +33,7 @@ from rbxcompose.compiler.systems.model import PlacedRobot, System
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.tree import FILE_BYTES, at
 from rbxcompose.msgs.rbxcompose_parameters import ParameterChange
-from rbxcompose.msgs.rcl_interfaces import GetParameters, Parameter
+from rbxcompose.msgs.rcl_interfaces import GetParameters, Parameter, ParameterValue
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.plan_requests import AdoptSaved, ComparePlan
 from rbxcompose.sdk.parameters import UnsettableError, changed, dimension_of, from_message, settings, to_message
@@ -100,17 +99,9 @@ class LiveSettings:
         return replace(self.plan, instances=tuple(instances))
 
 
-def compiled_as_it_runs(state: RobotState, unsaved: Mapping[Path, str] = MappingProxyType({})) -> Compilation:
-    """Compile a robot that runs as its files are now, with the layers that it runs with.
-
-    `unsaved` are texts in place of those of files, by their real paths.
-    """
-    return compiled_with(state.file, state.layers, unsaved)
-
-
 def live_settings(nodes: ParameterNodes, state: RobotState) -> LiveSettings | None:
     """Return the settings of a robot that runs; None if its files have errors now."""
-    found = compiled_as_it_runs(state)
+    found = compiled_with(state.file, state.layers)
     if found.robot is None or found.plan is None:
         return None
     return LiveSettings(found.robot, found.plan, found.sources, live_configs(nodes, found.robot))
@@ -118,20 +109,26 @@ def live_settings(nodes: ParameterNodes, state: RobotState) -> LiveSettings | No
 
 def live_configs(nodes: ParameterNodes, robot: Robot) -> dict[str, Config]:
     """Return the configurations of all components that are on the bus, with the values that they have now."""
-    wanted = {text: name for text, name in nodes_of(robot).items() if text in nodes.names}
-    configs = {node: robot.components[name].config for node, name in wanted.items()}
-    live = {
-        node: [setting.name for setting in settings(config).values() if setting.is_live]
-        for node, config in configs.items()
-    }
-    asked = [node for node, names in live.items() if names]
-    requests = [GetParameters.Request(names=tuple(live[node])) for node in asked]
-    for node, answer in zip(asked, nodes.ask(asked, "get_parameters", GetParameters, requests), strict=True):
-        pairs = zip(live[node], answer.values, strict=True)
-        values = [Parameter(name=name, value=value) for name, value in pairs if value.type]
-        with suppress(UnsettableError):  # its file has changed meanwhile
-            configs[node] = changed(configs[node], values)
-    return {name: configs[node] for node, name in wanted.items()}
+    configs = {name: robot.components[name].config for node, name in nodes_of(robot).items() if node in nodes.names}
+    live = {name: names for name, config in configs.items() if (names := _live_names(config))}
+    asked = [resolve(name, robot.manifest.bus.namespace or "") for name in live]
+    requests = [GetParameters.Request(names=tuple(names)) for names in live.values()]
+    answers = nodes.ask(asked, "get_parameters", GetParameters, requests)
+    for (name, names), answer in zip(live.items(), answers, strict=True):
+        pairs = zip(names, answer.values, strict=True)
+        configs[name] = _with_live(configs[name], {setting: value for setting, value in pairs if value.type})
+    return configs
+
+
+def _live_names(config: Config) -> list[str]:
+    return [setting.name for setting in settings(config).values() if setting.is_live]
+
+
+def _with_live(config: Config, values: Mapping[str, ParameterValue]) -> Config:
+    """Return a configuration with the values that its settings have now."""
+    with suppress(UnsettableError):  # its file has changed meanwhile
+        return changed(config, [Parameter(name=name, value=value) for name, value in values.items()])
+    return config
 
 
 def nodes_of(robot: Robot) -> dict[str, str]:
@@ -178,7 +175,8 @@ def files_with(live: LiveSettings, changes: Sequence[LiveChange], compiled: Comp
         try:
             edits.append(edit_of(live.robot.manifest, live.sources, path, change.live, change.dimension))
         except UnsavableError as error:
-            raise NotDoneError(_unsavable(change, error)) from error
+            message = f"'{change.path}' cannot be saved: {error.reason}"
+            raise NotDoneError(NOT_SAVED.at(error.span, message, help=error.help)) from error
     try:
         fix = merged(edits)
     except UnsavableError as error:
@@ -247,10 +245,6 @@ def _keys_changed(plan: Plan, folder: RobotFolder) -> dict[str, tuple[str, str]]
     found = answer_of(folder, ComparePlan(text), timeout=_COMPARE)
     each = ((component.name, reason) for component in found.components for reason in component.reasons)
     return {f"{name}.{change.key}": (change.before or "nothing", change.after or "nothing") for name, change in each}
-
-
-def _unsavable(change: LiveChange, error: UnsavableError) -> Finding:
-    return NOT_SAVED.at(error.span, f"'{change.path}' cannot be saved: {error.reason}", help=error.help)
 
 
 def _edited(live: LiveSettings, fix: Fix) -> NewTexts:
@@ -361,11 +355,6 @@ def param_reset(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     return write_values(nodes, wanted, arguments)
 
 
-def exact_text(value: object, dimension: Dimension | None) -> str:
-    """Return a value as `value_of` reads it, exact to the last but one bit."""
-    return value_text(value, dimension).replace("$$", "$")
-
-
 def param_dump(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     """Write the parameters that may change, as YAML for `load`."""
     wanted = [nodes.find(arguments.component)] if arguments.component else nodes.names
@@ -380,7 +369,8 @@ def param_dump(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     for one in found:
         lines += [f"{one.node.removeprefix('/')}:"] if one.node != node else []
         node = one.node
-        lines.append(f"  {one.about.name}: {exact_text(one.value, one.dimension)}")
+        value = value_text(one.value, one.dimension).replace("$$", "$")  # exact to the last but one bit
+        lines.append(f"  {one.about.name}: {value}")
     emit("\n".join(lines) or "{}")
     return 0
 
@@ -399,7 +389,7 @@ def param_save(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     changes = chosen(changed_since_up(live, folder, history), live, arguments.names)
     if changes:
         require_unedited(live, changes, folder, history)
-    exit_code = save(live, changes, partial(compiled_as_it_runs, state), arguments)
+    exit_code = save(live, changes, partial(compiled_with, state.file, state.layers), arguments)
     if changes and not arguments.dry_run:
         names: dict[str, list[str]] = {}
         for change in changes:
@@ -428,17 +418,8 @@ def save(live: LiveSettings, changes: Sequence[LiveChange], compiled: Compiled, 
             write(texts)
         places = sorted(str(edit.span) for edit in texts.fix.edits)
     if arguments.json:
-        emit(
-            json.dumps(
-                {
-                    "saved": [_data(live_change) for live_change in changes],
-                    "places": places,
-                    "difference": lines,
-                    "hash": seen,
-                    "dry_run": arguments.dry_run,
-                }
-            )
-        )
+        written = {"places": places, "difference": lines, "hash": seen, "dry_run": arguments.dry_run}
+        emit(json.dumps({"saved": [_data(change) for change in changes], **written}))
         return 0
     for change in changes:
         emit(_change_text(change))
@@ -479,32 +460,27 @@ def _data(change: LiveChange) -> dict[str, object]:
 class RemoteParameters:
     """The parameters of a robot of a system; `words` is the command as a host of it would take it.
 
-    The files here have a robot with simulated devices and one with `real` ones: the one meant is the one that runs.
+    The files here have a robot with simulated devices and one with real ones: the one meant is the one that runs.
     """
 
     system: System
     robot: PlacedRobot
     remote: Remote
     words: Sequence[str]
-    real: bool = False
 
     def run(self, arguments: argparse.Namespace) -> int:
         """Carry the command out and return its exit code."""
         if arguments.action == "load":
             return self._load(arguments.file)
-        running = self._ask("ps")
-        return replace(self, real=bool(running.get("real")))._compare(arguments)
-
-    def _compare(self, arguments: argparse.Namespace) -> int:
-        """Compare the live values with the files, and carry out what follows."""
-        live = self._live()
+        compiled = partial(self._compiled, real=bool(self._ask("ps").get("real")))
+        live = self._live(compiled({}))
         match arguments.action:
             case "diff":
                 return write_differences(live, arguments)
             case "reset":
                 return self._reset(chosen(list(live.changes), live, arguments.names), arguments)
             case _:
-                return self._save(live, arguments)
+                return self._save(live, compiled, arguments)
 
     def _load(self, file: Path) -> int:
         """Send a file of parameters along."""
@@ -527,7 +503,7 @@ class RemoteParameters:
             self._there("param", "set", *pairs, *(["--json"] if arguments.json else [])), check=False
         ).returncode
 
-    def _save(self, live: LiveSettings, arguments: argparse.Namespace) -> int:
+    def _save(self, live: LiveSettings, compiled: Compiled, arguments: argparse.Namespace) -> int:
         """Write what somebody has set into the files on this machine."""
         had: dict[str, list[object]] = {}
         for entry in self._ask("param", "history"):
@@ -544,22 +520,22 @@ class RemoteParameters:
                     f"'{change.path}' is {shown(change, change.written)} in the file now, which the robot has never had"
                 )
                 raise NotDoneError(CHANGED_SINCE.at(span, message, help="'rbxcompose apply' takes over the file"))
-        return save(live, changes, self._compiled, arguments)
+        return save(live, changes, compiled, arguments)
 
-    def _live(self) -> LiveSettings:
-        """Return the settings that the robot has now, beside those of the files here.
+    def _live(self, found: Compilation) -> LiveSettings:
+        """Return the settings that the robot has now, beside those of the files here, as they are compiled.
 
         Raises:
             NotDoneError: if the robot does not report them.
         """
-        found, dumped = self._compiled({}), self._ask("param", "dump")
+        dumped = self._ask("param", "dump")
         if found.robot is None or found.plan is None:
             raise NotDoneError(NO_FILES.at(None, f"the files of '{self.robot.name}' have errors"))
         return LiveSettings(found.robot, found.plan, found.sources, dict(_configs(found.robot, dumped)))
 
-    def _compiled(self, unsaved: Mapping[Path, str]) -> Compilation:
+    def _compiled(self, unsaved: Mapping[Path, str], *, real: bool) -> Compilation:
         """Return the robot as it is by itself, with other texts of its files."""
-        layers = layers_of(self.system, self.robot, real=self.real)
+        layers = layers_of(self.system, self.robot, real=real)
         return compiled_with(self.robot.plan.file, layers, unsaved)
 
     def _ask(self, *words: str) -> Any:
@@ -585,12 +561,9 @@ def _configs(robot: Robot, dumped: Mapping[str, Mapping[str, object]]) -> Iterat
         if values is None:
             continue
         config = robot.components[name].config
-        live = {setting.name for setting in settings(config).values() if setting.is_live}
+        live = _live_names(config)
         messages = {key: to_message(_plain(value)) for key, value in values.items() if key in live}
-        wanted = [Parameter(name=key, value=message) for key, message in messages.items() if message is not None]
-        with suppress(UnsettableError):  # its file has changed meanwhile
-            config = changed(config, wanted)
-        yield name, config
+        yield name, _with_live(config, {key: message for key, message in messages.items() if message is not None})
 
 
 def _json(value: object) -> object:

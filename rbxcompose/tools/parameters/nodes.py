@@ -147,29 +147,13 @@ def param_ls(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     wanted = [nodes.find(arguments.component)] if arguments.component else nodes.names
     found = listed(nodes, wanted)
     if arguments.json:
-        rows = [
-            (
-                parameter.node,
-                parameter.about.name,
-                parameter.value,
-                parameter.about.read_only,
-                parameter.about.description,
-            )
-            for parameter in found
-        ]
-        emit(to_json([dict(zip(_KEYS, row, strict=True)) for row in rows]))
+        emit(to_json([{key: data[key] for key in _KEYS} for data in map(_data, found)]))
         return 0
-    cells = [
-        (
-            parameter.node,
-            parameter.about.name,
-            parameter.text(parameter.value)[:_WIDEST],
-            "" if parameter.about.read_only else "live",
-            parameter.about.description,
-        )
-        for parameter in found
-    ]
-    emit(table([("component", "parameter", "value", "", "about"), *cells]))
+    rows = [("component", "parameter", "value", "", "about")]
+    for parameter in found:
+        about, value = parameter.about, parameter.text(parameter.value)[:_WIDEST]
+        rows.append((parameter.node, about.name, value, "" if about.read_only else "live", about.description))
+    emit(table(rows))
     return 0
 
 
