@@ -25,8 +25,7 @@ from rbxcompose.missions.view.picture import Drawn, picture_of
 from rbxcompose.tools.mission_editor.form import form, palette
 from rbxcompose.tools.mission_editor.new_mission import make_mission, templates
 from rbxcompose.tools.mission_editor.outline import INTERRUPTS, Block, MissionOutline, told
-from rbxcompose.tools.mission_editor.patch import path_of
-from rbxcompose.tools.mission_editor.patches import change
+from rbxcompose.tools.mission_editor.patches import change, path_of
 from rbxcompose.tools.mission_editor.yaml_places import Utf16
 from rbxcompose.tools.project_texts import ProjectTexts, ReadText, hash_of, words_of
 

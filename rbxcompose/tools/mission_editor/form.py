@@ -30,9 +30,8 @@ from rbxcompose.tools.lsp.document import Cursor, Document, Spot, quick_tree
 from rbxcompose.tools.lsp.names import SKILL, KnownNames
 from rbxcompose.tools.lsp.project import MISSION
 from rbxcompose.tools.mission_editor.outline import INTERRUPT, STATE, MissionOutline, kind_of, slots_of
-from rbxcompose.tools.mission_editor.patches import change
-from rbxcompose.tools.mission_editor.values import LINE, LINES, shape_of, shown_value
-from rbxcompose.tools.mission_editor.yaml_places import Path, PlacedNode, TextLines, placed
+from rbxcompose.tools.mission_editor.patches import FIXED, LINE, LINES, TEXT, change, shifted
+from rbxcompose.tools.mission_editor.yaml_places import BLOCK_MARK, Path, PlacedNode, TextLines, placed
 
 _VALUES = frozenset(("string", "number", "integer", "boolean", "null"))
 _HAS_PARTS = (TypeKind.LIST, TypeKind.MAP)
@@ -162,6 +161,31 @@ def _choices(value: GuidedValue, spot: Spot, schema: Mapping[str, Any], of: Type
         "units": list(units_of(dimension)) if dimension else [],
         "default": default,
     }
+
+
+def shape_of(lines: TextLines, node: PlacedNode | None) -> str:
+    """Return how a value can be edited; None is one that is not there."""
+    if node is None:
+        return LINE
+    raw = lines.text[node.start : node.end]
+    if node.form == "alias" or (node.mark[:2] != BLOCK_MARK and "\n" in raw):
+        return FIXED
+    if node.form == "scalar":
+        return TEXT if "\n" in raw else LINE
+    if node.is_flow and "\n" not in raw:
+        return LINE
+    return LINES if node.is_flow or lines.begins(node.start) else FIXED
+
+
+def shown_value(lines: TextLines, node: PlacedNode) -> str:
+    """Return a value as a form shows it: what is in lines of its own with its comments, as if it stood alone."""
+    if node.form == "scalar":
+        return node.text
+    if node.is_flow or not lines.begins(node.start):
+        return lines.text[node.start : node.end]
+    column = lines.column(node.start)
+    first, last = lines.region(node.start, node.end, column)
+    return shifted(lines.lines[first:last], -column)
 
 
 def _takes_value(schema: Mapping[str, Any]) -> bool:

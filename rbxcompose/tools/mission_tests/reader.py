@@ -532,10 +532,10 @@ class TrialReader:
         found = self._robot(root, written.path, report)
         if found is None:
             return None
-        trial = _read(root, *found, report)
+        trial = _read(root, written.name, *found, report)
         if trial is not None and not report.has_errors:
             report.extend(_with_its_inputs(root, found[0], trial))
-        return None if report.has_errors or trial is None else replace(trial, name=written.name)
+        return None if report.has_errors else trial
 
     def summed_up(self, findings: Iterable[Finding]) -> Iterator[Finding]:
         """Yield the findings, but merge those of all tests that the same robot with errors keeps from running."""
@@ -618,7 +618,7 @@ def _text(root: MappingNode, key: str, what: str, report: Report) -> ScalarNode 
     return None
 
 
-def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial | None:
+def _read(root: MappingNode, name: str, robot: Robot, plan: Plan, report: Report) -> Trial | None:
     chosen = _text(root, "mission", "the name of a mission", report)
     if chosen is None:
         return None
@@ -643,23 +643,7 @@ def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial 
     is_complete = _is_complete(context.facts, mocks, events)
     if is_complete:
         report.extend(_faults_without_servos(events))
-    header = {key: value.text for key in ("name", "about") if isinstance(value := root.get(key), ScalarNode)}
-    return Trial(
-        header.get("name", ""),
-        header.get("about", ""),
-        root.span.file,
-        root.entries["name"].value.span if "name" in root else root.span,
-        chosen.text,
-        program,
-        linked,
-        robot,
-        plan,
-        inputs,
-        mocks,
-        events,
-        expect,
-        is_complete,
-    )
+    return Trial(name, chosen.text, program, linked, robot, plan, inputs, mocks, events, expect, is_complete)
 
 
 def _with_its_inputs(root: MappingNode, robot: Robot, trial: Trial) -> Iterator[Finding]:
