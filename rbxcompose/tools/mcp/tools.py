@@ -1,15 +1,13 @@
-"""The tools: each is a verb of the command line, or two, with arguments that are checked.
-
-The texts of the arguments are what clients show.
-"""
+"""The tools: each is a verb of the command line, or two, with arguments that are checked."""
 
 from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import suppress
+from contextlib import asynccontextmanager, suppress
+from enum import Enum
 from typing import Annotated, Any, TypeVar
 
 from pydantic import Field
@@ -23,14 +21,62 @@ from rbxcompose.commands.lookup import answer_of, find_robot
 from rbxcompose.domains.console.access import Role
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.requests import NoteInLog
-from rbxcompose.tools.mcp.lanes import Lane
 from rbxcompose.tools.mcp.project_paths import ProjectPaths, words_of_finding
 from rbxcompose.tools.mcp.verb_process import VerbOutput, run_verb
 
+MOST_WAITING = 16  # in each lane
 _WORD = r"^[A-Za-z0-9_$][^\s/\\]*$"  # never an option, and never a path
 PlainWord = Annotated[str, Field(pattern=_WORD, max_length=200)]
 PlainWordOrNone = Annotated[str, Field(pattern=rf"^$|{_WORD}", max_length=200)]
 ProjectPath = Annotated[str, Field(min_length=1, max_length=1000)]
+
+
+class Lane(Enum):
+    """Calls of one lane wait for each other, and never for those of another; the value is how many go at once."""
+
+    COMPILE = "2 that compile"
+    LOOK = "4 that look at a robot"
+    OPERATE = "4 that operate one"
+    STOP = "4 that stop one"
+
+    @property
+    def at_once(self) -> int:
+        """Return how many calls are carried out at once."""
+        return int(self.value.split()[0])
+
+
+class Lanes:
+    """Lets calls go on when it is their turn."""
+
+    def __init__(self, deadline: float) -> None:
+        self._deadline = deadline
+        self._turns = {lane: asyncio.Semaphore(lane.at_once) for lane in Lane}
+        self._waiting = dict.fromkeys(Lane, 0)
+
+    @asynccontextmanager
+    async def turn(self, lane: Lane) -> AsyncIterator[None]:
+        """Wait for a turn, and end it after the deadline.
+
+        Raises:
+            Refused: if too many wait already, or it takes too long.
+        """
+        if self._waiting[lane] >= MOST_WAITING:
+            raise Refused("too many calls are waiting: try again")
+        self._waiting[lane] += 1
+        try:
+            await self._turns[lane].acquire()
+        finally:
+            self._waiting[lane] -= 1
+        try:
+            async with asyncio.timeout(self._deadline):
+                yield
+        except TimeoutError as error:
+            raise Refused(f"it took more than {self._deadline:g} s, and was ended") from error
+        finally:
+            self._turns[lane].release()
+
+
+# Arguments, whose texts are what clients show
 
 
 class WithTexts(Config):
