@@ -951,12 +951,8 @@ def _scalar(value: Any) -> str:
     if isinstance(value, int | float):
         return text_of(number(float(value)))
     text = str(value)
-    is_plain = (
-        not _LARGE.fullmatch(text)
-        and _PLAIN.fullmatch(text)
-        and text == text.strip()
-        and text.lower() not in _YAML_WORDS - {"true", "false"}
-    )
+    is_word = text.lower() in _YAML_WORDS - {"true", "false"}
+    is_plain = _PLAIN.fullmatch(text) and not _LARGE.fullmatch(text) and text == text.strip() and not is_word
     return text if is_plain else escaped(json.dumps(text, ensure_ascii=False))
 
 

@@ -216,9 +216,8 @@ def _spelt(tree: ScriptTree, how: _Spelling) -> tuple[str, int]:
             return f"-{inner(operand, MINUS)}", MINUS
         case syntax.Junction(operator=operator, operands=operands):
             strength = AND if operator == "and" else OR
-            return f" {how.words.get(operator, operator)} ".join(
-                inner(each, strength + 1) for each in operands
-            ), strength
+            word = f" {how.words.get(operator, operator)} "
+            return word.join(inner(each, strength + 1) for each in operands), strength
         case syntax.Comparison(operator=operator, left=left, right=right):
             return f"{inner(left, SUM)} {operator} {inner(right, SUM)}", COMPARED
         case syntax.Arithmetic(operator=operator, left=left, right=right):

@@ -450,11 +450,9 @@ class MissionMentions(_FileMentions):
 
     def _if_all_are_places(self, group: list[ScalarNode]) -> Iterator[Mention]:
         for robot in self.robots:
-            found: list[tuple[ScalarNode, Meanings]] = [
-                (node, self.files.meanings(robot, PLACE, node.text)) for node in group
-            ]
-            if all(meanings != NO_MEANING for _, meanings in found):
-                for scalar, meanings in found:
+            found = [self.files.meanings(robot, PLACE, node.text) for node in group]
+            if NO_MEANING not in found:
+                for scalar, meanings in zip(group, found, strict=True):
                     yield from self._meant(scalar, 0, meanings)
 
 
@@ -652,9 +650,8 @@ class SymbolIndex:
     def at(self, path: Path, line: int, column: int) -> list[Mention]:
         """Return the mentions at a position (from 0); several if the name there has several meanings."""
         offset = self.files.places(path).offset(line, column)
-        found = [
-            mention for mention in self.mentions if mention.file == path and mention.start <= offset <= mention.end
-        ]
+        here = (mention for mention in self.mentions if mention.file == path)
+        found = [mention for mention in here if mention.start <= offset <= mention.end]
         # Between two names, as at the end of the one of an instance, the one that begins there is meant.
         inside = [mention for mention in found if mention.start <= offset < mention.end] or found
         nearest = max((item.start for item in inside), default=0)

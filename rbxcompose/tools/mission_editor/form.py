@@ -82,10 +82,8 @@ class _FormDrawing:
 
     def fields(self, path: Path, node: PlacedNode, kind: str) -> Iterator[dict[str, Any]]:
         """Yield the fields of a block, and those of the map behind its word."""
-        inside = {slot.path[len(path)] for slot in slots_of(node, path) if len(slot.path) > len(path)} | {
-            "do",
-            "machine",
-        }
+        inside = {slot.path[len(path)] for slot in slots_of(node, path) if len(slot.path) > len(path)}
+        inside |= {"do", "machine"}
         keys = self.guide.keys(path)
         own = {kind, *anywhere()} if kind and kind not in kinds() else keys  # a skill is one key of a step
         for key, schema in keys.items():

@@ -110,14 +110,8 @@ def slots_of(step: PlacedNode, path: Path) -> list[Slot]:
 def _slot_in(step: PlacedNode, path: Path, of: Field) -> Slot:
     there, holds, part = step.get(of.key), _INSIDE[of.takes], _PARTS.get(of.takes, of.key)
     has_names = holds == NAMED or (holds == SEVERAL and there is not None and there.form == "map")
-    return Slot(
-        (*path, of.key),
-        holds,
-        part=part,
-        is_there=there is not None,
-        has_names=has_names,
-        is_optional=not of.is_required,
-    )
+    where, is_there, is_optional = (*path, of.key), there is not None, not of.is_required
+    return Slot(where, holds, part=part, is_there=is_there, has_names=has_names, is_optional=is_optional)
 
 
 def _states_in(node: PlacedNode, path: Path) -> Slot:

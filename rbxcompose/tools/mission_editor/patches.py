@@ -238,10 +238,7 @@ class _Patch(YamlPatch):
             text, plain = _bracketed(new)
             self.insert_in_brackets(path, index, f"{name}: {text}", [("scalar", name, SCALAR_MARK), plain])
             return self.done((*path, name))
-        if not name or scalar_text(name) != name:
-            raise Refused("it needs a name: letters, digits and underscores")
-        if name in names:
-            raise Refused(f"there is '{name}' already")
+        _require_new(name, names)
         if node.is_flow or not names:
             raise Refused(f"the map is written within brackets: {BY_HAND}")
         index = max(0, min(index, len(names)))
@@ -292,7 +289,7 @@ class _Patch(YamlPatch):
             return self.done(chosen)
         if node.form != "scalar" or "\n" in lines.text[node.start : node.end] or not node.text:
             raise Refused(f"this step has no keys: {BY_HAND}")
-        if not lines.text[lines.starts[lines.of(node.start)] : node.start].strip(" -") == "":
+        if lines.text[lines.starts[lines.of(node.start)] : node.start].strip(" -"):
             raise Refused(f"this step is written behind its key: {BY_HAND}")
         self.replace(node.end, node.end, ":")
         column = lines.column(node.start)
@@ -528,10 +525,7 @@ class _Patch(YamlPatch):
         pair = next((pair for pair in above.pairs if pair[0].text == path[-1]), None)
         if pair is None or not self.takes_names(path[:-1]):
             raise Refused("this has no name of its own")
-        if not name or scalar_text(name) != name:
-            raise Refused("it needs a name: letters, digits and underscores")
-        if name in _keys(above):
-            raise Refused(f"there is '{name}' already")
+        _require_new(name, _keys(above))
         self.replace(pair[0].start, pair[0].end, name)
         pair_in(tree_at(self.tree, path[:-1]), path[-1])[0] = ("scalar", name, SCALAR_MARK)
         if any(slot.path == path[:-1] and slot.of == STATE for slot in self.outline.all_slots()):
@@ -671,6 +665,13 @@ OPERATIONS: Mapping[str, Callable[[_Patch, Mapping[str, Any]], TextPatch]] = Map
 
 def _free(word: str, names: list[str]) -> str:
     return next(one for number in range(1, 10_000) if (one := word if number == 1 else f"{word}_{number}") not in names)
+
+
+def _require_new(name: str, names: list[str]) -> None:
+    if not name or scalar_text(name) != name:
+        raise Refused("it needs a name: letters, digits and underscores")
+    if name in names:
+        raise Refused(f"there is '{name}' already")
 
 
 def _leading(machine: PlacedNode, path: Path) -> Iterator[tuple[PlacedNode, Path]]:

@@ -162,10 +162,11 @@ def _turned_round(expect: Expectations) -> Iterator[Finding]:
         if step.at is None:
             continue
         if latest is not None and latest.at is not None and step.at < latest.at - 2 * ON_TIME:
-            related = [Related(latest.span, "this one is later")]
-            yield codes.NEVER.at(
-                step.span, "steps are listed as they begin, and this is earlier", help="exchange them", related=related
+            message, related = (
+                "steps are listed as they begin, and this is earlier",
+                [Related(latest.span, "this one is later")],
             )
+            yield codes.NEVER.at(step.span, message, help="exchange them", related=related)
         else:
             latest = step
 
@@ -180,9 +181,8 @@ def _bars(never: ExpectedStep, step: ExpectedStep) -> bool:
         return False
     if never.ended and (not step.ended or never.ended not in (step.ended, never.counts_as.get(step.ended))):
         return False
-    return all(
-        name in step.arguments and agrees(value, step.arguments[name]) for name, value in never.arguments.items()
-    )
+    arguments = step.arguments
+    return all(name in arguments and agrees(value, arguments[name]) for name, value in never.arguments.items())
 
 
 def read_mocks(context: TrialContext, node: TreeNode | None, models: Mapping[str, trials.MockModel]) -> dict[str, Mock]:
