@@ -181,6 +181,12 @@ def at(node: TreeNode, path: KeyPath) -> TreeNode | None:
     return found
 
 
+def text_at(node: TreeNode | None, path: KeyPath = ()) -> str:
+    """Return the text of the scalar at `path`; empty if there is none."""
+    found = at(node, path) if node is not None else None
+    return found.text if isinstance(found, ScalarNode) else ""
+
+
 def key_span(node: TreeNode, path: KeyPath) -> Span:
     """Return the place of the key at `path`, or of the nearest place above it if there is no key."""
     for length in range(len(path), 0, -1):

@@ -13,8 +13,7 @@ from rbxcompose.compiler.schema.scalars import Schema
 from rbxcompose.manifest.documents import KINDS
 from rbxcompose.missions.language.keys import anywhere
 from rbxcompose.tools.lsp.answers import fills, variables
-from rbxcompose.tools.lsp.document import Document, Spot
-from rbxcompose.tools.lsp.names import SKILL, named_by_key
+from rbxcompose.tools.lsp.document import SKILL, Document, Spot, named_by_key
 
 _FILL = re.compile(r"\$\{\s*([A-Za-z0-9_.]*)$")
 _VARIABLE = re.compile(r"\$([A-Za-z0-9_]*)$")

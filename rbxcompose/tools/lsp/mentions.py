@@ -25,7 +25,17 @@ from rbxcompose.compiler.sections.provides import provides
 from rbxcompose.manifest.registry import section_named
 from rbxcompose.manifest.section import PART, ROBOT, TEST, Section
 from rbxcompose.manifest.test_file import STEP_KEYS
-from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at, entries_of, scalars
+from rbxcompose.manifest.tree import (
+    KeyPath,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+    at,
+    entries_of,
+    scalars,
+    text_at,
+)
 from rbxcompose.missions.language.asked import Asked, WrittenArgument
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.keys import keys_taking
@@ -244,8 +254,7 @@ def filled_arguments(text: str) -> Iterator[tuple[int, str]]:
 
 def is_placed(declared: TreeNode | None) -> bool:
     """Return whether an input or argument takes the name of a place."""
-    word = at(declared, ("type",)) if isinstance(declared, MappingNode) else None
-    return isinstance(word, ScalarNode) and word.text in PLACED
+    return text_at(declared, ("type",)) in PLACED
 
 
 Skills = Mapping[str, Skill]

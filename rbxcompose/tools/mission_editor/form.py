@@ -26,8 +26,7 @@ from rbxcompose.missions.language.fields import first_line
 from rbxcompose.missions.language.keys import anywhere
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.tools.lsp.answers import variables
-from rbxcompose.tools.lsp.document import Cursor, Document, Spot, quick_tree
-from rbxcompose.tools.lsp.names import SKILL, KnownNames
+from rbxcompose.tools.lsp.document import SKILL, Cursor, Document, KnownNames, Spot, quick_tree
 from rbxcompose.tools.lsp.project import MISSION
 from rbxcompose.tools.mission_editor.outline import INTERRUPT, STATE, MissionOutline, kind_of, slots_of
 from rbxcompose.tools.mission_editor.patches import FIXED, LINE, LINES, TEXT, change, shifted

@@ -35,6 +35,7 @@ from rbxcompose.manifest.tree import (
     at,
     entries_of,
     key_span,
+    text_at,
     value_span,
 )
 from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of, to_plain, validate
@@ -318,7 +319,7 @@ def _ended(context: TrialContext, name: str, entries: Mapping[str, Entry]) -> st
     node = entries["ended"].value if "ended" in entries else None
     if node is None:
         return ""
-    word = node.text if isinstance(node, ScalarNode) else ""
+    word = text_at(node)
     known = {**ENDS, RUNS: RUNS, **context.facts.steps[name]}
     message = f"'{name}' does not end with '{word}'" if word else "'ended' needs a word"
     context.knows(node.span, word, known, message, "how it may end")
@@ -518,8 +519,7 @@ class TrialReader:
         sources = Texts(self.unsaved)
         root = Documents(report, sources).read(path, TEST)
         self.sources.update(sources)
-        name = root.get("name") if root else None
-        return WrittenTrial(path, name.text if isinstance(name, ScalarNode) and name.text else path.name, root, report)
+        return WrittenTrial(path, text_at(root, ("name",)) or path.name, root, report)
 
     def understand(self, written: WrittenTrial) -> Trial | None:
         """Return the test that a file contains, None if it cannot run; add its findings to its report."""
@@ -576,8 +576,7 @@ class TrialReader:
             none = "remove it: the robot has no profiles"
             report.extend(replace(finding, span=chosen.span, help=finding.help or none, fix=None) for finding in lost)
             return None
-        mission = root.get("mission")
-        found = robot_for_mission(made, mission.text if isinstance(mission, ScalarNode) else "")
+        found = robot_for_mission(made, text_at(root, ("mission",)))
         if found is None:
             why = codes.NEVER.at(written.span, _no_robot(shown, "the test"), help="see the findings of the robot")
             self._kept_back[why] = shown

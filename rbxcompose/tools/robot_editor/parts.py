@@ -17,7 +17,7 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.manifest.files import PARTS, PREFIX, library_root, project_of
-from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, at
+from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, at, text_at
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.tools.mission_editor.yaml_places import placed
 from rbxcompose.tools.robot_editor.subjects import Subject, Where, quantity_text, valid_name, written_text
@@ -81,9 +81,7 @@ class IncludedParts(Subject):
         """Return each instance with its part and its attachment, as they are written."""
         found = []
         for name, entry in instances(robot).items():
-            part, carrier = at(entry.value, ("part",)), at(entry.value, ("attach", "to"))
-            shown = part.text if isinstance(part, ScalarNode) else ""
-            to = carrier.text if isinstance(carrier, ScalarNode) else ""
+            shown, to = text_at(entry.value, ("part",)), text_at(entry.value, ("attach", "to"))
             pose = {key: self._written(robot, name, key) for key in self.fields}
             numbers = {key: _number_of(text, self.fields[key]) for key, text in pose.items()}
             plain = {"name": name, "part": shown, "to": to, "pose": pose, "numbers": numbers}
