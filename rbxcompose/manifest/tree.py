@@ -206,6 +206,22 @@ def value_span(node: TreeNode, path: KeyPath) -> Span:
     return node.span
 
 
+@dataclass(frozen=True, slots=True)
+class NodePlaces:
+    """The places of the keys and values of what is at the path `at` of a tree."""
+
+    root: TreeNode
+    at: KeyPath = ()
+
+    def key(self, path: KeyPath) -> Span:
+        """Return the place of a key."""
+        return key_span(self.root, (*self.at, *path))
+
+    def value(self, path: KeyPath) -> Span:
+        """Return the place of a value."""
+        return value_span(self.root, (*self.at, *path))
+
+
 def part_span(scalar: ScalarNode, start: int, end: int) -> Span:
     """Return the place of `scalar.text[start:end]`, or of the whole scalar if escapes or line breaks hide it."""
     span, quote = scalar.span, 0 if scalar.plain else 1

@@ -45,6 +45,7 @@ MOST_CHANGES = 4000  # of statuses that are told
 SAMPLER = "dry run"
 MOST_STEPS = 20  # of a test
 TESTS = "missions/tests"
+_OF_PLACE = ("name", "x", "y", "heading", "colour")
 TARGET_FRAME, ROBOT_FRAME = "map", "base_footprint"
 
 
@@ -137,10 +138,7 @@ def dry_run(made: Compilation, mission: str, path: Path, text: str) -> dict[str,
         ],
         "changes": [{"time": time, "path": list(path), "status": status} for time, path, status in changes],
         "track": [[round(value, 3) for value in at] for at in seen.track],
-        "places": [
-            {"name": place.name, "x": place.x, "y": place.y, "heading": place.heading, "colour": place.colour}
-            for place in names.places.values()
-        ],
+        "places": [{key: getattr(place, key) for key in _OF_PLACE} for place in names.places.values()],
     }
 
 

@@ -29,6 +29,7 @@ from rbxcompose.manifest.tree import (
     Entry,
     KeyPath,
     MappingNode,
+    NodePlaces,
     ScalarNode,
     SequenceNode,
     TreeNode,
@@ -437,7 +438,7 @@ def _published_by_event(context: TrialContext, node: TreeNode, sent: trials.Sent
     data = {} if written is None else to_plain(written)
     if not isinstance(data, dict):
         data = {next(iter(cls.FIELDS)): data}
-    made, findings = from_plain(cls, data, MessagePlaces(node, place))
+    made, findings = from_plain(cls, data, NodePlaces(node, place))
     context.report.extend(findings)
     return EventDeed(PUBLISH, topic=topic, message=made) if made is not None else None
 
@@ -447,22 +448,6 @@ def _topics(context: TrialContext) -> dict[str, str]:
     namespace = context.robot.manifest.bus.namespace or ""
     own = {resolve(name, namespace): message for name, message in context.names.topics.items()}
     return {**own, **{source.topic: source.message for source in context.robot.values.values()}}
-
-
-@dataclass(frozen=True, slots=True)
-class MessagePlaces:
-    """The places of the parts of a message."""
-
-    node: TreeNode
-    below: KeyPath
-
-    def key(self, path: KeyPath) -> Span:
-        """Return the place of a field's name."""
-        return key_span(self.node, (*self.below, *path))
-
-    def value(self, path: KeyPath) -> Span:
-        """Return the place of a field's value."""
-        return value_span(self.node, (*self.below, *path))
 
 
 @dataclass(frozen=True, slots=True)
