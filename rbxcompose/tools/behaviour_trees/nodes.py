@@ -173,20 +173,20 @@ LEAF, DECORATOR, CONTROL = (0, 0), (1, 1), (1, MANY)
 def _lists() -> list[BtNode]:
     yields = "There it yields between children; here the next one starts in the same tick."
     reactive = "Earlier conditions are evaluated again at each tick, other steps are not."
-    rows: list[tuple[str, str, dict[str, Any], str, bool]] = [
-        ("Sequence", "sequence", {}, "", True),
-        ("ReactiveSequence", "sequence", {"reactive": True}, reactive, True),
-        ("SequenceWithMemory", "sequence", {"history": "last"}, "", True),
-        ("AsyncSequence", "sequence", {}, yields, False),
-        ("Fallback", "fallback", {}, "", True),
-        ("ReactiveFallback", "fallback", {"reactive": True}, reactive, True),
-        ("AsyncFallback", "fallback", {}, yields, False),
-    ]
-    found = []
-    for name, word, options, note, is_exported in rows:
+
+    def row(name: str, word: str, note: str = "", *, is_exported: bool = True, **options: Any) -> BtNode:
         shown = "".join(f", `{key}: {str(value).lower()}`" for key, value in options.items())
-        found.append(BtNode(name, CONTROL, f"`{word}`{shown}", note, {}, word, options, is_exported))
-    return found
+        return BtNode(name, CONTROL, f"`{word}`{shown}", note, {}, word, options, is_exported)
+
+    return [
+        row("Sequence", "sequence"),
+        row("ReactiveSequence", "sequence", reactive, reactive=True),
+        row("SequenceWithMemory", "sequence", history="last"),
+        row("AsyncSequence", "sequence", yields, is_exported=False),
+        row("Fallback", "fallback"),
+        row("ReactiveFallback", "fallback", reactive, reactive=True),
+        row("AsyncFallback", "fallback", yields, is_exported=False),
+    ]
 
 
 def _modifiers() -> list[BtNode]:

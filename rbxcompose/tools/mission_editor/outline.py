@@ -198,9 +198,9 @@ class MissionOutline:
             self.slots.append(_states_in(root, ()))
             yield from self._states(root, ())
 
-    def _steps(self, node: PlacedNode, path: Path) -> Iterator[Block]:
+    def _steps(self, node: PlacedNode, path: Path, role: str = "") -> Iterator[Block]:
         for index, item in enumerate(node.items):
-            yield self._step(item, (*path, index), "", is_entry=True)
+            yield self._step(item, (*path, index), role, is_entry=True)
 
     def _step(self, node: PlacedNode, path: Path, role: str, *, is_entry: bool = False) -> Block:
         kind = kind_of(node)
@@ -229,20 +229,14 @@ class MissionOutline:
             if below is None:
                 continue
             role = "" if key in ("do", kind) else key
-            if below.form == "list" and below is not node and slot.holds == ONE:
-                yield from self._roled(self._steps(below, slot.path), role)
-            elif below.form == "list":
-                yield from self._steps(below, slot.path)
+            if below.form == "list":
+                is_role = below is not node and slot.holds == ONE
+                yield from self._steps(below, slot.path, role if is_role else "")
             elif below.form == "map" and slot.holds != ONE:
                 for name, value in below.pairs:
                     yield self._step(value, (*slot.path, name.text), name.text, is_entry=True)
             elif slot.holds == ONE:
                 yield self._step(below, slot.path, role)
-
-    def _roled(self, blocks: Iterator[Block], role: str) -> Iterator[Block]:
-        for block in blocks:
-            block.role = role
-            yield block
 
     def _states(self, node: PlacedNode, path: Path) -> Iterator[Block]:
         machine = node.get(MACHINE)
