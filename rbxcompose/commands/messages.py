@@ -11,8 +11,7 @@ from typing import Any, TypeVar
 
 import yaml
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Report, Span, kind
+from rbxcompose.base.findings import Finding, Report, kind
 from rbxcompose.base.printable import FORBIDDEN
 from rbxcompose.bus.graph import GraphName, WireType, find
 from rbxcompose.bus.names import name_problem
@@ -20,10 +19,10 @@ from rbxcompose.commands.console import NotDoneError, emit, refuse, write_report
 from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, SAID_NO, Guest, ReceivedMessage, wanted
 from rbxcompose.commands.interrupts import INTERRUPTED
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, key_span, plain_value, value_span
+from rbxcompose.manifest.tree import MappingNode, NodePlaces, ScalarNode, TreeNode, plain_value
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.cdr import CdrError, decode
-from rbxcompose.msgs.plain import KeyPath, from_plain, to_plain
+from rbxcompose.msgs.plain import from_plain, to_plain
 from rbxcompose.msgs.types import Interface, Message
 from rbxcompose.sdk.bound import Ended, Outcome, Reply
 from rbxcompose.sdk.ports import Qos
@@ -36,21 +35,6 @@ T = TypeVar("T", bound=Interface)
 _PERIOD = 1.0  # [s] between two notices about messages left out
 
 
-@dataclass(frozen=True, slots=True)
-class _Places:
-    """Source positions within a tree."""
-
-    root: TreeNode
-
-    def key(self, path: KeyPath) -> Span:
-        """Return the position of a key."""
-        return key_span(self.root, path)
-
-    def value(self, path: KeyPath) -> Span:
-        """Return the position of a value."""
-        return value_span(self.root, path)
-
-
 def message_from(message: type[M], text: str) -> M | None:
     """Read a message from YAML; an empty text means all defaults. On mistakes, report them and return None."""
     if not text.strip():
@@ -58,7 +42,7 @@ def message_from(message: type[M], text: str) -> M | None:
     root, findings = read_text(text, _SHOWN)
     made: M | None = None
     if root is not None and not findings:
-        made, findings = from_plain(message, _data(root), _Places(root))
+        made, findings = from_plain(message, _data(root), NodePlaces(root))
     if findings:
         write_report(Report([*findings]), {_SHOWN: text})
         return None

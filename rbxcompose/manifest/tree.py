@@ -183,6 +183,12 @@ def at(node: TreeNode, path: KeyPath) -> TreeNode | None:
     return found
 
 
+def text_at(node: TreeNode | None, path: KeyPath = ()) -> str:
+    """Return the text of the scalar at `path`; empty if there is none."""
+    found = at(node, path) if node is not None else None
+    return found.text if isinstance(found, ScalarNode) else ""
+
+
 def key_span(node: TreeNode, path: KeyPath) -> Span:
     """Return the place of the key at `path`, or of the nearest place above it if there is no key."""
     for length in range(len(path), 0, -1):
@@ -200,6 +206,22 @@ def value_span(node: TreeNode, path: KeyPath) -> Span:
         if (found := at(node, path[:length])) is not None:
             return found.span
     return node.span
+
+
+@dataclass(frozen=True, slots=True)
+class NodePlaces:
+    """The places of the keys and values of what is at the path `at` of a tree."""
+
+    root: TreeNode
+    at: KeyPath = ()
+
+    def key(self, path: KeyPath) -> Span:
+        """Return the place of a key."""
+        return key_span(self.root, (*self.at, *path))
+
+    def value(self, path: KeyPath) -> Span:
+        """Return the place of a value."""
+        return value_span(self.root, (*self.at, *path))
 
 
 def part_span(scalar: ScalarNode, start: int, end: int) -> Span:

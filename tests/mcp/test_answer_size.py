@@ -8,7 +8,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.tools.mcp.answer_size import CUT, MOST_ITEMS, MOST_TEXT, limited
+from rbxcompose.tools.mcp.server import CUT, MOST_ITEMS, MOST_TEXT, limited
 
 LEAST = 200  # characters, with which it can still be said that nothing fits
 DATA: st.SearchStrategy[Any] = st.recursive(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
-from rbxcompose.tools.mcp.lanes import MOST_WAITING, Lane, Lanes
+from rbxcompose.tools.mcp.tools import MOST_WAITING, Lane, Lanes
 
 LATE, BUSY = "it took more than 0.01 s, and was ended", "too many calls are waiting: try again"
 

@@ -16,7 +16,7 @@ import pytest
 from rbxcompose.commands.main import main as command
 from rbxcompose.domains.console.access import Role
 from rbxcompose.tools.commands import mcp
-from rbxcompose.tools.mcp.answer_size import MOST_CHARACTERS
+from rbxcompose.tools.mcp.server import MOST_CHARACTERS
 from tests.conftest import ROOT
 from tests.forked import Forked
 from tests.loops import for_all

@@ -116,7 +116,7 @@ async def _in_memory(operates: bool) -> AsyncIterator[Client]:
 
     from rbxcompose.domains.console.access import Role
     from rbxcompose.tools.mcp import server
-    from rbxcompose.tools.mcp.audit_log import AuditLog
+    from rbxcompose.tools.mcp.server import AuditLog
 
     role = Role.OPERATE if operates else Role.VIEW
     async with create_client_server_memory_streams() as (ours, theirs):

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from rbxcompose.base.requests import Refused
+from rbxcompose.tools.mission_editor.form import shape_of, shown_value
 from rbxcompose.tools.mission_editor.outline import MissionOutline
 from rbxcompose.tools.mission_editor.patches import change
-from rbxcompose.tools.mission_editor.values import shape_of, shown_value
 from tests.loops import for_all
 
 HEAD = "rbx: 1\nkind: Mission\nname: fetch\ndo:\n"

@@ -53,11 +53,11 @@ def told(record: TrialRecord) -> list[tuple[float, str]]:
 
 def expecting(trial: Trial, record: TrialRecord) -> Trial:
     """Return a test that expects just what happened."""
-    span = trial.span
     steps = tuple(
-        ExpectedStep(step.name, span, dict(step.arguments), step.ended, step.began, step.text) for step in record.steps
+        ExpectedStep(step.name, NOWHERE, dict(step.arguments), step.ended, step.began, step.text)
+        for step in record.steps
     )
-    return replace(trial, expect=Expectations(record.outcome, span, trial.expect.until, steps))
+    return replace(trial, expect=Expectations(record.outcome, NOWHERE, trial.expect.until, steps))
 
 
 @MANY

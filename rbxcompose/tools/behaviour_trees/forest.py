@@ -164,8 +164,7 @@ class _ForestReader:
             self.seen.add(found)
             text, findings = read_source(found, shown_name(found), self.sources, what="an imported file")
             if text is None:
-                self.report.add(
-                    MISTAKE.at(element.span, f"'{plain(written, _SHOWN)}' cannot be included: {findings[0].message}")
-                )
+                words = f"'{plain(written, _SHOWN)}' cannot be included: {findings[0].message}"
+                self.report.add(MISTAKE.at(element.span, words))
             else:
                 yield text, shown_name(found), found

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import field
 from functools import cache
-from itertools import count
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
@@ -27,7 +26,7 @@ from rbxcompose.missions.program.registry import kinds, modifier_keys, modifiers
 from rbxcompose.tools.behaviour_trees import nodes
 from rbxcompose.tools.behaviour_trees.forest import Forest, below, type_of
 from rbxcompose.tools.behaviour_trees.nodes import CONDITIONS, DIFFERS, EXPLICIT, MISTAKE, NODES, NOT_SAID
-from rbxcompose.tools.behaviour_trees.scripts import ScriptError, number, script_of, statements, text_of
+from rbxcompose.tools.behaviour_trees.scripts import ScriptError, number, script_of, statements, text_of, unplaced
 
 _PLAIN = re.compile(r"[$A-Za-z0-9_(][^:#\n\r\"\\&]*+")
 _LARGE = re.compile(r"[\d.]*+[eE][-+]?\d++|\d{15,}+")  # what YAML takes for a number that is none of ours
@@ -229,10 +228,8 @@ class ForestImporter:
         declared = {} if model is None else {port: one.direction for port, one in model.ports.items()}
         uses = [use for element in below(self.forest.trees[tree]) for use in self._uses(element)]
         names = [use.entry for use in uses]
-        begins, ends = (
-            {name: index for index, name in reversed([*enumerate(names)])},
-            dict(zip(names, count(), strict=False)),
-        )
+        begins = {name: index for index, name in reversed([*enumerate(names)])}
+        ends = {name: index for index, name in enumerate(names)}
         if "*" in found.passed:
             found.passed |= {name for name in names if name[0] not in "_@"}
         passed = found.passed | declared.keys()
@@ -310,10 +307,8 @@ class ForestImporter:
 
 
 def _is_auto(element: XmlElement) -> bool:
-    return element.attributes.get("_autoremap", element.attributes.get("__shared_blackboard", "")).lower() in (
-        "true",
-        "1",
-    )
+    given = element.attributes
+    return given.get("_autoremap", given.get("__shared_blackboard", "")).lower() in ("true", "1")
 
 
 def passed_ports(element: XmlElement, used: _TreePorts, forest: Forest) -> dict[str, str]:
@@ -472,10 +467,8 @@ class _TreeImporter:
     def outside(self, types: Mapping[str, str], declared: Mapping[str, Any]) -> None:
         """Tell which entries nothing sets, and which ports were taken for outputs."""
         known = {*types, *self.ports.inputs, *(use.entry for use in self.ports.uses if use.how == "i")}
-        unset = [
-            use.entry for use in self.ports.uses if use.entry not in known and self.ports.our(use.entry) not in declared
-        ]
-        if unset:
+        unknown = (use.entry for use in self.ports.uses if use.entry not in known)
+        if unset := [entry for entry in unknown if self.ports.our(entry) not in declared]:
             shown = ", ".join(f"'{plain(name, 60)}'" for name in dict.fromkeys(unset))
             words = f"nothing in the tree '{plain(self.tree, 60)}' sets {shown[:200]}"
             help_text = "declare what it is under 'values' of the robot, or under 'inputs' of the mission"
@@ -514,18 +507,15 @@ class _TreeImporter:
             return self.skill(element, kind)
         least, most = node.children
         if not least <= len(element.children) <= most:
-            wanted = (
-                str(least) if least == most else f"at least {least}" if most == nodes.MANY else f"{least} to {most}"
-            )
+            some = f"at least {least}" if most == nodes.MANY else f"{least} to {most}"
+            wanted = str(least) if least == most else some
             return self.left_out(element, f"it needs {wanted} children, and has {len(element.children)}", code=MISTAKE)
         if kind != "SubTree":
             for port in _ports(element).keys() - node.ports.keys():
                 words = f"'{kind}' has no port '{plain(port, 60)}'"
                 self.report.add(MISTAKE.misspelt(element.span, words, port, node.ports, "its ports are"))
-            missing = [
-                port for port, one in node.ports.items() if one.default is None and port not in element.attributes
-            ]
-            if missing:
+            needed = (port for port, codec in node.ports.items() if codec.default is None)
+            if missing := [port for port in needed if port not in element.attributes]:
                 return self.left_out(element, f"its port '{missing[0]}' has no value", code=MISTAKE)
         try:
             return self.known(element, node)
@@ -533,17 +523,16 @@ class _TreeImporter:
             return self.left_out(element, str(error))
 
     def known(self, element: XmlElement, node: nodes.BtNode) -> ImportedStep:
+        if node.ours == nodes.NOT_IMPORTED:
+            return self.left_out(element, "missions have nothing for it", node.note)
         if reader := _READERS.get(node.name):
             return reader(self, element)
-        value: Any = True
-        if node.port:
-            value = self.port(element, node.port)
+        value = self.port(element, node.port) if node.port else True
         if node.word in _order():
             return around(self.step(element.children[0]), {node.word: value})
         if node.children == nodes.CONTROL:
-            found = ImportedStep({node.word: self.steps(element, "reactive" in node.options)}, element.span)
-            found.update(node.options)
-            return found
+            steps = self.steps(element, "reactive" in node.options)
+            return ImportedStep({node.word: steps, **node.options}, element.span)
         return ImportedStep({node.word: value}, element.span)
 
     def port(self, element: XmlElement, port: str) -> Any:
@@ -590,14 +579,10 @@ class _TreeImporter:
         """Return a step with the conditions that an element has before and after it."""
         given = element.attributes
         for key in given:
-            if (
-                key[0] == "_"
-                and key not in CONDITIONS
-                and not key.startswith(("_rbx_", "_description", "__", "_autoremap"))
-            ):
-                self.report.add(
-                    MISTAKE.misspelt(element.span, f"unknown attribute '{plain(key, 60)}'", key, CONDITIONS)
-                )
+            is_other = key[0] != "_" or key.startswith(("_rbx_", "_description", "__", "_autoremap"))
+            if not is_other and key not in CONDITIONS:
+                words = f"unknown attribute '{plain(key, 60)}'"
+                self.report.add(MISTAKE.misspelt(element.span, words, key, CONDITIONS))
         try:
             return self._conditioned(element, step)
         except ScriptError as error:
@@ -648,7 +633,7 @@ class _TreeImporter:
         for each in statements(text):
             if not each.to:
                 raise ScriptError("a statement of this script assigns nothing")
-            tree = nodes.named(each.value, self.our)
+            tree = unplaced(each.value, self.our)
             name = self.our(each.to)
             reads = {node.name for node, _ in syntax.walk(tree) if isinstance(node, syntax.Variable)}
             if not groups or name in groups[-1] or reads & groups[-1].keys():
@@ -716,7 +701,8 @@ class _TreeImporter:
         ports = self.all.ports[used]
         given: dict[str, Any] = {}
         outputs: dict[str, str] = {}
-        for port, text in passed_ports(element, ports, self.all.forest).items():
+        passed = passed_ports(element, ports, self.all.forest)
+        for port, text in passed.items():
             entry = nodes.entry_of(text, port)
             if port not in ports.inputs and port not in ports.outputs:
                 words = f"the tree '{plain(used, 60)}' neither reads nor writes '{plain(port, 60)}'"
@@ -730,10 +716,9 @@ class _TreeImporter:
             if port in ports.outputs and entry:
                 outputs[self.our(entry)] = ports.our(port)
         model = self.all.forest.models.get(used)
-        optional = (
-            {port for port, one in model.ports.items() if "default" in one.element.attributes} if model else set()
-        )
-        for port in ports.inputs.keys() - passed_ports(element, ports, self.all.forest).keys() - optional:
+        declared = model.ports if model else {}
+        optional = {port for port, model_port in declared.items() if "default" in model_port.element.attributes}
+        for port in ports.inputs.keys() - passed.keys() - optional:
             words = f"the tree '{plain(used, 60)}' needs a value for its port '{plain(port, 60)}'"
             self.report.add(MISTAKE.at(element.span, words, help=f'write {plain(port, 60)}="..." here'))
         mission = self.all.missions[used]
@@ -919,9 +904,6 @@ class _TreeImporter:
     def always(self, element: XmlElement) -> ImportedStep:
         return ImportedStep({"check": "true" if type_of(element) == "AlwaysSuccess" else "false"}, element.span)
 
-    def not_said(self, element: XmlElement) -> ImportedStep:
-        return self.left_out(element, "missions have nothing for it", NODES[type_of(element)].note)
-
 
 def _case(text: str) -> str:
     tree = _literal(text)
@@ -968,12 +950,8 @@ def _scalar(value: Any) -> str:
     if isinstance(value, int | float):
         return text_of(number(float(value)))
     text = str(value)
-    is_plain = (
-        not _LARGE.fullmatch(text)
-        and _PLAIN.fullmatch(text)
-        and text == text.strip()
-        and text.lower() not in _YAML_WORDS - {"true", "false"}
-    )
+    is_word = text.lower() in _YAML_WORDS - {"true", "false"}
+    is_plain = _PLAIN.fullmatch(text) and not _LARGE.fullmatch(text) and text == text.strip() and not is_word
     return text if is_plain else escaped(json.dumps(text, ensure_ascii=False))
 
 
@@ -1043,8 +1021,4 @@ _READERS: Mapping[str, Callable[[_TreeImporter, XmlElement], ImportedStep]] = {
     "Script": _TreeImporter.script,
     "SetBlackboard": _TreeImporter.set_blackboard,
     "Log": _TreeImporter.log,
-    **dict.fromkeys(
-        ("ManualSelector", "WasEntryUpdated", "SkipUnlessUpdated", "WaitValueUpdate", "UnsetBlackboard", "TestNode"),
-        _TreeImporter.not_said,
-    ),
 }

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
@@ -37,6 +36,7 @@ _ENTRY = re.compile(r"\s*\{\s*([^{}\s]+)\s*\}\s*")
 _BOUNDARY = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|[^A-Za-z0-9]+")
 MOST_MSEC = 2**31
 UNNAMED = "unnamed"
+NOT_IMPORTED = "not imported"
 
 
 def snake(name: str) -> str:
@@ -122,14 +122,6 @@ def _write_msec(text: str) -> str:
     raise ScriptError(f"a time must be a whole number of milliseconds, not '{text}'" if tree else "")
 
 
-def _read_script(text: str, names: EntryNames) -> str:
-    return text_of(named(condition(text), names))
-
-
-def _write_script(text: str) -> str:
-    return script_of(tree_of(text))
-
-
 def tree_of(text: str) -> syntax.ExpressionNode:
     """Return the tree of an expression of ours.
 
@@ -142,33 +134,13 @@ def tree_of(text: str) -> syntax.ExpressionNode:
         raise ScriptError(error.message) from None
 
 
-def named(tree: syntax.ExpressionNode, names: EntryNames) -> syntax.ExpressionNode:
-    """Return a tree with other names for its variables."""
-
-    def renamed(value: Any) -> Any:
-        if isinstance(value, syntax.Variable):
-            return syntax.Variable(0, 0, names(value.name))
-        if isinstance(value, tuple):
-            return tuple(map(renamed, value))
-        if isinstance(value, syntax._Placed):
-            inner = {each.name: renamed(getattr(value, each.name)) for each in dataclasses.fields(value)}
-            return dataclasses.replace(value, **inner)
-        return value
-
-    found: syntax.ExpressionNode = renamed(tree)
-    return found
-
-
-COUNT, MSEC, SCRIPT = (
-    PortCodec(_read_count, _write_count),
-    PortCodec(_read_msec, _write_msec),
-    PortCodec(_read_script, _write_script),
-)
+COUNT, MSEC = PortCodec(_read_count, _write_count), PortCodec(_read_msec, _write_msec)
+SCRIPT = PortCodec(lambda text, names: text_of(unplaced(condition(text), names)), lambda text: script_of(tree_of(text)))
 TEXT = PortCodec(lambda text, names: text, str)
 
 
-def _or(port: PortCodec, default: str) -> PortCodec:
-    return PortCodec(port.read, port.write, default)
+def _text(default: str) -> PortCodec:
+    return replace(TEXT, default=default)
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,20 +172,20 @@ LEAF, DECORATOR, CONTROL = (0, 0), (1, 1), (1, MANY)
 def _lists() -> list[BtNode]:
     yields = "There it yields between children; here the next one starts in the same tick."
     reactive = "Earlier conditions are evaluated again at each tick, other steps are not."
-    rows: list[tuple[str, str, dict[str, Any], str, bool]] = [
-        ("Sequence", "sequence", {}, "", True),
-        ("ReactiveSequence", "sequence", {"reactive": True}, reactive, True),
-        ("SequenceWithMemory", "sequence", {"history": "last"}, "", True),
-        ("AsyncSequence", "sequence", {}, yields, False),
-        ("Fallback", "fallback", {}, "", True),
-        ("ReactiveFallback", "fallback", {"reactive": True}, reactive, True),
-        ("AsyncFallback", "fallback", {}, yields, False),
-    ]
-    found = []
-    for name, word, options, note, is_exported in rows:
+
+    def row(name: str, word: str, note: str = "", *, is_exported: bool = True, **options: Any) -> BtNode:
         shown = "".join(f", `{key}: {str(value).lower()}`" for key, value in options.items())
-        found.append(BtNode(name, CONTROL, f"`{word}`{shown}", note, {}, word, options, is_exported))
-    return found
+        return BtNode(name, CONTROL, f"`{word}`{shown}", note, {}, word, options, is_exported)
+
+    return [
+        row("Sequence", "sequence"),
+        row("ReactiveSequence", "sequence", reactive, reactive=True),
+        row("SequenceWithMemory", "sequence", history="last"),
+        row("AsyncSequence", "sequence", yields, is_exported=False),
+        row("Fallback", "fallback"),
+        row("ReactiveFallback", "fallback", reactive, reactive=True),
+        row("AsyncFallback", "fallback", yields, is_exported=False),
+    ]
 
 
 def _modifiers() -> list[BtNode]:
@@ -230,14 +202,13 @@ def _modifiers() -> list[BtNode]:
 
 
 def _others() -> list[BtNode]:
-    none = "not imported"
-    row = BtNode
-    thresholds = {"success_count": _or(TEXT, "-1"), "failure_count": _or(TEXT, "1")}
+    row, none = BtNode, NOT_IMPORTED
+    thresholds = {"success_count": _text("-1"), "failure_count": _text("1")}
     return [
         row("Parallel", CONTROL, "`parallel`, `succeed_when: 2`, `fail_when: all`",
             "All are ticked before the result is decided, and failure beats success. A skipped one does not count.",
             thresholds),
-        row("ParallelAll", CONTROL, "`parallel`, `wait_for_all: true`", "", {"max_failures": _or(TEXT, "1")}),
+        row("ParallelAll", CONTROL, "`parallel`, `wait_for_all: true`", "", {"max_failures": _text("1")}),
         row("IfThenElse", (2, 3), "`if`, `then`, `else`",
             "A condition that is a skill sets a datum first. Without a third child, a false condition is a failure."),
         row("WhileDoElse", (2, 3), "`as_long_as: $ready`; with three children, a reactive `sequence`",
@@ -247,18 +218,18 @@ def _others() -> list[BtNode]:
               {"variable": TEXT, **{f"case_{number}": TEXT for number in range(1, count + 1)}})
           for count in range(2, 7)),
         row("TryCatch", (2, MANY), "`fallback` of a `sequence` and the last child, which then fails",
-            "`catch_on_halt` is not imported.", {"catch_on_halt": _or(TEXT, "false")}),
+            "`catch_on_halt` is not imported.", {"catch_on_halt": _text("false")}),
         row("ManualSelector", CONTROL, none, "Start the mission of your choice with `rbxcompose mission run`.",
-            {"repeat_last_selection": _or(TEXT, "false")}),
+            {"repeat_last_selection": _text("false")}),
         row("ForceFailure", DECORATOR, "`optional: true`, and `invert: true` around it"),
         row("Repeat", DECORATOR, "`repeat: 3`, `do`", "One round per tick; a skipped round counts.",
             {"num_cycles": COUNT}, "repeat", {}, is_exported=True),
         row("KeepRunningUntilFailure", DECORATOR, "`repeat: forever`, `do`"),
         row("Delay", DECORATOR, "`sequence` with a `wait` before the step", "", {"delay_msec": MSEC}),
         row("Precondition", DECORATOR, "`only_if: $ready`; with another `else`: `if`", "",
-            {"if": SCRIPT, "else": _or(TEXT, "FAILURE")}, "only_if", {}, is_exported=True),
+            {"if": SCRIPT, "else": _text("FAILURE")}, "only_if", {}, is_exported=True),
         *(row(name, DECORATOR, "`for: item`, `in: [1, 2]`, `do`", "An empty list is skipped.",
-              {"queue": TEXT, "value": TEXT, "if_empty": _or(TEXT, "SUCCESS")})
+              {"queue": TEXT, "value": TEXT, "if_empty": _text("SUCCESS")})
           for name in ("LoopInt", "LoopBool", "LoopDouble", "LoopString")),
         *(row(name, children, none, "Write `wait_for: new($value)` for a value of the robot.", {"entry": TEXT})
           for name, children in (("WasEntryUpdated", LEAF), ("SkipUnlessUpdated", DECORATOR),
@@ -273,7 +244,7 @@ def _others() -> list[BtNode]:
         row("UnsetBlackboard", LEAF, none, "Data always have a value; `set` one that means none.", {"key": TEXT}),
         row("TestNode", LEAF, none, "Tests of missions replace skills by `mocks`."),
         row("Log", LEAF, "`log`", "A node of your program, if an exported mission logs.",
-            {"message": TEXT, "level": _or(TEXT, "info")}),
+            {"message": TEXT, "level": _text("info")}),
     ]  # fmt: skip
 
 

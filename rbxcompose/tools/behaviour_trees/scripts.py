@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import field
+from dataclasses import field, fields, replace
+from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions import tree as syntax
@@ -215,9 +216,8 @@ def _spelt(tree: ScriptTree, how: _Spelling) -> tuple[str, int]:
             return f"-{inner(operand, MINUS)}", MINUS
         case syntax.Junction(operator=operator, operands=operands):
             strength = AND if operator == "and" else OR
-            return f" {how.words.get(operator, operator)} ".join(
-                inner(each, strength + 1) for each in operands
-            ), strength
+            word = f" {how.words.get(operator, operator)} "
+            return word.join(inner(each, strength + 1) for each in operands), strength
         case syntax.Comparison(operator=operator, left=left, right=right):
             return f"{inner(left, SUM)} {operator} {inner(right, SUM)}", COMPARED
         case syntax.Arithmetic(operator=operator, left=left, right=right):
@@ -234,11 +234,18 @@ def _spelt(tree: ScriptTree, how: _Spelling) -> tuple[str, int]:
     raise AssertionError
 
 
-def unplaced(node: object) -> object:
-    """Return an expression's tree without places in the text, to compare two."""
-    if isinstance(node, tuple):
-        return tuple(unplaced(each) for each in node)
-    if isinstance(node, syntax._Placed):
-        names = [name for name in type(node).__slots__ if name not in ("start", "end")]
-        return (type(node).__name__, *(unplaced(getattr(node, name)) for name in names))
-    return node
+def unplaced(tree: ScriptTree, names: Callable[[str], str] = str) -> ScriptTree:
+    """Return an expression's tree without places in the text, to compare two, and with other `names` for variables."""
+
+    def changed(value: Any) -> Any:
+        if isinstance(value, syntax.Variable):
+            return syntax.Variable(0, 0, names(value.name))
+        if isinstance(value, tuple):
+            return tuple(map(changed, value))
+        if isinstance(value, syntax._Placed):
+            inner = {each.name: changed(getattr(value, each.name)) for each in fields(value)}
+            return replace(value, **{**inner, "start": 0, "end": 0})
+        return value
+
+    found: ScriptTree = changed(tree)
+    return found

@@ -39,8 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
             NOT_INSTALLED.at(None, "the server for the Model Context Protocol is not installed", help=help_text)
         )
     from rbxcompose.domains.console.access import Role
-    from rbxcompose.tools.mcp.audit_log import AuditLog, audit_path
-    from rbxcompose.tools.mcp.server import serve
+    from rbxcompose.tools.mcp.server import AuditLog, audit_path, serve
 
     if not any(Path(arguments.folder, name).exists() for name in _IN_PROJECTS):
         problem = (

@@ -21,8 +21,7 @@ from rbxcompose.missions.engine.world import POSE
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.program.program import Program
 from rbxcompose.missions.program.registry import keys_taking, kinds, modifier_keys
-from rbxcompose.tools.lsp.document import Document, Spot, quick_tree
-from rbxcompose.tools.lsp.names import SKILL, below_profile, named_by_key
+from rbxcompose.tools.lsp.document import SKILL, Document, Spot, below_profile, named_by_key, quick_tree
 from rbxcompose.tools.lsp.project import MISSION, kind_of
 
 _FILLS = {"robot.name": "name of the robot", "sim": "true in simulation", "env.": "an environment variable"}
@@ -76,10 +75,10 @@ def _program(spot: Spot) -> Program | None:
 
 
 def _declared(spot: Spot, root: tree.MappingNode, section: str) -> Iterator[tuple[str, str]]:
-    named, program = root.get(section), _program(spot)
-    for name in named.entries if isinstance(named, tree.MappingNode) else ():
+    program = _program(spot)
+    for name, entry in tree.entries_of(root.get(section)):
         known = base_names(program, spot.known.robot.names).get(name) if program and spot.known.robot else None
-        word = tree.at(named, (name, "type")) if isinstance(named, tree.MappingNode) else None
+        word = tree.at(entry.value, ("type",))
         yield name, known.phrase if known else word.text if isinstance(word, tree.ScalarNode) else UNKNOWN.phrase
 
 
@@ -126,9 +125,8 @@ def _section(name: str, entry: tree.Entry, is_mission: bool) -> OutlineEntry:
 
 
 def _named(node: tree.TreeNode) -> Iterator[OutlineEntry]:
-    for entry in node.entries.values() if isinstance(node, tree.MappingNode) else ():
-        below = entry.value.entries if isinstance(entry.value, tree.MappingNode) else {}
-        inner = (one for one in below.values() if not isinstance(one.value, tree.ScalarNode))
+    for _, entry in tree.entries_of(node):
+        inner = (one for _, one in tree.entries_of(entry.value) if not isinstance(one.value, tree.ScalarNode))
         yield _made(entry, "name", tuple(_made(item, "value", tuple(_named(item.value))) for item in inner))
 
 
@@ -312,8 +310,7 @@ def _field(spot: Spot) -> str:
 def _type(spot: Spot) -> str:
     """Return what the type of the entry named at the position is."""
     place = (*spot.cursor.place, "type")
-    word = tree.at(spot.cursor.root, place)
-    return spot.guide.value(place).words.get(word.text, "") if isinstance(word, tree.ScalarNode) else ""
+    return spot.guide.value(place).words.get(tree.text_at(spot.cursor.root, place), "")
 
 
 def _value(spot: Spot) -> str:

@@ -13,8 +13,7 @@ from rbxcompose.compiler.schema.scalars import Schema
 from rbxcompose.manifest.documents import KINDS
 from rbxcompose.missions.program.registry import anywhere
 from rbxcompose.tools.lsp.answers import fills, variables
-from rbxcompose.tools.lsp.document import Document, Spot
-from rbxcompose.tools.lsp.names import SKILL, named_by_key
+from rbxcompose.tools.lsp.document import SKILL, Document, Spot, named_by_key
 
 _FILL = re.compile(r"\$\{\s*([A-Za-z0-9_.]*)$")
 _VARIABLE = re.compile(r"\$([A-Za-z0-9_]*)$")
@@ -91,8 +90,7 @@ def _words_of_item(spot: Spot) -> Iterator[CompletionItem]:
     """Yield what can be written as a word in a list where a key is possible as well."""
     path = spot.cursor.path
     if spot.document.is_mission and _takes_nodes(spot.guide.keys(path)):
-        for name, about in spot.known.of(SKILL).items():
-            yield CompletionItem(name, "name", name, len(spot.cursor.before), about)
+        yield from _names(spot.known.of(SKILL), "name", len(spot.cursor.before))
     else:
         yield from _of_value(spot, path)
 
@@ -100,12 +98,10 @@ def _words_of_item(spot: Spot) -> Iterator[CompletionItem]:
 def _of_value(spot: Spot, path: tuple[str | int, ...]) -> Iterator[CompletionItem]:
     before, value = spot.cursor.before, spot.guide.value(path)
     if match := _FILL.search(before):
-        yield from (CompletionItem(name, "variable", name, len(match[1]), about) for name, about in fills(spot).items())
+        yield from _names(fills(spot), "variable", len(match[1]))
         return
     if spot.document.is_mission and (match := _VARIABLE.search(before)):
-        yield from (
-            CompletionItem(name, "variable", name, len(match[1]), about) for name, about in variables(spot).items()
-        )
+        yield from _names(variables(spot), "variable", len(match[1]))
         return
     if match := _QUANTITY.fullmatch(before):
         if value.dimension:
@@ -113,10 +109,9 @@ def _of_value(spot: Spot, path: tuple[str | int, ...]) -> Iterator[CompletionIte
         return
     kind = value.names
     replaces = len(before) if kind in PREFIXED else len(before) - len(before.rstrip(_WORD_CHARACTERS))
-    for name, about in (spot.known.of(kind, path) if kind else {}).items():
-        yield CompletionItem(name, "name", name, replaces, about)
-    if spot.document.is_mission and not kind and _is_expression(value):
-        yield from (CompletionItem(name, "name", name, replaces, about) for name, about in spot.known.of(PLACE).items())
+    yield from _names(spot.known.of(kind, path) if kind else {}, "name", replaces)
+    if spot.document.is_mission and not kind and value.dimension is None and not value.words:
+        yield from _names(spot.known.of(PLACE), "name", replaces)  # places can be compared here
     kinds = dict.fromkeys((spot.document.usual_kind, *KINDS), "") if path == ("kind",) else {}
     for word, about in (kinds or value.words).items():
         yield CompletionItem(word, "word", word, replaces, "", about)
@@ -124,9 +119,8 @@ def _of_value(spot: Spot, path: tuple[str | int, ...]) -> Iterator[CompletionIte
         yield from (CompletionItem(sample, "word", sample, 0, "example") for sample in value.examples)
 
 
-def _is_expression(value: GuidedValue) -> bool:
-    """Return whether places can be compared here."""
-    return value.dimension is None and not value.words
+def _names(names: Mapping[str, str], sort: str, replaces: int) -> Iterator[CompletionItem]:
+    return (CompletionItem(name, sort, name, replaces, about) for name, about in names.items())
 
 
 def _units(dimension: Dimension, match: re.Match[str]) -> Iterator[CompletionItem]:

@@ -22,9 +22,19 @@ from rbxcompose.compiler.sections.missions import INPUT, missions
 from rbxcompose.manifest.registry import section_named
 from rbxcompose.manifest.section import PART, ROBOT, TEST, Section
 from rbxcompose.manifest.test_file import STEP_KEYS
-from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at, entries_of, scalars
+from rbxcompose.manifest.tree import (
+    KeyPath,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+    at,
+    entries_of,
+    scalars,
+    text_at,
+)
 from rbxcompose.missions.language.grammar import BODIES, STATE_KEYS, Takes
-from rbxcompose.missions.language.reader import INTERRUPT_KEYS, read_program
+from rbxcompose.missions.language.reader import BODIES, INTERRUPT_KEYS, read_program
 from rbxcompose.missions.program.parts import DEEDS, MACHINE_KEYS, Asked, WrittenArgument
 from rbxcompose.missions.program.program import Program, Skill
 from rbxcompose.missions.program.registry import keys_taking, kinds, modifier_keys
@@ -236,8 +246,7 @@ def filled_arguments(text: str) -> Iterator[tuple[int, str]]:
 
 def is_placed(declared: TreeNode | None) -> bool:
     """Return whether an input or argument takes the name of a place."""
-    word = at(declared, ("type",)) if isinstance(declared, MappingNode) else None
-    return isinstance(word, ScalarNode) and word.text in PLACED
+    return text_at(declared, ("type",)) in PLACED
 
 
 Skills = Mapping[str, Skill]
@@ -442,11 +451,9 @@ class MissionMentions(_FileMentions):
 
     def _if_all_are_places(self, group: list[ScalarNode]) -> Iterator[Mention]:
         for robot in self.robots:
-            found: list[tuple[ScalarNode, Meanings]] = [
-                (node, self.files.meanings(robot, PLACE, node.text)) for node in group
-            ]
-            if all(meanings != NO_MEANING for _, meanings in found):
-                for scalar, meanings in found:
+            found = [self.files.meanings(robot, PLACE, node.text) for node in group]
+            if NO_MEANING not in found:
+                for scalar, meanings in zip(group, found, strict=True):
                     yield from self._meant(scalar, 0, meanings)
 
 
@@ -644,9 +651,8 @@ class SymbolIndex:
     def at(self, path: Path, line: int, column: int) -> list[Mention]:
         """Return the mentions at a position (from 0); several if the name there has several meanings."""
         offset = self.files.places(path).offset(line, column)
-        found = [
-            mention for mention in self.mentions if mention.file == path and mention.start <= offset <= mention.end
-        ]
+        here = (mention for mention in self.mentions if mention.file == path)
+        found = [mention for mention in here if mention.start <= offset <= mention.end]
         # Between two names, as at the end of the one of an instance, the one that begins there is meant.
         inside = [mention for mention in found if mention.start <= offset < mention.end] or found
         nearest = max((item.start for item in inside), default=0)

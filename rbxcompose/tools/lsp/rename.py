@@ -146,9 +146,8 @@ def _made(files: ProjectFiles, places: Mapping[Path, set[tuple[int, int]]], new:
 def _refuse_foreign(files: ProjectFiles, symbol: Symbol) -> None:
     section = section_named(symbol.sort)
     if not files.is_own(symbol.file):
-        raise CannotRenameError(
-            f"'{symbol.name}' comes from {shown_name(symbol.file)}, which does not belong to this project"
-        )
+        where = shown_name(symbol.file)
+        raise CannotRenameError(f"'{symbol.name}' comes from {where}, which does not belong to this project")
     if section is not None and section.has_topics:
         raise CannotRenameError(
             f"'{symbol.name}' is a topic: ports, other programs and parts know it by this name; write `connect:` for a "
@@ -161,19 +160,16 @@ def _refuse_ambiguous(index: SymbolIndex, symbols: list[Symbol]) -> None:
     if len(sorts) > 1:
         where = _where(index, symbols)
         raise CannotRenameError(f"'{symbols[0].name}' has several meanings ({', '.join(sorts)}){where}")
-    mentions = sorted(
-        {(mention.file, mention.start, mention.end) for symbol in symbols for mention in index.of(symbol)}
-    )
-    for file, start, _ in mentions:
+    mentions = {(mention.file, mention.start, mention.end) for symbol in symbols for mention in index.of(symbol)}
+    for file, start, _ in sorted(mentions):
         if start < 0:
             raise CannotRenameError(
                 f"'{symbols[0].name}' stands in a text of {shown_name(file)} that is folded or has escapes; change it "
                 "by hand"
             )
         if not index.files.is_own(file):
-            raise CannotRenameError(
-                f"'{symbols[0].name}' is used in {shown_name(file)}, which does not belong to this project"
-            )
+            used = f"'{symbols[0].name}' is used in {shown_name(file)}"
+            raise CannotRenameError(f"{used}, which does not belong to this project")
 
 
 def _where(index: SymbolIndex, symbols: list[Symbol]) -> str:
@@ -242,9 +238,8 @@ def _refuse_other(robot: Path, old: Compilation, new: Compilation) -> None:
     if was - now:
         code, severity = next(iter(was - now))
         what = "error" if severity is Severity.ERROR else "warning"
-        raise CannotRenameError(
-            f"the name is part of a mistake: correct the {what} {code} in {shown_name(robot)} first"
-        )
+        mistake = f"{what} {code} in {shown_name(robot)}"
+        raise CannotRenameError(f"the name is part of a mistake: correct the {mistake} first")
 
 
 def compiler(environment: Mapping[str, str], unsaved: Mapping[Path, str]) -> Compile:

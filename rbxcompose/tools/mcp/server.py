@@ -8,6 +8,7 @@ import time
 import traceback
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -19,24 +20,33 @@ from mcp.shared.exceptions import MCPError
 from pydantic import ValidationError
 
 import rbxcompose
-from rbxcompose.base.files import read_regular
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import read_regular, state_folder
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.printable import plain
 from rbxcompose.base.requests import Refused
 from rbxcompose.domains.console.access import Role
 from rbxcompose.manifest.files import library_root
 from rbxcompose.manifest.tree import FILE_BYTES
-from rbxcompose.tools.mcp.answer_size import limited
-from rbxcompose.tools.mcp.audit_log import AuditLog
-from rbxcompose.tools.mcp.lanes import Lane, Lanes
+from rbxcompose.runtime.log import LogFile
 from rbxcompose.tools.mcp.project_paths import ProjectPaths
-from rbxcompose.tools.mcp.tools import TOOLS, ToolContext, VerbTool
+from rbxcompose.tools.mcp.tools import TOOLS, Lane, Lanes, ToolContext, VerbTool
 
 CallContext = ServerRequestContext[Any]
 LANGUAGE = "rbxcompose://language"
 FINDING, MANIFEST = "rbxcompose://findings/", "rbxcompose://project/"
 _MARKDOWN, _YAML = "text/markdown", "application/yaml"
 _CLIENT = 60  # characters of its name
+MOST_CHARACTERS = 40_000  # of a whole answer, as JSON
+MOST_ITEMS = 200  # of a list
+MOST_TEXT = 20_000  # characters of one text
+_DEEPEST = 20
+CUT = "left_out"
+"""The key under which an answer says what it lacks."""
+LOG = "mcp.jsonl"
+TEXTS = "unsaved"  # the argument with whole texts
+_MOST = 30  # arguments, and entries of one
+_WORDS = 200  # characters of a text
 _ABOUT = (
     "Robots and missions of the project in the folder where this server was started. Nothing here writes a file: give "
     "changed texts as 'unsaved' to try them."
@@ -176,3 +186,103 @@ async def serve(role: Role, deadline: float, log: AuditLog) -> None:
     )
     async with stdio_server() as (there, back):
         await server.run(there, back, server.create_initialization_options())
+
+
+# Answers of a limited size, which say what was left out
+
+
+def limited(data: dict[str, Any], most: int = MOST_CHARACTERS) -> dict[str, Any]:
+    """Return an answer that has at most `most` characters as JSON: lists lose their ends, texts what is behind."""
+    items, text = MOST_ITEMS, MOST_TEXT
+    while True:
+        cut: list[str] = []
+        shown = _cut(data, "", items, text, cut, _DEEPEST)
+        shown = {**shown, CUT: cut[:MOST_ITEMS]} if cut else shown
+        if len(json.dumps(shown, ensure_ascii=False)) <= most:
+            return dict(shown)
+        if items == 1 and text == 1:
+            return {CUT: [f"the answer has more than {most:,} characters"]}
+        items, text = max(1, items // 2), max(1, text // 2)
+
+
+def _cut(value: Any, name: str, items: int, text: int, cut: list[str], depth: int) -> Any:
+    match value:
+        case str() if len(value) > text:
+            cut.append(f"{name}: {len(value) - text:,} of {len(value):,} characters")
+            return value[:text]
+        case dict() | list() if not depth:
+            cut.append(f"{name}: what is nested deeper")
+            return None
+        case dict():
+            if len(value) > items:
+                cut.append(f"{name}: {len(value) - items:,} of {len(value):,} entries")
+            some = list(value.items())[:items]
+            return {key: _cut(entry, f"{name}.{key}".lstrip("."), items, text, cut, depth - 1) for key, entry in some}
+        case list():
+            if len(value) > items:
+                cut.append(f"{name}: {len(value) - items:,} of {len(value):,} items")
+            some = value[:items]
+            return [_cut(item, f"{name}.{index}", items, text, cut, depth - 1) for index, item in enumerate(some)]
+    return value
+
+
+# The log of all that clients have called: one line of JSON for each call, in the state folder
+
+
+@dataclass(frozen=True, slots=True)
+class AuditedCall:
+    """A call: when it ended [s since the epoch], how long it took [s], who called what, and what came of it."""
+
+    time: float
+    took: float
+    client: str
+    project: str
+    tool: str
+    arguments: Mapping[str, Any]
+    result: str
+
+    def to_json(self) -> str:
+        """Return it as a line; texts of files are left out."""
+        when = datetime.fromtimestamp(self.time, UTC).isoformat(timespec="milliseconds")
+        fields = {
+            "time": when,
+            "client": plain(self.client),
+            "project": self.project,
+            "tool": plain(self.tool),
+            "arguments": {plain(key): _brief(key, value) for key, value in list(self.arguments.items())[:_MOST]},
+            "result": plain(self.result),
+            "took": round(self.took, 3),
+        }
+        return json.dumps(fields, ensure_ascii=False)
+
+
+class AuditLog:
+    """Writes calls; old ones go to other files, which are deleted in the end, as those of a robot's log are."""
+
+    def __init__(self) -> None:
+        """Open it.
+
+        Raises:
+            OSError: if it cannot be written.
+        """
+        self.path = audit_path()
+        self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        self._file = LogFile(self.path)
+
+    def write(self, client: str, tool: str, arguments: Mapping[str, Any], result: str, took: float) -> None:
+        """Add a call that has just ended."""
+        self._file.write(AuditedCall(time.time(), took, client, str(Path.cwd()), tool, arguments, result))
+
+
+def audit_path() -> Path:
+    """Return the file with the newest calls."""
+    return state_folder() / LOG
+
+
+def _brief(key: str, value: Any) -> Any:
+    """Return an argument shortened; of texts of files, how long they are."""
+    if key == TEXTS and isinstance(value, dict):
+        return {plain(str(path)): f"{len(str(text)):,} characters" for path, text in list(value.items())[:_MOST]}
+    if value is None or isinstance(value, bool | int | float):
+        return value
+    return plain(value if isinstance(value, str) else json.dumps(value, ensure_ascii=False), _WORDS)

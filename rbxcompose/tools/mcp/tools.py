@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import suppress
-from typing import Any, TypeVar
+from contextlib import asynccontextmanager, suppress
+from enum import Enum
+from typing import Annotated, Any, TypeVar
+
+from pydantic import Field
 
 from rbxcompose.base.config import Config
 from rbxcompose.base.dataclass import dataclass
@@ -18,21 +21,154 @@ from rbxcompose.commands.lookup import answer_of, find_robot
 from rbxcompose.domains.console.access import Role
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.requests import NoteInLog
-from rbxcompose.tools.mcp.lanes import Lane
 from rbxcompose.tools.mcp.project_paths import ProjectPaths, words_of_finding
-from rbxcompose.tools.mcp.tool_arguments import (
-    CheckArguments,
-    DryRunArguments,
-    ExplainArguments,
-    MissionArguments,
-    RobotArguments,
-    RunArguments,
-    StoryArguments,
-    TrialArguments,
-    UpArguments,
-    WhyArguments,
-)
-from rbxcompose.tools.mcp.verb_process import run_verb
+from rbxcompose.tools.mcp.verb_process import VerbOutput, run_verb
+
+MOST_WAITING = 16  # in each lane
+_WORD = r"^[A-Za-z0-9_$][^\s/\\]*$"  # never an option, and never a path
+PlainWord = Annotated[str, Field(pattern=_WORD, max_length=200)]
+PlainWordOrNone = Annotated[str, Field(pattern=rf"^$|{_WORD}", max_length=200)]
+ProjectPath = Annotated[str, Field(min_length=1, max_length=1000)]
+
+
+class Lane(Enum):
+    """Calls of one lane wait for each other, and never for those of another; the value is how many go at once."""
+
+    COMPILE = "2 that compile"
+    LOOK = "4 that look at a robot"
+    OPERATE = "4 that operate one"
+    STOP = "4 that stop one"
+
+    @property
+    def at_once(self) -> int:
+        """Return how many calls are carried out at once."""
+        return int(self.value.split()[0])
+
+
+class Lanes:
+    """Lets calls go on when it is their turn."""
+
+    def __init__(self, deadline: float) -> None:
+        self._deadline = deadline
+        self._turns = {lane: asyncio.Semaphore(lane.at_once) for lane in Lane}
+        self._waiting = dict.fromkeys(Lane, 0)
+
+    @asynccontextmanager
+    async def turn(self, lane: Lane) -> AsyncIterator[None]:
+        """Wait for a turn, and end it after the deadline.
+
+        Raises:
+            Refused: if too many wait already, or it takes too long.
+        """
+        if self._waiting[lane] >= MOST_WAITING:
+            raise Refused("too many calls are waiting: try again")
+        self._waiting[lane] += 1
+        try:
+            await self._turns[lane].acquire()
+        finally:
+            self._waiting[lane] -= 1
+        try:
+            async with asyncio.timeout(self._deadline):
+                yield
+        except TimeoutError as error:
+            raise Refused(f"it took more than {self._deadline:g} s, and was ended") from error
+        finally:
+            self._turns[lane].release()
+
+
+# Arguments, whose texts are what clients show
+
+
+class WithTexts(Config):
+    """Arguments of a tool that reads files."""
+
+    unsaved: dict[str, str] = {}
+    """Texts to use in place of those of files of the project, by path: a change is tried, and no file is written."""
+
+
+class CheckArguments(WithTexts):
+    """Arguments of `check`."""
+
+    paths: Annotated[list[ProjectPath], Field(max_length=100)] = ["."]
+    """Robots, missions, parts, tests or systems, or folders of them; without any, all robots of the project."""
+    profiles: Annotated[list[PlainWord], Field(max_length=20)] = []
+    """Profiles to apply."""
+
+
+class ExplainArguments(Config):
+    """Arguments of `explain`."""
+
+    code: PlainWord
+    """Such as RBX1001."""
+
+
+class RobotArguments(WithTexts):
+    """Arguments of a tool about a robot of the project."""
+
+    robot: Annotated[str, Field(max_length=1000)] = ""
+    """The robot's file or folder, or rbx:robots/NAME of the library; without it, the only one of the project."""
+    profiles: Annotated[list[PlainWord], Field(max_length=20)] = []
+    """Profiles to apply."""
+
+
+class WhyArguments(RobotArguments):
+    """Arguments of `why`."""
+
+    value: PlainWord
+    """The path of a value, such as battery.runtime, or of a port, such as go_to.cmd_vel."""
+
+
+class TrialArguments(WithTexts):
+    """Arguments of `test`."""
+
+    paths: Annotated[list[ProjectPath], Field(max_length=100)] = ["missions"]
+    """Tests, or folders of tests."""
+    filter: Annotated[str, Field(max_length=200)] = ""
+    """Only those with this text in their names."""
+
+
+class DryRunArguments(WithTexts):
+    """Arguments of `dry_run`."""
+
+    mission: PlainWord
+    """The name that the robot gives it."""
+    robot: Annotated[str, Field(max_length=1000)] = ""
+    """The robot's file or folder, or rbx:robots/NAME of the library; without it, the only one of the project."""
+
+
+class UpArguments(Config):
+    """Arguments of a tool about a robot that runs."""
+
+    robot: PlainWordOrNone = ""
+    """The name of a robot that is up; without it, the only one."""
+
+
+class StoryArguments(UpArguments):
+    """Arguments of `story`."""
+
+    mission: PlainWordOrNone = ""
+    """Only what this one did."""
+    lines: Annotated[int, Field(ge=1, le=200)] = 100
+    """How many of the newest lines."""
+
+
+class MissionArguments(UpArguments):
+    """Arguments of a tool about a mission that runs."""
+
+    mission: PlainWordOrNone = ""
+    """Which one; without it, the only one that runs."""
+
+
+class RunArguments(UpArguments):
+    """Arguments of `mission_run`."""
+
+    mission: PlainWord
+    """Which one."""
+    inputs: dict[Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*$")], str] = {}
+    """Its inputs as text, such as {"rounds": "2"}."""
+    start: PlainWordOrNone = ""
+    """Start in this state: 'outer.inner'."""
+
 
 ToolAnswer = dict[str, Any]
 P = TypeVar("P")
@@ -51,6 +187,10 @@ class ToolContext:
     async def on_disk(self, find: Callable[[P], T], given: P) -> T:
         """Return what is found in the project, which may be large; nothing else waits for that."""
         return await asyncio.get_running_loop().run_in_executor(self.threads, find, given)
+
+    async def verb(self, *words: str, given: WithTexts) -> VerbOutput:
+        """Run a verb in the project, with the texts that are given in place of those of files."""
+        return await run_verb(*words, folder=self.paths.root, unsaved=self.paths.texts(given.unsaved))
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +211,7 @@ class VerbTool:
 
 async def _check(context: ToolContext, given: CheckArguments) -> ToolAnswer:
     paths = await context.on_disk(context.paths.checked, given.paths)
-    texts = context.paths.texts(given.unsaved)
-    words = ("check", "--format", "json", *_profiles(given.profiles), *paths)
-    done = await run_verb(*words, folder=context.paths.root, unsaved=texts)
+    done = await context.verb("check", "--format", "json", *_profiles(given.profiles), *paths, given=given)
     findings = done.data(0, 1)
     count = {severity: sum(finding["severity"] == severity for finding in findings) for severity in Severity}
     return {
@@ -91,16 +229,13 @@ async def _explain(context: ToolContext, given: ExplainArguments) -> ToolAnswer:
 
 async def _why(context: ToolContext, given: WhyArguments) -> ToolAnswer:
     robot = await context.on_disk(context.paths.robot, given.robot)
-    texts = context.paths.texts(given.unsaved)
-    words = ("why", given.value, robot, "--json", *_profiles(given.profiles))
-    return dict((await run_verb(*words, folder=context.paths.root, unsaved=texts)).data(0))
+    done = await context.verb("why", given.value, robot, "--json", *_profiles(given.profiles), given=given)
+    return dict(done.data(0))
 
 
 async def _plan(context: ToolContext, given: RobotArguments) -> ToolAnswer:
     robot = await context.on_disk(context.paths.robot, given.robot)
-    texts = context.paths.texts(given.unsaved)
-    words = ("plan", robot, *_profiles(given.profiles))
-    done = await run_verb(*words, folder=context.paths.root, unsaved=texts)
+    done = await context.verb("plan", robot, *_profiles(given.profiles), given=given)
     if done.code:
         raise Refused(done.trouble)
     return {"plan": done.out.rstrip("\n")}
@@ -108,9 +243,7 @@ async def _plan(context: ToolContext, given: RobotArguments) -> ToolAnswer:
 
 async def _test(context: ToolContext, given: TrialArguments) -> ToolAnswer:
     paths = await context.on_disk(context.paths.tests, given.paths)
-    texts = context.paths.texts(given.unsaved)
-    words = ("test", "--json", f"--filter={given.filter}", *paths)
-    done = await run_verb(*words, folder=context.paths.root, unsaved=texts)
+    done = await context.verb("test", "--json", f"--filter={given.filter}", *paths, given=given)
     tests = done.data(0, 1)["tests"]
     for test in tests:
         if test["passed"]:
@@ -121,9 +254,7 @@ async def _test(context: ToolContext, given: TrialArguments) -> ToolAnswer:
 
 async def _dry_run(context: ToolContext, given: DryRunArguments) -> ToolAnswer:
     robot = await context.on_disk(context.paths.robot, given.robot)
-    texts = context.paths.texts(given.unsaved)
-    words = ("mission", "try", given.mission, robot, "--json")
-    tried = (await run_verb(*words, folder=context.paths.root, unsaved=texts)).data(0)
+    tried = (await context.verb("mission", "try", given.mission, robot, "--json", given=given)).data(0)
     return {key: tried[key] for key in ("outcome", "why", "time", "left_out", "story")}
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from rbxcompose.base.expressions.values import is_named_pose
-from rbxcompose.base.findings import Severity, Span
+from rbxcompose.base.findings import Severity
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Refused
 from rbxcompose.commands.new_files import write_new
@@ -45,6 +45,7 @@ MOST_CHANGES = 4000  # of statuses that are told
 SAMPLER = "dry run"
 MOST_STEPS = 20  # of a test
 TESTS = "missions/tests"
+_OF_PLACE = ("name", "x", "y", "heading", "colour")
 TARGET_FRAME, ROBOT_FRAME = "map", "base_footprint"
 
 
@@ -100,14 +101,11 @@ def tried(made: Compilation, mission: str) -> tuple[TrialRecord, _Watching, Prog
         raise Refused(f"'{started[0]}' would start a program: try it with 'rbxcompose test'")
     program, names = robot.missions[mission].program, robot.names
     linked, seen = link(program, names.missions), _Watching()
-    where = Span(program.file, 1, 1, 1, 1)
     inputs, missing = bind_texts(program, {}, robot.missions[mission].inputs, names.places)
     if missing:
         raise Refused(f"it cannot run yet: {missing[0].message}; a 'default' would do")
-    trial = Trial(
-        "dry run", "", program.file, where, mission, program, linked, robot, plan, inputs, {}, (),
-        Expectations(until=LONGEST), is_complete=False,
-    )  # fmt: skip
+    expect = Expectations(until=LONGEST)
+    trial = Trial("dry run", mission, program, linked, robot, plan, inputs, {}, (), expect, is_complete=False)
     run = RobotRun(trial, seen)
     run.record.name_by(lambda number: run.executive.missions.runs[mission].heading(number))
     seen.follow(run)
@@ -140,10 +138,7 @@ def dry_run(made: Compilation, mission: str, path: Path, text: str) -> dict[str,
         ],
         "changes": [{"time": time, "path": list(path), "status": status} for time, path, status in changes],
         "track": [[round(value, 3) for value in at] for at in seen.track],
-        "places": [
-            {"name": place.name, "x": place.x, "y": place.y, "heading": place.heading, "colour": place.colour}
-            for place in names.places.values()
-        ],
+        "places": [{key: getattr(place, key) for key in _OF_PLACE} for place in names.places.values()],
     }
 
 

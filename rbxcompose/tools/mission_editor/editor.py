@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from rbxcompose.base.findings import Finding, Severity, Span
-from rbxcompose.base.fixes import places
+from rbxcompose.base.fixes import EditPlace, places
 from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.base.requests import Refused
 from rbxcompose.compiler.compile import Compilation, look_at_mission, with_text_of_mission
@@ -25,9 +25,8 @@ from rbxcompose.missions.view.picture import Drawn, picture_of
 from rbxcompose.tools.mission_editor.form import form, palette
 from rbxcompose.tools.mission_editor.new_mission import make_mission, templates
 from rbxcompose.tools.mission_editor.outline import INTERRUPTS, Block, MissionOutline, told
-from rbxcompose.tools.mission_editor.patch import path_of
-from rbxcompose.tools.mission_editor.patches import change
-from rbxcompose.tools.mission_editor.yaml_places import Utf16
+from rbxcompose.tools.mission_editor.patches import change, path_of
+from rbxcompose.tools.mission_editor.yaml_places import TextEdit, Utf16
 from rbxcompose.tools.project_texts import ProjectTexts, ReadText, hash_of, words_of
 
 MOST_FINDINGS = 200
@@ -75,8 +74,7 @@ class MissionEditor:
         text, units = request["text"], Utf16(request["text"])
         with paused_collection():
             made = change(text, request["operation"])
-        edits = [{"from": units.at(one.start), "to": units.at(one.end), "text": one.text} for one in made.edits]
-        return {"edits": edits, "chosen": list(made.chosen)}
+        return {"edits": _edits_as_data(made.edits, units), "chosen": list(made.chosen)}
 
     def _palette(self, request: Mapping[str, Any]) -> list[dict[str, str]]:
         """Return what can be put into a mission of this robot."""
@@ -193,12 +191,8 @@ class MissionEditor:
         findings = [self._finding(one, units) for one in own[:MOST_FINDINGS]]
         for data, one in zip(findings, own, strict=False):
             if one.fix is not None and (edits := applied[id(one.fix)]):
-                moved = [
-                    {"from": units.at(edit.start), "to": units.at(edit.end), "text": edit.text}
-                    for edit in edits
-                    if not edit.is_guard
-                ]
-                data["fix"] = {"title": one.fix.title, "edits": moved}
+                moved = [edit for edit in edits if not edit.is_guard]
+                data["fix"] = {"title": one.fix.title, "edits": _edits_as_data(moved, units)}
         errors = sum(one.severity is Severity.ERROR for one in own)
         elsewhere = [{**words_of(one), "place": str(one.span or "")} for one in others[:MOST_FINDINGS]]
         return {"findings": findings, "errors": errors, "count": len(own), "elsewhere": elsewhere}
@@ -207,6 +201,10 @@ class MissionEditor:
         span = finding.span or Span("", 1, 1, 1, 1)
         start, end = units.offset(span.line, span.column), units.offset(span.end_line, span.end_column)
         return {**words_of(finding), "from": start, "to": max(start, end), "line": span.line, "fix": None}
+
+
+def _edits_as_data(edits: Iterable[TextEdit | EditPlace], units: Utf16) -> list[dict[str, Any]]:
+    return [{"from": units.at(edit.start), "to": units.at(edit.end), "text": edit.text} for edit in edits]
 
 
 REQUESTS: Mapping[str, Callable[[MissionEditor, Mapping[str, Any]], Any]] = MappingProxyType(

@@ -25,13 +25,11 @@ from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions.language.fields import first_line
 from rbxcompose.missions.program.registry import anywhere, kinds
 from rbxcompose.tools.lsp.answers import variables
-from rbxcompose.tools.lsp.document import Cursor, Document, Spot, quick_tree
-from rbxcompose.tools.lsp.names import SKILL, KnownNames
+from rbxcompose.tools.lsp.document import SKILL, Cursor, Document, KnownNames, Spot, quick_tree
 from rbxcompose.tools.lsp.project import MISSION
 from rbxcompose.tools.mission_editor.outline import INTERRUPT, STATE, MissionOutline, kind_of, slots_of
-from rbxcompose.tools.mission_editor.patches import change
-from rbxcompose.tools.mission_editor.values import LINE, LINES, shape_of, shown_value
-from rbxcompose.tools.mission_editor.yaml_places import Path, PlacedNode, TextLines, placed
+from rbxcompose.tools.mission_editor.patches import FIXED, LINE, LINES, TEXT, change, shifted
+from rbxcompose.tools.mission_editor.yaml_places import BLOCK_MARK, Path, PlacedNode, TextLines, placed
 
 _VALUES = frozenset(("string", "number", "integer", "boolean", "null"))
 _HAS_PARTS = (TypeKind.LIST, TypeKind.MAP)
@@ -62,8 +60,8 @@ def form(robot: Robot, file: FilePath, text: str, path: Path) -> dict[str, Any]:
     if not isinstance(root, MappingNode):
         raise Refused("the text cannot be read")
     guide, known = guide_of(robot, file, root)
-    drawn = _FormDrawing(Document(file, text, robot), root, guide, known, outline.lines)
-    fields = list(drawn.fields(path, node, kind))
+    drawn = _FormDrawing(Document(file, text, robot), root, guide, known, outline.lines, path, kind)
+    fields = list(drawn.fields(node))
     fields.sort(key=lambda one: (not one["is_word"], not one["within"], not one["value"], one["shape"] != LINE))
     name = str(path[-1]) if any(slot.path == path[:-1] and slot.has_names for slot in outline.all_slots()) else ""
     about = guide.describe((*path, kind)) if kind else ""
@@ -72,69 +70,62 @@ def form(robot: Robot, file: FilePath, text: str, path: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class _FormDrawing:
-    """What the fields of a form are drawn from; `lines` are of the text as it is."""
+    """What the fields of a block's form are drawn from; `lines` are of the text as it is, `kind` is its word."""
 
     document: Document
     root: MappingNode
     guide: Guide
     known: KnownNames
     lines: TextLines
+    path: Path
+    kind: str
 
-    def fields(self, path: Path, node: PlacedNode, kind: str) -> Iterator[dict[str, Any]]:
-        """Yield the fields of a block, and those of the map behind its word."""
-        inside = {slot.path[len(path)] for slot in slots_of(node, path) if len(slot.path) > len(path)} | {
-            "do",
-            "machine",
-        }
-        keys = self.guide.keys(path)
+    def fields(self, node: PlacedNode) -> Iterator[dict[str, Any]]:
+        """Yield the fields of the block, and those of the map behind its word."""
+        path, kind = self.path, self.kind
+        inside = {slot.path[len(path)] for slot in slots_of(node, path) if len(slot.path) > len(path)}
+        inside |= {"do", "machine"}
+        keys, main = self.guide.keys(path), self._main()
         own = {kind, *anywhere()} if kind and kind not in kinds() else keys  # a skill is one key of a step
         for key, schema in keys.items():
             if key not in own or key in inside:
                 continue
             there = node.get(key) if node.form == "map" else None
-            parts = list(self._parts(path, key, there)) if key == kind else []
+            parts = list(self._parts(there)) if key == kind else []
             yield from parts
-            if not parts or (self._main(kind) is not None and (there is None or there.form != "map")):
-                yield self._field(path, (), key, schema, there, self._main(kind) if key == kind else None, kind)
+            if not parts or (main is not None and (there is None or there.form != "map")):
+                yield self._field((*path, key), schema, there, main if key == kind else None)
 
-    def _parts(self, path: Path, kind: str, there: PlacedNode | None) -> Iterator[dict[str, Any]]:
+    def _parts(self, there: PlacedNode | None) -> Iterator[dict[str, Any]]:
         """Yield the entries that the map behind a word can have, if a map is there, or nothing."""
         if there is not None and there.form != "map" and (there.form != "scalar" or there.text):
             return
-        skill = self.known.skills.get(kind)
-        for key, schema in self.guide.keys((*path, kind)).items():
+        skill, word = self.known.skills.get(self.kind), (*self.path, self.kind)
+        for key, schema in self.guide.keys(word).items():
             of = skill.arguments.get(key, _UNKNOWN) if skill is not None else None
             written = there.get(key) if there is not None and there.form == "map" else None
-            yield self._field(path, (kind,), key, schema, written, of, kind)
+            yield self._field((*word, key), schema, written, of)
 
-    def _main(self, kind: str) -> Type | None:
+    def _main(self) -> Type | None:
         """Return the type of the main argument of a skill."""
-        skill = self.known.skills.get(kind)
+        skill = self.known.skills.get(self.kind)
         return skill.arguments.get(skill.main) if skill is not None and skill.main else None
 
     def _field(
-        self,
-        path: Path,
-        within: Path,
-        key: str,
-        schema: Mapping[str, Any],
-        there: PlacedNode | None,
-        of: Type | None,
-        kind: str,
+        self, where: Path, schema: Mapping[str, Any], there: PlacedNode | None, of: Type | None
     ) -> dict[str, Any]:
         shape = shape_of(self.lines, there)
         is_empty = there is None or (there.form == "scalar" and not there.text)
         if is_empty and ((of is not None and of.kind in _HAS_PARTS) or not _takes_value(schema)):
             shape = LINES
-        where = (*path, *within, key)
         spot = Spot(self.document, Cursor(self.root, where, "", "", False), self.known, self.guide)
         return {
-            "key": key,
-            "within": list(within),
+            "key": where[-1],
+            "within": list(where[len(self.path) : -1]),
             "about": str(schema.get("description", "")),
             "value": "" if there is None else shown_value(self.lines, there),
             "shape": shape,
-            "is_word": key == kind and not within,
+            "is_word": where == (*self.path, self.kind),
             **(_choices(self.guide.value(where), spot, schema, of) if shape == LINE else _NO_CHOICES),
         }
 
@@ -161,6 +152,31 @@ def _choices(value: GuidedValue, spot: Spot, schema: Mapping[str, Any], of: Type
         "units": list(units_of(dimension)) if dimension else [],
         "default": default,
     }
+
+
+def shape_of(lines: TextLines, node: PlacedNode | None) -> str:
+    """Return how a value can be edited; None is one that is not there."""
+    if node is None:
+        return LINE
+    raw = lines.text[node.start : node.end]
+    if node.form == "alias" or (node.mark[:2] != BLOCK_MARK and "\n" in raw):
+        return FIXED
+    if node.form == "scalar":
+        return TEXT if "\n" in raw else LINE
+    if node.is_flow and "\n" not in raw:
+        return LINE
+    return LINES if node.is_flow or lines.begins(node.start) else FIXED
+
+
+def shown_value(lines: TextLines, node: PlacedNode) -> str:
+    """Return a value as a form shows it: what is in lines of its own with its comments, as if it stood alone."""
+    if node.form == "scalar":
+        return node.text
+    if node.is_flow or not lines.begins(node.start):
+        return lines.text[node.start : node.end]
+    column = lines.column(node.start)
+    first, last = lines.region(node.start, node.end, column)
+    return shifted(lines.lines[first:last], -column)
 
 
 def _takes_value(schema: Mapping[str, Any]) -> bool:

@@ -109,14 +109,8 @@ def slots_of(step: PlacedNode, path: Path) -> list[Slot]:
 def _slot_in(step: PlacedNode, path: Path, of: Field) -> Slot:
     there, holds, part = step.get(of.key), _INSIDE[of.takes], _PARTS.get(of.takes, of.key)
     has_names = holds == NAMED or (holds == SEVERAL and there is not None and there.form == "map")
-    return Slot(
-        (*path, of.key),
-        holds,
-        part=part,
-        is_there=there is not None,
-        has_names=has_names,
-        is_optional=not of.is_required,
-    )
+    where, is_there, is_optional = (*path, of.key), there is not None, not of.is_required
+    return Slot(where, holds, part=part, is_there=is_there, has_names=has_names, is_optional=is_optional)
 
 
 def _states_in(node: PlacedNode, path: Path) -> Slot:
@@ -203,9 +197,9 @@ class MissionOutline:
             self.slots.append(_states_in(root, ()))
             yield from self._states(root, ())
 
-    def _steps(self, node: PlacedNode, path: Path) -> Iterator[Block]:
+    def _steps(self, node: PlacedNode, path: Path, role: str = "") -> Iterator[Block]:
         for index, item in enumerate(node.items):
-            yield self._step(item, (*path, index), "", is_entry=True)
+            yield self._step(item, (*path, index), role, is_entry=True)
 
     def _step(self, node: PlacedNode, path: Path, role: str, *, is_entry: bool = False) -> Block:
         kind = kind_of(node)
@@ -234,20 +228,14 @@ class MissionOutline:
             if below is None:
                 continue
             role = "" if key in ("do", kind) else key
-            if below.form == "list" and below is not node and slot.holds == ONE:
-                yield from self._roled(self._steps(below, slot.path), role)
-            elif below.form == "list":
-                yield from self._steps(below, slot.path)
+            if below.form == "list":
+                is_role = below is not node and slot.holds == ONE
+                yield from self._steps(below, slot.path, role if is_role else "")
             elif below.form == "map" and slot.holds != ONE:
                 for name, value in below.pairs:
                     yield self._step(value, (*slot.path, name.text), name.text, is_entry=True)
             elif slot.holds == ONE:
                 yield self._step(below, slot.path, role)
-
-    def _roled(self, blocks: Iterator[Block], role: str) -> Iterator[Block]:
-        for block in blocks:
-            block.role = role
-            yield block
 
     def _states(self, node: PlacedNode, path: Path) -> Iterator[Block]:
         machine = node.get(MACHINE)

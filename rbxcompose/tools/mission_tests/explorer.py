@@ -10,7 +10,7 @@ from typing import Any
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions import tree as syntax
 from rbxcompose.base.expressions.types import TypeKind
-from rbxcompose.base.expressions.values import NOT_ARRIVED, NotArrived, Value
+from rbxcompose.base.expressions.values import NOT_ARRIVED, NotArrived, Value, is_number
 from rbxcompose.missions.analysis.facts import constants_of, number_in
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent, Reported, SkillStarted
@@ -46,9 +46,6 @@ def representatives(linked: Program, robot: RobotNames, inputs: Mapping[str, Val
 
 def _values(robot: RobotNames, name: str, compared: set[Value]) -> tuple[Value, ...]:
     kind = robot.values[name]
-    numbers = sorted(
-        float(value) for value in compared if isinstance(value, int | float) and not isinstance(value, bool)
-    )
     if kind.kind is TypeKind.FLAG:
         return (True, False)
     if kind.choices:
@@ -56,6 +53,7 @@ def _values(robot: RobotNames, name: str, compared: set[Value]) -> tuple[Value, 
     words = tuple(sorted(value for value in compared if isinstance(value, str)))
     if words or kind.kind is TypeKind.TEXT:
         return (*words, OTHER)
+    numbers = sorted(float(value) for value in compared if is_number(value))
     return _around(numbers) if numbers else (0.0,)
 
 
@@ -159,7 +157,7 @@ class Explorer:
         self.limits = limits
         self.robot = robot
         self.out = Explored(program.name)
-        self.world = ExploredWorld(program.name, robot)
+        self.world = ExploredWorld()
         self.engine = Engine(program, robot, inputs, self.world)
         self.values = representatives(self.engine.program, robot, inputs)
         self.skills = {node.number: node.skill for node in self.engine.program.nodes}
@@ -247,8 +245,7 @@ class Explorer:
                 self.out.ends.setdefault(self.world.end.outcome or self.world.end.result, script)
             return
         world = self.world
-        held = dict(world.held)
-        moment = Moment(save(self.engine), world.now, dict(world.values), dict(world.calls), held, script)
+        moment = Moment(save(self.engine), world.now, dict(world.values), dict(world.calls), dict(world.held), script)
         waits_for = self.engine.reads() & self.values.keys()
         if not moment.calls and self.engine.next_wake() is None and not waits_for:
             self.record(WAITS_FOR_EVER, script)
@@ -272,7 +269,7 @@ class Explorer:
 class ExploredWorld:
     """A world in which nothing happens by itself."""
 
-    def __init__(self, mission: str, robot: RobotNames) -> None:
+    def __init__(self) -> None:
         self.now = 0.0
         self.values: dict[str, Value] = {}
         self.counts: dict[str, int] = {}
@@ -351,16 +348,8 @@ def fingerprint(moment: Moment, tasks: Sequence[Task]) -> str:
         _state(task, state, moment.now, saved["statuses"][task.number] == RUNNING)
         for task, state in zip(tasks, saved["tasks"], strict=True)
     ]
-    kept = (
-        saved["statuses"],
-        engine,
-        states,
-        saved["runs"],
-        saved["kept"],
-        values,
-        sorted(moment.calls.items()),
-        sorted(moment.held),
-    )
+    calls = sorted(moment.calls.items()), sorted(moment.held)
+    kept = (saved["statuses"], engine, states, saved["runs"], saved["kept"], values, *calls)
     return json.dumps(kept, sort_keys=True)
 
 

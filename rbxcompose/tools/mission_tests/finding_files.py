@@ -26,8 +26,9 @@ def tests_of(paths: Iterable[Path]) -> list[Path]:
 
 def _may_be_test(path: Path) -> bool:
     """Return whether a file is a test, or is called one; hidden ones are left out: editors keep theirs there."""
+    is_one = path.suffix in _SUFFIXES and path.is_file() and kind_of(path) == TEST
     is_called_one = path.name.endswith(_TESTS) and not path.name.startswith(".")
-    return is_test(path) or (is_called_one and (path.is_file() or _is_odd(path)))
+    return is_one or (is_called_one and (path.is_file() or _is_odd(path)))
 
 
 def _is_odd(path: Path) -> bool:
@@ -37,8 +38,3 @@ def _is_odd(path: Path) -> bool:
     except OSError:  # such as a link to itself
         return path.is_symlink()
     return not ((stat.S_ISREG(mode) and os.access(path, os.R_OK)) or stat.S_ISDIR(mode))
-
-
-def is_test(path: Path) -> bool:
-    """Return whether a file says that it is a test."""
-    return path.suffix in _SUFFIXES and path.is_file() and kind_of(path) == TEST

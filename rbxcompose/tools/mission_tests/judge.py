@@ -94,18 +94,12 @@ def _ending(expect: Expectations, record: TrialRecord) -> Iterator[UnmetExpectat
     counts_as = record.end.result if record.end else RUNS
     if expect.outcome and expect.outcome not in (happened, counts_as):
         why = f": {record.end.message}" if record.end and record.end.message else ""
-        yield UnmetExpectation(
-            f"expected outcome {expect.outcome}, the mission {_how(happened)}{why}", expect.outcome_span, last
-        )
+        how = "is still running" if happened == RUNS else f"ended with {happened}"
+        yield UnmetExpectation(f"expected outcome {expect.outcome}, the mission {how}{why}", expect.outcome_span, last)
     if record.late:
         events = "an event" if record.late == 1 else f"{record.late} events"
-        yield UnmetExpectation(
-            f"the mission ended at {at(record.now)}, before {events} of the test", expect.outcome_span, last
-        )
-
-
-def _how(outcome: str) -> str:
-    return "is still running" if outcome == RUNS else f"ended with {outcome}"
+        words = f"the mission ended at {at(record.now)}, before {events} of the test"
+        yield UnmetExpectation(words, expect.outcome_span, last)
 
 
 def _steps(expected: Sequence[ExpectedStep], record: TrialRecord, effort: _Effort) -> Iterator[UnmetExpectation]:
@@ -158,9 +152,7 @@ def _nearest(step: ExpectedStep, later: Iterable[tuple[int, Done]], before: Iter
     near, differences = min(pairs, key=lambda pair: ("" in pair[1], len(pair[1])), default=(None, []))
     if near and not (earlier and "" in differences):
         others = [difference for difference in differences if difference and not difference.startswith("started")]
-        return f"the nearest is {near.text} at {at(near.began)}" + "".join(
-            f", which {difference}" for difference in others
-        )
+        return "".join([f"the nearest is {near.text} at {at(near.began)}", *(f", which {other}" for other in others)])
     if earlier:
         return f"it was done only earlier, at {at(earlier.began)}"
     return f"it did not start after {last.text}" if last else "it never started"
@@ -176,31 +168,24 @@ def _never(never: Sequence[ExpectedStep], record: TrialRecord, effort: _Effort) 
     for step in never:
         done = next((one for _, one in effort.of(steps.after(step.name, 0)) if is_it(step, one)), None)
         if done:
-            yield UnmetExpectation(
-                f"{_written(step)} must never be done, but was at {at(done.began)}", step.span, done.line
-            )
+            words = f"{_written(step)} must never be done, but was at {at(done.began)}"
+            yield UnmetExpectation(words, step.span, done.line)
 
 
 def _counts(expect: Expectations, record: TrialRecord) -> Iterator[UnmetExpectation]:
     counts = Counter(step.name for step in record.steps)
     for one in expect.count:
         if counts[one.name] != one.value:
-            yield UnmetExpectation(f"expected {_times(one.name, one.value)}, counted {counts[one.name]}", one.span)
-
-
-def _times(name: str, count: object) -> str:
-    return f"{name} {'once' if count == 1 else f'{count} times'}"
+            times = "once" if one.value == 1 else f"{one.value} times"
+            yield UnmetExpectation(f"expected {one.name} {times}, counted {counts[one.name]}", one.span)
 
 
 def _data(expect: Expectations, record: TrialRecord, types: Mapping[str, Type]) -> Iterator[UnmetExpectation]:
-    for expected_value in expect.data:
-        happened, kind = record.data.get(expected_value.name, NOT_ARRIVED), types.get(expected_value.name)
-        if not agrees(expected_value.value, happened):
+    for datum in expect.data:
+        happened, kind = record.data.get(datum.name, NOT_ARRIVED), types.get(datum.name)
+        if not agrees(datum.value, happened):
             actual = "it has no value" if happened is NOT_ARRIVED else f"it is {show(kind, happened)}"
-            yield UnmetExpectation(
-                f"expected {expected_value.name} to be {show(kind, expected_value.value)}, {actual}",
-                expected_value.span,
-            )
+            yield UnmetExpectation(f"expected {datum.name} to be {show(kind, datum.value)}, {actual}", datum.span)
 
 
 def _published(expect: Expectations, record: TrialRecord, effort: _Effort) -> Iterator[UnmetExpectation]:

@@ -131,9 +131,6 @@ class Trial:
     """
 
     name: str
-    about: str
-    file: str  # as shown in findings
-    span: Span
     mission: str
     program: Program
     linked: Program

@@ -28,12 +28,14 @@ from rbxcompose.manifest.tree import (
     Entry,
     KeyPath,
     MappingNode,
+    NodePlaces,
     ScalarNode,
     SequenceNode,
     TreeNode,
     at,
     entries_of,
     key_span,
+    text_at,
     value_span,
 )
 from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of, to_plain, validate
@@ -160,10 +162,11 @@ def _turned_round(expect: Expectations) -> Iterator[Finding]:
         if step.at is None:
             continue
         if latest is not None and latest.at is not None and step.at < latest.at - 2 * ON_TIME:
-            related = [Related(latest.span, "this one is later")]
-            yield codes.NEVER.at(
-                step.span, "steps are listed as they begin, and this is earlier", help="exchange them", related=related
+            message, related = (
+                "steps are listed as they begin, and this is earlier",
+                [Related(latest.span, "this one is later")],
             )
+            yield codes.NEVER.at(step.span, message, help="exchange them", related=related)
         else:
             latest = step
 
@@ -178,9 +181,8 @@ def _bars(never: ExpectedStep, step: ExpectedStep) -> bool:
         return False
     if never.ended and (not step.ended or never.ended not in (step.ended, never.counts_as.get(step.ended))):
         return False
-    return all(
-        name in step.arguments and agrees(value, step.arguments[name]) for name, value in never.arguments.items()
-    )
+    arguments = step.arguments
+    return all(name in arguments and agrees(value, arguments[name]) for name, value in never.arguments.items())
 
 
 def read_mocks(context: TrialContext, node: TreeNode | None, models: Mapping[str, trials.MockModel]) -> dict[str, Mock]:
@@ -316,7 +318,7 @@ def _ended(context: TrialContext, name: str, entries: Mapping[str, Entry]) -> st
     node = entries["ended"].value if "ended" in entries else None
     if node is None:
         return ""
-    word = node.text if isinstance(node, ScalarNode) else ""
+    word = text_at(node)
     known = {**ENDS, RUNS: RUNS, **context.facts.steps[name]}
     message = f"'{name}' does not end with '{word}'" if word else "'ended' needs a word"
     context.knows(node.span, word, known, message, "how it may end")
@@ -434,7 +436,7 @@ def _published_by_event(context: TrialContext, node: TreeNode, sent: trials.Sent
     data = {} if written is None else to_plain(written)
     if not isinstance(data, dict):
         data = {next(iter(cls.FIELDS)): data}
-    made, findings = from_plain(cls, data, MessagePlaces(node, place))
+    made, findings = from_plain(cls, data, NodePlaces(node, place))
     context.report.extend(findings)
     return EventDeed(PUBLISH, topic=topic, message=made) if made is not None else None
 
@@ -444,22 +446,6 @@ def _topics(context: TrialContext) -> dict[str, str]:
     namespace = context.robot.manifest.bus.namespace or ""
     own = {resolve(name, namespace): message for name, message in context.names.topics.items()}
     return {**own, **{source.topic: source.message for source in context.robot.values.values()}}
-
-
-@dataclass(frozen=True, slots=True)
-class MessagePlaces:
-    """The places of the parts of a message."""
-
-    node: TreeNode
-    below: KeyPath
-
-    def key(self, path: KeyPath) -> Span:
-        """Return the place of a field's name."""
-        return key_span(self.node, (*self.below, *path))
-
-    def value(self, path: KeyPath) -> Span:
-        """Return the place of a field's value."""
-        return value_span(self.node, (*self.below, *path))
 
 
 @dataclass(frozen=True, slots=True)
@@ -516,8 +502,7 @@ class TrialReader:
         sources = Texts(self.unsaved)
         root = Documents(report, sources).read(path, TEST)
         self.sources.update(sources)
-        name = root.get("name") if root else None
-        return WrittenTrial(path, name.text if isinstance(name, ScalarNode) and name.text else path.name, root, report)
+        return WrittenTrial(path, text_at(root, ("name",)) or path.name, root, report)
 
     def understand(self, written: WrittenTrial) -> Trial | None:
         """Return the test that a file contains, None if it cannot run; add its findings to its report."""
@@ -530,10 +515,10 @@ class TrialReader:
         found = self._robot(root, written.path, report)
         if found is None:
             return None
-        trial = _read(root, *found, report)
+        trial = _read(root, written.name, *found, report)
         if trial is not None and not report.has_errors:
             report.extend(_with_its_inputs(root, found[0], trial))
-        return None if report.has_errors or trial is None else replace(trial, name=written.name)
+        return None if report.has_errors else trial
 
     def summed_up(self, findings: Iterable[Finding]) -> Iterator[Finding]:
         """Yield the findings, but merge those of all tests that the same robot with errors keeps from running."""
@@ -574,8 +559,7 @@ class TrialReader:
             none = "remove it: the robot has no profiles"
             report.extend(replace(finding, span=chosen.span, help=finding.help or none, fix=None) for finding in lost)
             return None
-        mission = root.get("mission")
-        found = robot_for_mission(made, mission.text if isinstance(mission, ScalarNode) else "")
+        found = robot_for_mission(made, text_at(root, ("mission",)))
         if found is None:
             why = codes.NEVER.at(written.span, _no_robot(shown, "the test"), help="see the findings of the robot")
             self._kept_back[why] = shown
@@ -616,7 +600,7 @@ def _text(root: MappingNode, key: str, what: str, report: Report) -> ScalarNode 
     return None
 
 
-def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial | None:
+def _read(root: MappingNode, name: str, robot: Robot, plan: Plan, report: Report) -> Trial | None:
     chosen = _text(root, "mission", "the name of a mission", report)
     if chosen is None:
         return None
@@ -641,23 +625,7 @@ def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial 
     is_complete = _is_complete(context.facts, mocks, events)
     if is_complete:
         report.extend(_faults_without_servos(events))
-    header = {key: value.text for key in ("name", "about") if isinstance(value := root.get(key), ScalarNode)}
-    return Trial(
-        header.get("name", ""),
-        header.get("about", ""),
-        root.span.file,
-        root.entries["name"].value.span if "name" in root else root.span,
-        chosen.text,
-        program,
-        linked,
-        robot,
-        plan,
-        inputs,
-        mocks,
-        events,
-        expect,
-        is_complete,
-    )
+    return Trial(name, chosen.text, program, linked, robot, plan, inputs, mocks, events, expect, is_complete)
 
 
 def _with_its_inputs(root: MappingNode, robot: Robot, trial: Trial) -> Iterator[Finding]:

@@ -53,9 +53,8 @@ class TrialWriter:
     def line(self, outcome: FileOutcome) -> str:
         """Return the one line on a test."""
         word = self.paint("pass", "passed") if outcome.passed else self.paint("fail", "FAILED")
-        times = f"{outcome.took * 1e3:.0f} ms" + (
-            f", {outcome.robot_time:.1f} s of robot time" if outcome.verdict else ""
-        )
+        robot_time = f", {outcome.robot_time:.1f} s of robot time" if outcome.verdict else ""
+        times = f"{outcome.took * 1e3:.0f} ms{robot_time}"
         return f"{word}  {plain(outcome.name) or '?'}  {self.paint('time', f'({plain(outcome.file)}, {times})')}"
 
     def trace(self, verdict: Verdict) -> str:
@@ -154,30 +153,23 @@ def _test(outcome: FileOutcome) -> dict[str, Any]:
 
 def junit(outcomes: Sequence[FileOutcome]) -> str:
     """Return one suite with a case for each test; what kept a test from running is an error, the rest a failure."""
-    failed = [file_outcome for file_outcome in outcomes if file_outcome.verdict and not file_outcome.passed]
-    broken = [file_outcome for file_outcome in outcomes if not file_outcome.verdict]
-    counts = {"tests": len(outcomes), "failures": len(failed), "errors": len(broken)}
+    failed = sum(1 for outcome in outcomes if outcome.verdict and not outcome.passed)
+    counts = {"tests": len(outcomes), "failures": failed, "errors": sum(not outcome.verdict for outcome in outcomes)}
     numbers = {key: str(value) for key, value in counts.items()}
-    took = f"{sum(file_outcome.took for file_outcome in outcomes):.3f}"
+    took = f"{sum(outcome.took for outcome in outcomes):.3f}"
     root = ElementTree.Element("testsuites", {"name": "rbxcompose test", "time": took, **numbers})
     suite = ElementTree.SubElement(root, "testsuite", {"name": "missions", "time": took, **numbers})
     for outcome in outcomes:
         mission = outcome.verdict.trial.mission if outcome.verdict else outcome.file
-        case = ElementTree.SubElement(
-            suite,
-            "testcase",
-            name=_fit(outcome.name or outcome.file),
-            classname=_fit(mission),
-            time=f"{outcome.took:.3f}",
-            file=_fit(outcome.file),
-        )
+        name, file = _fit(outcome.name or outcome.file), _fit(outcome.file)
+        about = {"name": name, "classname": _fit(mission), "time": f"{outcome.took:.3f}", "file": file}
+        case = ElementTree.SubElement(suite, "testcase", about)
         if outcome.verdict and not outcome.passed:
             messages = [problem.message for problem in outcome.verdict.problems]
             _add(case, "failure", messages[0], TrialWriter().trace(outcome.verdict))
         elif not outcome.verdict:
-            _add(
-                case, "error", "the test has errors", "\n".join(f"{f.span or ''} {f.message}" for f in outcome.findings)
-            )
+            words = "\n".join(f"{finding.span or ''} {finding.message}" for finding in outcome.findings)
+            _add(case, "error", "the test has errors", words)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 

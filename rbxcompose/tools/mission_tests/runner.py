@@ -173,6 +173,12 @@ class TrialRun(ABC):
                 self.values.set(call.mock.sets, call.arguments)
             self.ended(call.leaf, result)
 
+    def finished(self, engine: Engine) -> TrialRecord:
+        """Return the record of a run that has ended."""
+        self.record.late = len(self.events)
+        self.record.data = dict(engine.data)
+        return self.record
+
     @abstractmethod
     def await_calls(self) -> None:
         """Have calls that have begun, or go on, end when they are due."""
@@ -211,9 +217,7 @@ class TrialStage(TrialRun):
             self.now = self.record.now = max(upcoming, self.now)
         else:
             self.record.trouble = f"did not end: {MOST_INSTANTS:,} things happened within {self.now:g} s"
-        self.record.late = len(self.events)
-        self.record.data = dict(self.engine.data)
-        return self.record
+        return self.finished(self.engine)
 
     def _excess(self) -> str:
         """Return what there is too much of, in words; counted, so that a test ends the same way on every computer."""
@@ -267,9 +271,7 @@ class RobotRun(TrialRun):
         super().__init__(trial, seen)
         plan = _with_mission(trial.plan, trial)
         self.bench = Bench(plan=plan, start=False, rules=LiveRules(trial.robot))
-        name = next(
-            instance.name for instance in plan.instances if declared(instance.type, instance.config, RunsMissions)
-        )
+        name = next(one.name for one in plan.instances if declared(one.type, one.config, RunsMissions))
         executive = self.bench.component(name)
         if not isinstance(executive, Mission):
             raise TypeError(f"'{name}' runs no missions")
@@ -298,9 +300,7 @@ class RobotRun(TrialRun):
         if not self.bench.run_until(self._is_over, LONGEST_TEST if until is None else until) and until is None:
             self.record.trouble = f"did not end within {LONGEST_TEST:g} s of robot time"
         self.record.now = self.now
-        self.record.late = len(self.events)
-        self.record.data = dict(self.executive.missions.runs[self.trial.mission].engine.data)
-        return self.record
+        return self.finished(self.executive.missions.runs[self.trial.mission].engine)
 
     def _is_over(self) -> bool:
         if self.bench.host.hosted[self.name].component is not self.executive:

@@ -17,9 +17,9 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.manifest.files import PARTS, PREFIX, library_root, project_of
-from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, at
+from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, at, text_at
 from rbxcompose.manifest.validate import to_plain
-from rbxcompose.tools.mission_editor.yaml_places import PlacedNode, placed
+from rbxcompose.tools.mission_editor.yaml_places import placed
 from rbxcompose.tools.robot_editor.subjects import Subject, Where, quantity_text, valid_name, written_text
 
 FARTHEST_PIECE = 100.0  # [m] from the link that carries it
@@ -61,13 +61,10 @@ def _offered(path: Path, shown: str) -> OfferedPart | None:
     if root is None or root.form != "map" or (kind := root.get("kind")) is None or kind.text != "Part":
         return None
     name, about, args = root.get("name"), root.get("about"), root.get("args")
-    needs = tuple(key.text for key, value in (args.pairs if args is not None else ()) if _is_needed(value))
+    declared = args.pairs if args is not None else ()
+    needs = tuple(key.text for key, argument in declared if argument.get("default") is None)
     has_body = root.get("body") is not None or root.get("include") is not None
     return OfferedPart(name.text if name else path.stem, about.text if about else "", shown, has_body, needs)
-
-
-def _is_needed(argument: PlacedNode) -> bool:
-    return argument.get("default") is None
 
 
 class IncludedParts(Subject):
@@ -84,10 +81,7 @@ class IncludedParts(Subject):
         """Return each instance with its part and its attachment, as they are written."""
         found = []
         for name, entry in instances(robot).items():
-            part = at(entry.value, ("part",))
-            shown = part.text if isinstance(part, ScalarNode) else ""
-            carrier = at(entry.value, ("attach", "to"))
-            to = carrier.text if isinstance(carrier, ScalarNode) else ""
+            shown, to = text_at(entry.value, ("part",)), text_at(entry.value, ("attach", "to"))
             pose = {key: self._written(robot, name, key) for key in self.fields}
             numbers = {key: _number_of(text, self.fields[key]) for key, text in pose.items()}
             plain = {"name": name, "part": shown, "to": to, "pose": pose, "numbers": numbers}
@@ -221,11 +215,7 @@ def argument_text(key: Any, value: Any) -> str:
     Raises:
         Refused: if it is none that fits into a line.
     """
-    if (
-        not isinstance(key, str)
-        or not _LINK.fullmatch(key)
-        or not isinstance(value, str)
-        or not _VALUE.fullmatch(value)
-    ):
+    is_key = isinstance(key, str) and _LINK.fullmatch(key)
+    if not is_key or not isinstance(value, str) or not _VALUE.fullmatch(value):
         raise Refused(f"'{str(key)[:60]}' must be a word, a number or a quantity")
     return f"{key}: {value.strip()}"

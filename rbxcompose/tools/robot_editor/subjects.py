@@ -17,7 +17,7 @@ from rbxcompose.commands.new_files import AnswerError, read_name
 from rbxcompose.compiler.composition.value_edits import is_same, value_text
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.muxes.sections.muxes import muxes
-from rbxcompose.manifest.tree import KeyPath, ScalarNode
+from rbxcompose.manifest.tree import KeyPath, text_at
 
 FARTHEST = 1e6  # [m] from the origin of `map`; no view shows what is farther away
 HIGHEST = 1_000_000  # priority
@@ -227,8 +227,7 @@ def valid_name(name: Any, what: str, taken: Mapping[str, Any]) -> str:
 def written_text(robot: Robot, path: KeyPath) -> str:
     """Return a value as the file has it; empty if none has."""
     steps = robot.manifest.history.of(path)
-    node = steps[-1].node if steps else None
-    return node.text if isinstance(node, ScalarNode) else ""
+    return text_at(steps[-1].node) if steps else ""
 
 
 def quantity_text(key: str, value: Any, dimension: Dimension, old: str) -> tuple[float, str]:

@@ -416,7 +416,7 @@ def draw_graph(body: Body, form: str) -> bytes:
     """Return the graph of a body in one of `FORMATS`.
 
     Raises:
-        NotDrawnError: if Graphviz is not installed.
+        NotDoneError: if Graphviz is not installed.
     """
     drawn: bytes = graphviz().AGraph(string=body_dot(body)).draw(format=form, prog="dot")
     return drawn
