@@ -16,12 +16,12 @@ from rbxcompose.compiler.composition.robot_manifest import History, RobotManifes
 from rbxcompose.compiler.sections.composition import include
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.files import shown_name
+from rbxcompose.manifest.reader import TWICE
 from rbxcompose.manifest.registry import section_named, sections_in_use
 from rbxcompose.manifest.section import ROBOT, Section
 from rbxcompose.manifest.shapes import refers_below
 from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
 from rbxcompose.manifest.validate import MISSING_KEY
-from rbxcompose.manifest.walk import TWICE
 
 STILL_USED = kind("RBX1310")
 _MOST_SHOWN = 8

@@ -1,8 +1,8 @@
-"""The ports of a running component: the runtime binds them to the bus, tests to whatever they like."""
+"""The ports and windows of a running component: the runtime binds them to the bus, tests to whatever they like."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import StrEnum
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, Transform3
@@ -218,3 +218,41 @@ class Look(Protocol):
             LookupError: if there is none; the text names the frames or the times that there are.
         """
         ...
+
+
+KeyedParts = Mapping[str, Any]
+
+
+class KeyFeed:
+    """What a window tells of something with named parts: all of them at first, then what is new, if anybody watches.
+
+    An update is `{"whole": bool, "changed": {...}, "gone": [...]}`; a whole one replaces what was known. The messages
+    around them are those of `bus/window.py`.
+    """
+
+    def __init__(self, window: Window) -> None:
+        self._window = window
+        self._sent: KeyedParts | None = None  # None while nobody watched
+
+    def update(self, parts: KeyedParts) -> None:
+        """Send what differs from what was told last."""
+        before, self._sent = self._sent, dict(parts) if self._window.is_watched else None
+        if self._sent is None or self._sent == before:
+            return
+        self._window.put(whole(parts) if before is None else _difference(before, parts))
+
+
+def whole(parts: KeyedParts) -> dict[str, Any]:
+    """Return all parts as an update."""
+    return {"whole": True, "changed": dict(parts), "gone": []}
+
+
+def _difference(before: KeyedParts, parts: KeyedParts) -> dict[str, Any]:
+    changed = {key: part for key, part in parts.items() if key not in before or before[key] != part}
+    return {"whole": False, "changed": changed, "gone": [key for key in before if key not in parts]}
+
+
+def added(known: KeyedParts, update: KeyedParts) -> dict[str, Any]:
+    """Return what is known after an update."""
+    kept = {} if update["whole"] else {key: entry for key, entry in known.items() if key not in update["gone"]}
+    return {**kept, **update["changed"]}

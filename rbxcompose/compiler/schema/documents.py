@@ -14,8 +14,7 @@ from rbxcompose.base.config import Name, Time, field_docs
 from rbxcompose.base.files import replace_file
 from rbxcompose.compiler.schema.mission import mission_schema
 from rbxcompose.compiler.schema.robot import document, or_empty, overlay_schema, part_schema, robot_schema
-from rbxcompose.compiler.schema.scalars import DEFINITIONS, SHARED, Schema
-from rbxcompose.compiler.schema.settle import opened, schemas_of
+from rbxcompose.compiler.schema.scalars import DEFINITIONS, SHARED, Schema, opened, schemas_of
 from rbxcompose.manifest import system_file, test_file
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.registry import sections

@@ -7,8 +7,7 @@ from typing import Any
 
 from rbxcompose.base.units import DIMENSIONS, Dimension
 from rbxcompose.compiler.schema.overlays import SECTION, WHOLE
-from rbxcompose.compiler.schema.scalars import DIMENSION, Schema
-from rbxcompose.compiler.schema.settle import referred
+from rbxcompose.compiler.schema.scalars import DIMENSION, Schema, referred
 from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode, at
 
 _DEEPEST = 12  # nested references and choices

@@ -4,9 +4,8 @@ from collections.abc import Iterator
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.compiler.systems.certificates import MUTUAL, NO_SECURITY
-from rbxcompose.compiler.systems.exchange import exchange_of, shared_crossings
 from rbxcompose.compiler.systems.model import PlacedRobot, System
-from rbxcompose.compiler.systems.share import OF_RUNTIME, access_of, hosts_of, listens
+from rbxcompose.compiler.systems.share import OF_RUNTIME, access_of, exchange_of, hosts_of, listens, shared_crossings
 
 NETWORK = "every machine of the network"
 _PROOFS = {

@@ -19,8 +19,6 @@ from rbxcompose.compiler.model.robot import resolve as absolute
 from rbxcompose.compiler.model.skills import served_skills
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.certificates import NO_SECURITY
-from rbxcompose.compiler.systems.consoles import ports_of, with_free_ports
-from rbxcompose.compiler.systems.exchange import shared_name
 from rbxcompose.compiler.systems.model import (
     PORTS,
     HostOffer,
@@ -32,8 +30,15 @@ from rbxcompose.compiler.systems.model import (
     next_port,
     place,
 )
-from rbxcompose.compiler.systems.neighbours import PLACE_IN_WORLD, ROBOTS_IN_WORLD, with_others
+from rbxcompose.compiler.systems.neighbours import (
+    PLACE_IN_WORLD,
+    ROBOTS_IN_WORLD,
+    ports_of,
+    with_free_ports,
+    with_others,
+)
 from rbxcompose.compiler.systems.rules import UNKNOWN_HOST, system_findings
+from rbxcompose.compiler.systems.share import shared_name
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.files import PREFIX, PROFILE, find, resolve, shown_name
 from rbxcompose.manifest.fill import fill, names_of
