@@ -62,9 +62,7 @@ def component_type(name: str) -> type[Component[Any]]:
         KeyError: if no type has this name.
         BrokenPluginError: if it belongs to another package and cannot be used.
     """
-    if name not in _TYPES:
-        _load(name)
-    return _TYPES[name]
+    return PLUGINS.find(name, _TYPES, f"class by @component({name!r})")
 
 
 def declared(name: str, config: Config, kind: type[K]) -> list[K]:
@@ -97,13 +95,3 @@ def _is_usable(name: str) -> bool:
     except BrokenPluginError:  # reported when a manifest uses it
         return False
     return True
-
-
-def _load(name: str) -> None:
-    try:
-        is_there = PLUGINS.load(name)
-    except BrokenPluginError:
-        _TYPES.pop(name, None)  # it may have got that far
-        raise
-    if is_there and name not in _TYPES:
-        raise PLUGINS.broken(name, f"its module declares no class by @component({name!r})")

@@ -15,7 +15,7 @@ from rbxcompose.base.config import Dimensioned, Place
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.types import COUNT, FLAG, PLACE, POSE, TEXT, Type, choice_of, quantity_of
 from rbxcompose.base.geometry import Pose2
-from rbxcompose.base.plugins import BrokenPluginError, Plugins
+from rbxcompose.base.plugins import Plugins
 from rbxcompose.base.units import NUMBER
 
 PLUGINS = Plugins("skill", "skills")
@@ -118,15 +118,7 @@ def skill_type(name: str) -> SkillType:
         KeyError: if no skill has this name.
         BrokenPluginError: if it belongs to another package and cannot be used.
     """
-    if name not in _SKILLS:
-        try:
-            is_there = PLUGINS.load(name)
-        except BrokenPluginError:
-            _SKILLS.pop(name, None)
-            raise
-        if is_there and name not in _SKILLS:
-            raise PLUGINS.broken(name, f"its module declares no skill by @skill({name!r})")
-    return _SKILLS[name]
+    return PLUGINS.find(name, _SKILLS, f"skill by @skill({name!r})")
 
 
 def _place(made: Callable[..., Any]) -> str:
