@@ -155,7 +155,6 @@ class RobotRules(Protocol):
 
     def why_not(self, now: Configs, new: Configs) -> ChangeRefusal | None:
         """Return what `new` configurations break that was not broken before, where others have those of `now`."""
-        ...
 
 
 C = TypeVar("C", bound=Config)

@@ -71,23 +71,23 @@ _DECLARED = "'inputs' or 'data' of the mission, as 'save' of a step, or as 'valu
 
 
 class StaticScope(Protocol):
-    """The names that exist, and their types."""
+    """The names that exist, and their types; a subclass knows what it overrides, and nothing else."""
 
     def variable(self, name: str) -> Type | None:
         """Return the type of `$name`; None if there is no such name."""
-        ...
+        return None
 
     def word(self, name: str) -> Type | None:
         """Return the type of what a bare word names; None if it names nothing. Choices need not be known."""
-        ...
+        return None
 
     def variables(self) -> Iterable[str]:
         """Return the names that `variable` knows, without '$'."""
-        ...
+        return ()
 
     def words(self) -> Iterable[str]:
         """Return the names that `word` knows."""
-        ...
+        return ()
 
 
 @dataclass(frozen=True, slots=True)
