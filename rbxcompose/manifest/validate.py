@@ -338,8 +338,7 @@ def _unknown_key(
     is_foreign = FOREIGN.get(key) in missing
     meant = [FOREIGN[key]] if is_foreign else get_close_matches(key, missing, n=1, cutoff=SIMILAR)
     message = f"unknown key '{plain(key, 60)}' in {where((*path, *loc[:-1]))}"
-    above = tree.at(node, loc[:-1])
-    taken = above.entries if isinstance(above, tree.MappingNode) else ()
+    taken = tree.entries_of(tree.at(node, loc[:-1]))
     finding = UNKNOWN_KEY.misspelt(tree.key_span(node, loc), message, key, meant or known, KEYS, taken=taken)
     return finding, meant[0] if meant else ""
 
