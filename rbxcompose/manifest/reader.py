@@ -63,9 +63,8 @@ class Walk:
         self.may_tag = "!" in text
         self.known_tags = known_tags
         self.findings: list[Finding] = []
-        self._done: dict[
-            int, tuple[tree.TreeNode, int, int]
-        ] = {}  # by id: the node, how many nodes it has, how deep it is
+        # By id: the node, how many nodes it has, how deep it is.
+        self._done: dict[int, tuple[tree.TreeNode, int, int]] = {}
         self._open: set[int] = set()  # ids of the nodes being walked, from the root to the current one
         self._alias_nodes = 0
 

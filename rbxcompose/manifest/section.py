@@ -499,20 +499,12 @@ class Contents:
     def brought(self, kind: str) -> dict[str, object]:
         """Return the names of a kind that sections define outside the manifest."""
         defining = (section for section in self._sections if kind in section.defines)
-        return {
-            name: value
-            for section in defining
-            for name, value in section.defined(self.of(section)).get(kind, {}).items()
-        }
+        return {name: value for one in defining for name, value in one.defined(self.of(one)).get(kind, {}).items()}
 
     @cached_property
     def open_kinds(self) -> frozenset[str]:
         """Return the kinds of which any name may exist: a section that defines them is no map, or a file lacks."""
-        naming = [
-            section
-            for section in self._sections
-            if section.names and (not self.is_whole or section.is_unreadable(self.root))
-        ]
+        naming = [one for one in self._sections if one.names and (not self.is_whole or one.is_unreadable(self.root))]
         return frozenset((*(section.names for section in naming), *(COMPONENT for section in naming if section.runs)))
 
     @cached_property

@@ -134,15 +134,13 @@ def _fills(key: str, empty: Mapping[str, str], full: Mapping[str, str]) -> bool:
 def _of_instance(instance: Instance) -> dict[str, str]:
     """Return the properties of an instance, by key; settings as a person writes them."""
     wires = {f"topic of {wire.port}": f"{wire.topic} ({wire.type})" for wire in instance.wires if wire.topic}
-    options = {
+
+    bounds = {f"{BOUNDS}{name}": _bounds(instance.config, name, each) for name, each in instance.bounds.items()}
+    return {
         "type": instance.type,
         "process": instance.process,
         "starts_after": ", ".join(instance.starts_after) or "nothing",
-    }
-    options["log"] = log_word(instance.log)
-    bounds = {f"{BOUNDS}{name}": _bounds(instance.config, name, each) for name, each in instance.bounds.items()}
-    return {
-        **options,
+        "log": log_word(instance.log),
         **dict(_flat(instance.restart, "restart")),
         **dict(_flat(instance.config, "")),
         **wires,

@@ -34,11 +34,7 @@ _WIDTH = 120  # of a line in a file
 
 def system_schema(types: Iterable[str]) -> Schema:
     """Return the schema of a system; it is the same for all types of components."""
-    keys = {
-        name: field.annotation
-        for name, field in system_file.SystemFile.model_fields.items()
-        if name == system_file.SECURITY
-    }
+    keys = {system_file.SECURITY: system_file.SystemFile.model_fields[system_file.SECURITY].annotation}
     schemas, definitions = schemas_of({**system_file.SECTIONS, **system_file.LINKS, **system_file.PROFILES, **keys})
     about = field_docs(system_file.SystemFile)
     sections = {

@@ -321,9 +321,8 @@ def _placed_robot(member: _Member, out: System, compiling: _Compiling) -> Placed
     robot, plan = (compilation.robot, compilation.plan) if compilation else (None, None)
     if compilation is None or robot is None or plan is None:
         return None
-    bus = replace(
-        plan.bus, port=next_port(plan.bus.port, {placed_robot.plan.bus.port for placed_robot in out.robots.values()})
-    )
+    taken = {other.plan.bus.port for other in out.robots.values()}
+    bus = replace(plan.bus, port=next_port(plan.bus.port, taken))
     plan, link_port = replace(plan, robot=name, bus=bus), _link_port(model, plan, out)
     plan = with_free_ports(plan, {port for robot in out.robots.values() for port in ports_of(robot.plan)})
     names = [instance.name for instance in plan.instances]

@@ -105,16 +105,14 @@ def _typed(topic_end: TopicEnd) -> str:
 
 def _unshared(system: System, robot: PlacedRobot) -> Iterator[Finding]:
     """Yield a finding for each end that takes something of another robot that this one does not share."""
-    for topic_end in robot.ends:
-        name, _, own = topic_end.topic.removeprefix("/").partition("/")
+    for end in robot.ends:
+        name, _, own = end.topic.removeprefix("/").partition("/")
         other = system.robots.get(name)
-        if _gives(topic_end) or other is None or other is robot or share.givers_of(robot, topic_end.topic):
+        if _gives(end) or other is None or other is robot or share.givers_of(robot, end.topic):
             continue
-        if topic_end.topic not in {share.shared_name(name, each) for each in other.model.share}:
-            does = "listens to" if isinstance(topic_end.end.port, In) else "calls"
-            message = (
-                f"'{topic_end.end.component}' of '{robot.name}' {does} {topic_end.topic}, which '{name}' does not share"
-            )
+        if end.topic not in {share.shared_name(name, each) for each in other.model.share}:
+            does = "listens to" if isinstance(end.end.port, In) else "calls"
+            message = f"'{end.end.component}' of '{robot.name}' {does} {end.topic}, which '{name}' does not share"
             yield NOT_SHARED.at(other.span(system.root), message, help=_cure(other, own))
 
 
