@@ -60,8 +60,7 @@ from rbxcompose.sdk.ports import (
     ServesAction,
     ServesTopic,
 )
-from rbxcompose.sdk.registry import component
-from rbxcompose.sdk.skills import Activity, skill
+from rbxcompose.sdk.registry import Activity, component, skill
 from rbxcompose.sdk.updater import CompositeTask, FrequencyTask, StampTask, TaskStatus, heartbeat
 
 __all__ = [

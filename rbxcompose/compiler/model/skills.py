@@ -24,7 +24,7 @@ from rbxcompose.missions.program.program import Program, Skill
 from rbxcompose.missions.sources import Orders, OrderTopic, SkillSource, SkillWay, TopicSource
 from rbxcompose.sdk.capabilities import CommandsMotion, Drains, Navigates
 from rbxcompose.sdk.ports import In, Out, Qos, Serves, ServesAction, ServesTopic
-from rbxcompose.sdk.skills import SkillType, skill_names, skill_type
+from rbxcompose.sdk.registry import SkillType, skill_names, skill_type
 
 
 def skills_of(

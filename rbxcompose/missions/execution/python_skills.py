@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.execution.errands import Errand, Shell, WhenDone
 from rbxcompose.missions.program.outcomes import Result
-from rbxcompose.sdk.skills import Activity, Returned, SkillType
+from rbxcompose.sdk.registry import Activity, Returned, SkillType
 
 LONGEST = 0.005  # [s] in one call, during which all missions wait
 WORDS = ("success", "failure")

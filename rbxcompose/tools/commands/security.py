@@ -21,9 +21,9 @@ from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.compiler.plan.model import LinkTls
 from rbxcompose.compiler.systems import certificates
-from rbxcompose.compiler.systems.audit import listeners, reachable_keys
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.compiler.systems.reader import compile_system
+from rbxcompose.compiler.systems.share import listeners, reachable_keys
 
 GROUP = "system"
 NOT_MADE = kind("RBX6116")
