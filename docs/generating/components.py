@@ -7,7 +7,7 @@ from typing import Any
 from docs.generating.markdown import about, code, example, example_of, indented, page, table
 from docs.generating.shapes import keys_table
 from rbxcompose.base.config import PLACE, Place
-from rbxcompose.compiler.schema.entries import examples_of
+from rbxcompose.compiler.schema.robot import examples_of
 from rbxcompose.manifest.section import ComponentOptions
 from rbxcompose.missions.program.goals import typed_fields
 from rbxcompose.sdk.component import Component

@@ -8,8 +8,7 @@ from docs.generating.components import ports_of
 from docs.generating.markdown import about, code, example, example_of, lowered, page, table
 from docs.generating.shapes import keys_table
 from rbxcompose.compiler.schema.mission import mission_schema
-from rbxcompose.compiler.schema.scalars import SHARED, Schema
-from rbxcompose.compiler.schema.settle import referred
+from rbxcompose.compiler.schema.scalars import SHARED, Schema, referred
 from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.missions.language.fields import Field, first_line
 from rbxcompose.missions.language.grammar import Takes

@@ -23,11 +23,9 @@ class Clock(Protocol):
 
     def now(self) -> float:
         """Return robot time [s] since the robot's start."""
-        ...
 
     def stamp(self) -> int:
         """Return the time to write into messages [ns]: since the Unix epoch, or robot time if stepped."""
-        ...
 
 
 def local_time(seconds: float) -> datetime:

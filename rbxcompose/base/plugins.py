@@ -18,7 +18,7 @@ import sys
 from collections.abc import Iterator
 from functools import cache, cached_property
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from rbxcompose.base.findings import Severity, kind
 from rbxcompose.base.printable import plain
@@ -26,6 +26,7 @@ from rbxcompose.base.printable import plain
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
+T = TypeVar("T")
 GROUP = "rbxcompose.plugins"
 
 BROKEN = kind("RBX9301")
@@ -123,6 +124,25 @@ class Plugins:
             importlib.import_module(self.shipped[name])
             return True
         return self.load_foreign(name)
+
+    def find(self, name: str, known: dict[str, T], declared: str) -> T:
+        """Return the thing of this name from `known`, importing the plug-in that enters it there if necessary.
+
+        `declared` says what its decorator declares.
+
+        Raises:
+            KeyError: if there is none.
+            BrokenPluginError: if it belongs to another package and cannot be used.
+        """
+        if name not in known:
+            try:
+                is_there = self.load(name)
+            except BrokenPluginError:
+                known.pop(name, None)  # it may have got that far
+                raise
+            if is_there and name not in known:
+                raise self.broken(name, f"its module declares no {declared}")
+        return known[name]
 
     def load_shipped(self) -> None:
         """Import all of our own."""

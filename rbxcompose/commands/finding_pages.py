@@ -49,7 +49,7 @@ def declared() -> Iterator[tuple[str, str]]:
     [home] = map(Path, rbxcompose.__path__)
     for path in sorted(home.rglob("*.py")):
         if codes := _DECLARED.findall(path.read_text(encoding="utf-8")):
-            module = ".".join((home.name, *path.relative_to(home).with_suffix("").parts))
+            module = ".".join((home.name, *path.relative_to(home).with_suffix("").parts)).removesuffix(".__init__")
             yield from ((module, code) for code in codes)
 
 

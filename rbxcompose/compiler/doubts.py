@@ -16,12 +16,12 @@ from rbxcompose.compiler.composition.robot_manifest import History, RobotManifes
 from rbxcompose.compiler.sections.composition import include
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.files import shown_name
+from rbxcompose.manifest.reader import TWICE
 from rbxcompose.manifest.registry import section_named, sections_in_use
 from rbxcompose.manifest.section import ROBOT, Section
 from rbxcompose.manifest.shapes import refers_below
-from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
+from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at, entries_of
 from rbxcompose.manifest.validate import MISSING_KEY
-from rbxcompose.manifest.walk import TWICE
 
 STILL_USED = kind("RBX1310")
 _MOST_SHOWN = 8
@@ -136,7 +136,7 @@ class _Search:
 
     def _enclose(self, node: TreeNode, span: Span, path: KeyPath = ()) -> None:
         """Note an error that is at no key and no value, by the innermost entry around it."""
-        for name, entry in node.entries.items() if isinstance(node, MappingNode) else ():
+        for name, entry in entries_of(node).items():
             if entry.value.span.contains(span):
                 self._enclose(entry.value, span, (*path, name))
                 return
@@ -212,12 +212,12 @@ def without_half_entries(
 
     `read_so_far` is the number of findings from before the sections were read, `given` what the file includes.
     """
-    prefixes = tuple(f"{name}_" for name in _entries(given, include.name))
+    prefixes = tuple(f"{name}_" for name in entries_of(given.get(include.name)))
     halves = Doubts(
         places=_by_line(
             span
             for section in sections_in_use(ROBOT)
-            for name, entry in _entries(root, section.name).items()
+            for name, entry in entries_of(root.get(section.name)).items()
             if section.has_topics or name.startswith(prefixes) or not prefixes
             for span in (entry.key.span, entry.value.span)
         )
@@ -226,11 +226,6 @@ def without_half_entries(
         *(one for one in findings[:read_so_far] if one.code != NOTHING_TO_CHANGE.code),
         *(one for one in findings[read_so_far:] if one.code != MISSING_KEY.code or not halves.touch(one, ())),
     ]
-
-
-def _entries(root: MappingNode, section: str) -> Mapping[str, Entry]:
-    there = root.get(section)
-    return there.entries if isinstance(there, MappingNode) else {}
 
 
 def with_removals(

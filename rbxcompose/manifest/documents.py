@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import field, replace
-from dataclasses import replace as changed
 from pathlib import Path
 from typing import Any, Literal
 
@@ -74,17 +73,17 @@ class Documents:
         shown = shown_name(file)
         self.files[shown] = file
         root, findings = read_file(file, shown, self.sources)
-        self.report.extend(changed(one, span=one.span or span) for one in findings)
+        self.report.extend(replace(one, span=one.span or span) for one in findings)
         if root is None:
             return None
         if finding := _trouble(root, wanted):
             if span and finding.span and file.name == ROBOT_FILE:  # another file was meant
                 because = (Related(finding.span, f"what kind '{plain(shown)}' is"), *finding.related)
                 message = f"this must name a file of kind {wanted}"
-                self.report.add(changed(finding, span=span, message=message, help="", related=because))
+                self.report.add(replace(finding, span=span, message=message, help="", related=because))
             else:
                 related = (Related(span, f"this needs a {wanted}"),) if span else ()
-                self.report.add(changed(finding, related=(*finding.related, *related)))
+                self.report.add(replace(finding, related=(*finding.related, *related)))
             return None
         return root if isinstance(root, MappingNode) else None
 
@@ -120,8 +119,8 @@ class Documents:
                     places[name, *place] = keys
         entries = dict(root.entries)
         for name in sections.keys() & root.entries.keys():
-            entries[name] = changed(entries[name], value=self._placed(entries[name].value, (name,), places, root))
-        whole = self._placed(changed(root, entries=entries), (), places, root)
+            entries[name] = replace(entries[name], value=self._placed(entries[name].value, (name,), places, root))
+        whole = self._placed(replace(root, entries=entries), (), places, root)
         return whole if isinstance(whole, MappingNode) else root
 
     def _placed(self, node: TreeNode, path: KeyPath, places: _Places, root: MappingNode) -> TreeNode:
@@ -131,12 +130,12 @@ class Documents:
             match node:
                 case SequenceNode(items=items):
                     inner = (self._placed(item, (*path, index), places, root) for index, item in enumerate(items))
-                    return changed(node, items=tuple(inner))
+                    return replace(node, items=tuple(inner))
                 case MappingNode(entries=entries):
                     values = {
                         name: self._placed(entry.value, (*path, name), places, root) for name, entry in entries.items()
                     }
-                    return changed(node, entries={name: changed(entries[name], value=values[name]) for name in entries})
+                    return replace(node, entries={name: replace(entries[name], value=values[name]) for name in entries})
         own = places.get(place)
         if own is None or not isinstance(node, MappingNode):
             return node
@@ -153,7 +152,7 @@ class Documents:
                 message = f"unknown key '{plain(name, 60)}' in {where(path)}"
                 help_text = _home(homes[0], places, root)
                 self.report.add(UNKNOWN_KEY.at(entry.key.span, message, help=help_text, about=[name]))
-        return changed(node, entries=left)
+        return replace(node, entries=left)
 
     def check(self, model: type[ManifestHeader], root: MappingNode) -> None:
         """Add findings for the top-level keys of a file; the contents of a section are checked where it is read."""
@@ -162,7 +161,7 @@ class Documents:
             name: Entry(entry.key, ScalarNode("", entry.value.span)) if name in anything else entry
             for name, entry in root.entries.items()
         }
-        validate(model, changed(root, entries=keys), (), self.report)
+        validate(model, replace(root, entries=keys), (), self.report)
 
 
 def _home(place: KeyPath, places: _Places, root: MappingNode) -> str:

@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections.abc import Iterable
 from itertools import islice
 from pathlib import Path
 
@@ -48,11 +49,7 @@ def project_of(path: Path) -> Path:
 
 
 def _project_around(folder: Path) -> Path:
-    above = (
-        parent
-        for parent in (folder, *folder.parents)
-        if any((parent / name).is_dir() for name in ("robots", "missions"))
-    )
+    above = (one for one in (folder, *folder.parents) if any((one / name).is_dir() for name in ("robots", "missions")))
     return next(above, folder)
 
 
@@ -67,9 +64,7 @@ def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
         message, folder = f"'{plain(written)}' is outside the project", plain(shown_name(project_of(writer)))
         where = f"'{folder}'" if folder != "." else "this folder"
         if namesakes := files_named(Path(written).name, writer):
-            return OUTSIDE.at(
-                span, message, help="did you mean " + " or ".join(f"'{namesake}'" for namesake in namesakes) + "?"
-            )
+            return OUTSIDE.at(span, message, help=f"did you mean {_either(namesakes)}?")
         return OUTSIDE.at(span, message, help=f"the project is {where}: move the file there, or use what 'rbx:' has")
     if not is_there(path):
         return _missing(written, path, span, writer)
@@ -150,11 +145,8 @@ def _missing(written: str, path: Path, span: Span | None, writer: Path | None = 
     if writer is not None and BACKSLASH in written and span is not None:
         return _with_backslashes(written, span, writer)
     if writer is not None and (namesakes := files_named(path.name, writer)):
-        message, help_text = (
-            f"'{plain(written)}' does not exist",
-            " or ".join(f"'{namesake}'" for namesake in namesakes),
-        )
-        return UNREADABLE.at(span, message, help=f"did you mean {help_text}?")
+        message = f"'{plain(written)}' does not exist"
+        return UNREADABLE.at(span, message, help=f"did you mean {_either(namesakes)}?")
     if (library_root() / written).is_file() and written.startswith(f"{PARTS}/"):
         fix = replacement(span, written, f"{PREFIX}{written}") if span else None
         message, meant = f"'{plain(written)}' does not exist", f"{PREFIX}{plain(written)}"
@@ -162,16 +154,8 @@ def _missing(written: str, path: Path, span: Span | None, writer: Path | None = 
     if (neighbours := _names_in(path.parent)) is None:
         return UNREADABLE.at(span, f"'{plain(written)}' does not exist", help=_nearest_folder(path))
     message, there = f"'{plain(written)}' does not exist", f"in '{plain(shown_name(path.parent))}'"
-    if (
-        len(
-            whole := [
-                neighbour
-                for neighbour in neighbours
-                if Path(neighbour).stem == path.name and neighbour.endswith(_ENDINGS)
-            ]
-        )
-        == 1
-    ):
+    whole = [name for name in neighbours if Path(name).stem == path.name and name.endswith(_ENDINGS)]
+    if len(whole) == 1:
         meant = f"{written.removesuffix(path.name)}{whole[0]}"
         fix = replacement(span, written, meant) if span else None
         return UNREADABLE.at(span, message, help=f"did you mean '{plain(meant)}'?", fix=fix)
@@ -188,9 +172,13 @@ def _no_robot(written: str, folder: Path, span: Span | None, writer: Path | None
         return UNREADABLE.at(span, f"{where} is no file", help=help_text)
     robots = _robots_in(folder) or [f"{_ROBOTS}/{robot}" for robot in _robots_in(folder / _ROBOTS)]
     base = "" if written in (".", "./") else f"{written.rstrip('/')}/"
-    listed = " or ".join(f"'{plain(base + robot)}'" for robot in robots[:_MOST_NAMESAKES])
+    listed = _either(plain(base + robot) for robot in robots[:_MOST_NAMESAKES])
     help_text = f"did you mean {listed}?" if robots else f"'rbxcompose new robot NAME' makes one in '{_ROBOTS}/NAME'"
     return UNREADABLE.at(span, f"there is no robot in {where}: it has no {ROBOT_FILE}", help=help_text)
+
+
+def _either(names: Iterable[str]) -> str:
+    return " or ".join(f"'{name}'" for name in names)
 
 
 def _robots_in(folder: Path) -> list[str]:

@@ -15,12 +15,12 @@ from typing import NamedTuple, TypeVar
 from rbxcompose.base.config import Secret
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions import types
-from rbxcompose.base.expressions.check import check
+from rbxcompose.base.expressions.check import StaticScope, check
 from rbxcompose.base.expressions.evaluate import evaluate
 from rbxcompose.base.expressions.parser import parse_fill
 from rbxcompose.base.expressions.tree import Expression, ExpressionError
 from rbxcompose.base.expressions.types import Type, TypeKind
-from rbxcompose.base.expressions.values import EvaluationError
+from rbxcompose.base.expressions.values import EvaluationError, Scope
 from rbxcompose.base.files import NotRegularError, open_regular
 from rbxcompose.base.findings import DID_YOU_MEAN, Report, Span, correction, kind, nearest, once, replacement, suggest
 from rbxcompose.base.printable import plain
@@ -192,22 +192,14 @@ def with_arguments(
 
 
 @dataclass(frozen=True, slots=True)
-class NameTypes:
-    """The names as the static check of an expression sees them."""
+class NameTypes(StaticScope):
+    """The names as the static check of an expression sees them; nothing is known as `$name` yet."""
 
     names: Mapping[str, Typed]
-
-    def variable(self, name: str) -> Type | None:
-        """Return None: nothing that is known while the robot runs can be filled in."""
-        return None
 
     def word(self, name: str) -> Type | None:
         """Return the type of a name."""
         return self.names[name].type if name in self.names else None
-
-    def variables(self) -> Iterable[str]:
-        """Return nothing, see `variable`."""
-        return ()
 
     def words(self) -> Iterable[str]:
         """Return all names."""
@@ -215,14 +207,10 @@ class NameTypes:
 
 
 @dataclass(frozen=True, slots=True)
-class NameValues:
+class NameValues(Scope):
     """The names as the evaluation of an expression sees them: numbers in SI, lists and maps as plain data."""
 
     names: Mapping[str, Typed]
-
-    def variable(self, name: str) -> object:
-        """Raise, since there is no such value."""
-        raise KeyError(name)
 
     def word(self, name: str) -> object:
         """Return the value of a name."""
@@ -230,14 +218,6 @@ class NameValues:
         if isinstance(value, Quantity):
             return value.value
         return to_plain(value) if isinstance(value, ScalarNode | SequenceNode | tree.MappingNode) else value
-
-    def age(self, name: str) -> float:
-        """Raise, since there is no such value."""
-        raise KeyError(name)
-
-    def is_new(self, name: str) -> bool:
-        """Raise, since there is no such value."""
-        raise KeyError(name)
 
 
 SYNTAX = kind("RBX1201", is_fixable=True)
@@ -282,7 +262,7 @@ def fill(
 
 
 def _values_at(section: TreeNode | None, keys: Collection[str]) -> Iterator[TreeNode]:
-    entries = section.entries.values() if isinstance(section, tree.MappingNode) else ()
+    entries = tree.entries_of(section).values()
     inner = (entry.value for entry in entries if isinstance(entry.value, tree.MappingNode))
     yield from (node.entries[key].value for node in inner for key in keys if key in node)
 

@@ -30,6 +30,7 @@ from rbxcompose.manifest.tree import (
     SequenceNode,
     TreeNode,
     at,
+    entries_of,
     is_empty,
     key_span,
     value_span,
@@ -61,32 +62,25 @@ class Renames(Protocol):
     @property
     def prefix(self) -> str:
         """Return the prefix of its names."""
-        ...
 
     @property
     def running(self) -> frozenset[str]:
         """Return the names of all that the part runs."""
-        ...
 
     def component(self, name: str) -> str:
         """Return the new name of something that runs; `component.port` keeps its port."""
-        ...
 
     def topic(self, topic: str) -> str:
         """Return the new name of a topic."""
-        ...
 
     def written(self, topic: str) -> RenamedTopic:
         """Return the entry that renames a topic: its own, or that of a topic above it."""
-        ...
 
     def topics(self, node: TreeNode, above: str = "") -> TreeNode:
         """Return a map whose keys are topics (below `above`, if given) with these keys renamed."""
-        ...
 
     def texts(self, node: TreeNode, change: Callable[[str], str]) -> TreeNode:
         """Return a node with every text below it changed, except those that are filled in later."""
-        ...
 
 
 def is_misplaced(entry: TreeNode, keys: Collection[str], own: Collection[str]) -> bool:
@@ -253,15 +247,12 @@ class Wiring(Protocol):
     @property
     def components(self) -> Mapping[str, Any]:
         """Return these components by name, each a `RobotComponent`: a section without names of its own sees all."""
-        ...
 
     def message_of(self, topic: str) -> str:
         """Return the type of a subscriber of a topic, else of a publisher below it; empty if there is none."""
-        ...
 
     def drives(self, topic: str) -> bool:
         """Return whether a base follows the commands on a topic."""
-        ...
 
 
 M = TypeVar("M")
@@ -440,8 +431,7 @@ class Declaration(Generic[M]):
 
     def names_in(self, root: MappingNode) -> Iterable[str]:
         """Return the names that a tree defines in this section."""
-        named = at(root, (self.name, *self.at)) if self.names else None
-        return named.entries if isinstance(named, MappingNode) else ()
+        return entries_of(at(root, (self.name, *self.at)) if self.names else None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -509,20 +499,12 @@ class Contents:
     def brought(self, kind: str) -> dict[str, object]:
         """Return the names of a kind that sections define outside the manifest."""
         defining = (section for section in self._sections if kind in section.defines)
-        return {
-            name: value
-            for section in defining
-            for name, value in section.defined(self.of(section)).get(kind, {}).items()
-        }
+        return {name: value for one in defining for name, value in one.defined(self.of(one)).get(kind, {}).items()}
 
     @cached_property
     def open_kinds(self) -> frozenset[str]:
         """Return the kinds of which any name may exist: a section that defines them is no map, or a file lacks."""
-        naming = [
-            section
-            for section in self._sections
-            if section.names and (not self.is_whole or section.is_unreadable(self.root))
-        ]
+        naming = [one for one in self._sections if one.names and (not self.is_whole or one.is_unreadable(self.root))]
         return frozenset((*(section.names for section in naming), *(COMPONENT for section in naming if section.runs)))
 
     @cached_property

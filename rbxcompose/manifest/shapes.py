@@ -136,11 +136,7 @@ def alternatives(hint: Any) -> Iterator[Any]:
 
 
 def _models(hint: Any) -> Iterator[type[BaseModel]]:
-    return (
-        alternative
-        for alternative in alternatives(hint)
-        if isinstance(alternative, type) and issubclass(alternative, BaseModel)
-    )
+    return (one for one in alternatives(hint) if isinstance(one, type) and issubclass(one, BaseModel))
 
 
 def _types_at(model: Any, path: KeyPath) -> list[Any]:

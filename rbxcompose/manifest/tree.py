@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import field
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import field, replace
+from typing import TypeVar
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Span
@@ -95,6 +96,7 @@ class MappingNode:
 
 
 TreeNode = ScalarNode | SequenceNode | MappingNode
+N = TypeVar("N", ScalarNode, SequenceNode, MappingNode, TreeNode)
 
 
 def children(node: TreeNode) -> Iterable[tuple[Key, TreeNode]]:
@@ -106,11 +108,6 @@ def children(node: TreeNode) -> Iterable[tuple[Key, TreeNode]]:
             return [(name, entry.value) for name, entry in entries.items()]
         case SequenceNode(items=items):
             return enumerate(items)
-
-
-def entries_of(node: TreeNode | None) -> Iterable[tuple[str, Entry]]:
-    """Return the entries of a map; nothing of any other node."""
-    return node.entries.items() if isinstance(node, MappingNode) else ()
 
 
 def all_nodes(root: TreeNode) -> Iterator[TreeNode]:
@@ -130,17 +127,30 @@ def scalars(root: TreeNode | None) -> Iterator[ScalarNode]:
     return (node for node in (all_nodes(root) if root is not None else ()) if isinstance(node, ScalarNode))
 
 
-def with_children(node: TreeNode, change: Callable[[Key, TreeNode], TreeNode]) -> TreeNode:
+def entries_of(node: TreeNode | None) -> Mapping[str, Entry]:
+    """Return the entries of a map; none for any other node, or none."""
+    return node.entries if isinstance(node, MappingNode) else {}
+
+
+def only(root: MappingNode, *keys: str) -> MappingNode:
+    """Return a map with only these of its keys."""
+    return replace(root, entries={name: entry for name, entry in root.entries.items() if name in keys})
+
+
+def without(root: MappingNode, *keys: str) -> MappingNode:
+    """Return a map without these of its keys."""
+    return replace(root, entries={name: entry for name, entry in root.entries.items() if name not in keys})
+
+
+def with_children(node: N, change: Callable[[Key, TreeNode], TreeNode]) -> N:
     """Return a node with `change` applied to each node directly below it; the same node if nothing changes."""
     changed = {key: new for key, below in children(node) if (new := change(key, below)) is not below}
     match node:
         case MappingNode(entries=entries) if changed:
             new_ones = {name: Entry(entry.key, changed.get(name, entry.value)) for name, entry in entries.items()}
-            return MappingNode(new_ones, node.span, node.tag)
+            return replace(node, entries=new_ones)
         case SequenceNode(items=items) if changed:
-            return SequenceNode(
-                tuple(changed.get(index, item) for index, item in enumerate(items)), node.span, node.tag
-            )
+            return replace(node, items=tuple(changed.get(index, item) for index, item in enumerate(items)))
     return node
 
 

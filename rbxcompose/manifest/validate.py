@@ -116,12 +116,7 @@ def _key_above(model: Any, loc: tree.KeyPath, node: tree.TreeNode | None) -> str
     if not isinstance(node, tree.MappingNode) or not node.entries:
         return ""
     fields = (pair for cls in models_at(model, loc[:-1]) for pair in field_types(cls).items())
-    maps = (
-        (name, alternative)
-        for name, hint in fields
-        for alternative in alternatives(hint)
-        if get_origin(alternative) is dict
-    )
+    maps = ((name, one) for name, hint in fields for one in alternatives(hint) if get_origin(one) is dict)
     return next((name for name, one in maps if node.entries.keys() & {*keys_at(get_args(one)[1], ())}), "")
 
 
@@ -338,8 +333,7 @@ def _unknown_key(
     is_foreign = FOREIGN.get(key) in missing
     meant = [FOREIGN[key]] if is_foreign else get_close_matches(key, missing, n=1, cutoff=SIMILAR)
     message = f"unknown key '{plain(key, 60)}' in {where((*path, *loc[:-1]))}"
-    above = tree.at(node, loc[:-1])
-    taken = above.entries if isinstance(above, tree.MappingNode) else ()
+    taken = tree.entries_of(tree.at(node, loc[:-1]))
     finding = UNKNOWN_KEY.misspelt(tree.key_span(node, loc), message, key, meant or known, KEYS, taken=taken)
     return finding, meant[0] if meant else ""
 
@@ -384,10 +378,8 @@ def _finding(model: Any, node: tree.TreeNode, path: tree.KeyPath, loc: tree.KeyP
             bound = format_quantity(context[key], dimension) if dimension else context[key]
             return OUT_OF_RANGE.at(span, f"'{name}' must be {words} {bound}")
         case kind_of_error if kind_of_error in EXPECTED:
-            message, help_text = (
-                f"'{name}' must be {EXPECTED[kind_of_error]}",
-                help_of_form(model, loc, value, error["type"]),
-            )
+            message = f"'{name}' must be {EXPECTED[kind_of_error]}"
+            help_text = help_of_form(model, loc, value, kind_of_error)
             return WRONG_TYPE.at(span, message, label=label_of(value), help=help_text)
     if "valid" in context:  # a validator of ours that supplies the valid names
         message = error["msg"] if is_key else f"'{name}': {error['msg']}"

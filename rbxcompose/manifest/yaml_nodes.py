@@ -9,7 +9,7 @@ import yaml
 from rbxcompose.base.findings import Finding, Related, Report, Span, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.manifest import slips
-from rbxcompose.manifest.tree import DATA_NODES, DEPTH, NODES, MappingNode, TreeNode, is_larger
+from rbxcompose.manifest.tree import DATA_NODES, DEPTH, NODES, TreeNode, entries_of, is_larger
 
 _NO_SIGIL = "@`%>|"  # at the beginning of a text; `&`, `*` and `!` may have been meant as such
 _TWO_KEYS = re.compile(r"[\w.$-]+ +([a-z_]+: [^:]+)")  # the value of one key, and another key
@@ -231,7 +231,7 @@ def compose(text: str, file: str) -> tuple[yaml.Node | None, Finding | None]:
 
 def is_moderate(section: TreeNode | None, what: str, report: Report) -> bool:
     """Return whether every entry of a section is small enough for a mission, after a finding for each that is not."""
-    entries = section.entries.values() if isinstance(section, MappingNode) else ()
+    entries = entries_of(section).values()
     large = [entry for entry in entries if is_larger(entry.value, DATA_NODES)]
     for entry in large:
         message = f"the {what} '{entry.key.text}' holds more than {DATA_NODES:,} values"

@@ -1,8 +1,8 @@
-"""The ports of a running component: the runtime binds them to the bus, tests to whatever they like."""
+"""The ports and windows of a running component: the runtime binds them to the bus, tests to whatever they like."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import StrEnum
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, Transform3
@@ -25,11 +25,9 @@ class Sender(Protocol[M_contra]):
     @property
     def is_wanted(self) -> bool:
         """Return whether anything would receive a message now; a costly one need not be made for nobody."""
-        ...
 
     def __call__(self, message: M_contra, /) -> None:
         """Publish `message`."""
-        ...
 
 
 class OrderSender(Sender[M_contra], Protocol[M_contra]):
@@ -38,11 +36,9 @@ class OrderSender(Sender[M_contra], Protocol[M_contra]):
     @property
     def listeners(self) -> frozenset[bytes]:
         """Return the components that would receive an order now, each by a unique name that changes at a restart."""
-        ...
 
     def watch(self, changed: Callable[[], None], /) -> None:
         """Call `changed` whenever a subscriber appears or disappears."""
-        ...
 
 
 class Latest(Protocol[M_co]):
@@ -51,12 +47,10 @@ class Latest(Protocol[M_co]):
     @property
     def value(self) -> M_co | None:
         """Return the newest message, or None before the first one."""
-        ...
 
     @property
     def age(self) -> float:
         """Return the time since the newest message arrived [s]; infinite before the first one."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,11 +89,9 @@ class Caller(Protocol[Q_contra, R]):
     @property
     def is_available(self) -> bool:
         """Return whether a server is known."""
-        ...
 
     def __call__(self, request: Q_contra, then: Callable[[Reply[R]], None], /, *, timeout: float = 5.0) -> None:
         """Send `request`; `then` is called with the reply, or with an error after `timeout` [s]."""
-        ...
 
 
 class Outcome(StrEnum):
@@ -130,33 +122,26 @@ class ServedGoal(Protocol[G_co, R_contra, F_contra]):
     @property
     def request(self) -> G_co:
         """Return the goal as sent."""
-        ...
 
     @property
     def cancel_requested(self) -> bool:
         """Return whether the goal should end soon, by `canceled`."""
-        ...
 
     @property
     def is_paused(self) -> bool:
         """Return whether the goal is paused: hold it as it is until it continues or is cancelled."""
-        ...
 
     def feedback(self, message: F_contra, /) -> None:
         """Send feedback to the client."""
-        ...
 
     def succeeded(self, result: R_contra | None = None, /) -> None:
         """End the goal as succeeded; without a result its zero value is sent."""
-        ...
 
     def aborted(self, reason: str = "", result: R_contra | None = None, /) -> None:
         """End the goal as failed; the reason goes to the log, and into the result unless one is given."""
-        ...
 
     def canceled(self, result: R_contra | None = None, /) -> None:
         """End the goal because its client or a stop requested it."""
-        ...
 
 
 class ActionServer(Protocol[G_co, R_contra, F_contra]):
@@ -165,7 +150,6 @@ class ActionServer(Protocol[G_co, R_contra, F_contra]):
     @property
     def current(self) -> ServedGoal[G_co, R_contra, F_contra] | None:
         """Return the accepted goal, or None; a newer goal replaces it."""
-        ...
 
 
 class SentGoal(Protocol):
@@ -173,7 +157,6 @@ class SentGoal(Protocol):
 
     def cancel(self) -> None:
         """Request the server to end the goal; `Ended` still follows."""
-        ...
 
 
 class ActionCaller(Protocol[G_contra, R, F_co]):
@@ -182,13 +165,11 @@ class ActionCaller(Protocol[G_contra, R, F_co]):
     @property
     def is_available(self) -> bool:
         """Return whether a server is known."""
-        ...
 
     def __call__(
         self, goal: G_contra, then: Callable[[Ended[R]], None], feedback: Callable[[F_co], None] | None = None, /
     ) -> SentGoal:
         """Send `goal`; `then` is called with its end exactly once."""
-        ...
 
 
 class Window(Protocol):
@@ -197,11 +178,9 @@ class Window(Protocol):
     @property
     def is_watched(self) -> bool:
         """Return whether there is a subscriber; without one, nothing need be prepared."""
-        ...
 
     def put(self, value: object, /) -> None:
         """Send an update, as data for JSON."""
-        ...
 
 
 class Look(Protocol):
@@ -209,7 +188,6 @@ class Look(Protocol):
 
     def now(self) -> Pose2 | None:
         """Return the newest pose [m, m, rad], or None while the frames are not connected."""
-        ...
 
     def transform(self, *, at: int | None = None) -> Transform3:
         """Return the newest pose in space, or the one at a stamp [ns], interpolated.
@@ -217,4 +195,41 @@ class Look(Protocol):
         Raises:
             LookupError: if there is none; the text names the frames or the times that there are.
         """
-        ...
+
+
+KeyedParts = Mapping[str, Any]
+
+
+class KeyFeed:
+    """What a window tells of something with named parts: all of them at first, then what is new, if anybody watches.
+
+    An update is `{"whole": bool, "changed": {...}, "gone": [...]}`; a whole one replaces what was known. The messages
+    around them are those of `bus/window.py`.
+    """
+
+    def __init__(self, window: Window) -> None:
+        self._window = window
+        self._sent: KeyedParts | None = None  # None while nobody watched
+
+    def update(self, parts: KeyedParts) -> None:
+        """Send what differs from what was told last."""
+        before, self._sent = self._sent, dict(parts) if self._window.is_watched else None
+        if self._sent is None or self._sent == before:
+            return
+        self._window.put(whole(parts) if before is None else _difference(before, parts))
+
+
+def whole(parts: KeyedParts) -> dict[str, Any]:
+    """Return all parts as an update."""
+    return {"whole": True, "changed": dict(parts), "gone": []}
+
+
+def _difference(before: KeyedParts, parts: KeyedParts) -> dict[str, Any]:
+    changed = {key: part for key, part in parts.items() if key not in before or before[key] != part}
+    return {"whole": False, "changed": changed, "gone": [key for key in before if key not in parts]}
+
+
+def added(known: KeyedParts, update: KeyedParts) -> dict[str, Any]:
+    """Return what is known after an update."""
+    kept = {} if update["whole"] else {key: entry for key, entry in known.items() if key not in update["gone"]}
+    return {**kept, **update["changed"]}

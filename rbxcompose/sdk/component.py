@@ -83,55 +83,43 @@ class Context(Protocol):
     @property
     def is_stopped(self) -> bool:
         """Return whether the robot is held by a stop."""
-        ...
 
     @property
     def starts_mission(self) -> bool:
         """Return whether the mission of `start` is to start: not when it is over, nor because files have changed."""
-        ...
 
     @property
     def is_again(self) -> bool:
         """Return whether it was already started since the robot came up: it, or its process, has failed since."""
-        ...
 
     @property
     def is_over(self) -> bool:
         """Return whether nobody waits any more for the call that runs: one that may block should return soon."""
-        ...
 
     @property
     def address(self) -> BusAddress:
         """Return where the robot is on the bus."""
-        ...
 
     def log(self, level: Level, text: str) -> None:
         """Write one event of the robot's story."""
-        ...
 
     def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
         """Report the component's state to diagnostics."""
-        ...
 
     def watch(self, name: str, task: DiagnosticTask) -> None:
         """Report how `task` stands to diagnostics, once a second while the component is active."""
-        ...
 
     def wake_at(self, time: float) -> None:
         """Call the component's `wake` at robot time `time` [s]; earlier requests remain."""
-        ...
 
     def notify(self, event: RobotEvent) -> None:
         """Report something that concerns the whole robot to the supervisor."""
-        ...
 
     def repeat(self, requests: Sequence[Command]) -> None:
         """Send these, instead of earlier ones, to the component again after it was restarted."""
-        ...
 
     def window(self, path: str, question: Query[Any]) -> Window:
         """Open a window for tools outside at `path`; queries there get the component's answer to `question`."""
-        ...
 
     def listen(self, port: In[Any]) -> None:
         """Subscribe to the topic of an input, named like one of `ports` or anew, instead of what its name had before.
@@ -141,11 +129,9 @@ class Context(Protocol):
         Raises:
             Refused: if its topic is no name of ROS, or one on which the component itself publishes.
         """
-        ...
 
     def mute(self, name: str) -> None:
         """End the subscription of an input; do nothing if there is none."""
-        ...
 
 
 class Component(Generic[C]):

@@ -25,32 +25,20 @@ from rbxcompose.msgs.rbxcompose_parameters import NodeChange
 
 LOWEST, HIGHEST = -(2**63), 2**63 - 1  # of an integer on the wire
 
-_SINGLE = {
-    rcl_interfaces.ParameterType.PARAMETER_BOOL: "bool_value",
-    rcl_interfaces.ParameterType.PARAMETER_INTEGER: "integer_value",
-    rcl_interfaces.ParameterType.PARAMETER_DOUBLE: "double_value",
-    rcl_interfaces.ParameterType.PARAMETER_STRING: "string_value",
+_KIND = rcl_interfaces.ParameterType
+# By type: the field with the value, the words for it, and for a single value the type of several.
+_TYPES: Mapping[int, tuple[str, str, int]] = {
+    _KIND.PARAMETER_BOOL: ("bool_value", "a flag", _KIND.PARAMETER_BOOL_ARRAY),
+    _KIND.PARAMETER_INTEGER: ("integer_value", "a whole number", _KIND.PARAMETER_INTEGER_ARRAY),
+    _KIND.PARAMETER_DOUBLE: ("double_value", "a number", _KIND.PARAMETER_DOUBLE_ARRAY),
+    _KIND.PARAMETER_STRING: ("string_value", "text", _KIND.PARAMETER_STRING_ARRAY),
+    _KIND.PARAMETER_BYTE_ARRAY: ("byte_array_value", "bytes", 0),
+    _KIND.PARAMETER_BOOL_ARRAY: ("bool_array_value", "flags", 0),
+    _KIND.PARAMETER_INTEGER_ARRAY: ("integer_array_value", "whole numbers", 0),
+    _KIND.PARAMETER_DOUBLE_ARRAY: ("double_array_value", "numbers", 0),
+    _KIND.PARAMETER_STRING_ARRAY: ("string_array_value", "texts", 0),
 }
-_ARRAYS = {
-    rcl_interfaces.ParameterType.PARAMETER_BYTE_ARRAY: "byte_array_value",
-    rcl_interfaces.ParameterType.PARAMETER_BOOL_ARRAY: "bool_array_value",
-    rcl_interfaces.ParameterType.PARAMETER_INTEGER_ARRAY: "integer_array_value",
-    rcl_interfaces.ParameterType.PARAMETER_DOUBLE_ARRAY: "double_array_value",
-    rcl_interfaces.ParameterType.PARAMETER_STRING_ARRAY: "string_array_value",
-}
-
-
-TYPE_WORDS = {
-    rcl_interfaces.ParameterType.PARAMETER_BOOL: "a flag",
-    rcl_interfaces.ParameterType.PARAMETER_INTEGER: "a whole number",
-    rcl_interfaces.ParameterType.PARAMETER_DOUBLE: "a number",
-    rcl_interfaces.ParameterType.PARAMETER_STRING: "text",
-    rcl_interfaces.ParameterType.PARAMETER_BYTE_ARRAY: "bytes",
-    rcl_interfaces.ParameterType.PARAMETER_BOOL_ARRAY: "flags",
-    rcl_interfaces.ParameterType.PARAMETER_INTEGER_ARRAY: "whole numbers",
-    rcl_interfaces.ParameterType.PARAMETER_DOUBLE_ARRAY: "numbers",
-    rcl_interfaces.ParameterType.PARAMETER_STRING_ARRAY: "texts",
-}
+TYPE_WORDS = {number: words for number, (_, words, _) in _TYPES.items()}
 
 
 def to_message(value: object) -> rcl_interfaces.ParameterValue | None:
@@ -60,8 +48,7 @@ def to_message(value: object) -> rcl_interfaces.ParameterValue | None:
 
 
 def _made(number: int, value: object) -> rcl_interfaces.ParameterValue:
-    name = {**_SINGLE, **_ARRAYS}.get(number)
-    fields: dict[str, object] = {name: value} if name else {}
+    fields: dict[str, object] = {_TYPES[number][0]: value} if number in _TYPES else {}
     return rcl_interfaces.ParameterValue(type=number, **fields)  # type: ignore[arg-type]
 
 
@@ -69,15 +56,15 @@ def parameter_type(value: object) -> int | None:
     """Return the number of the type of a value, None if it is of no type that a parameter has; None is not set."""
     match value:
         case None:
-            return rcl_interfaces.ParameterType.PARAMETER_NOT_SET
+            return _KIND.PARAMETER_NOT_SET
         case bool():
-            return rcl_interfaces.ParameterType.PARAMETER_BOOL
+            return _KIND.PARAMETER_BOOL
         case int() if not isinstance(value, Enum):
-            return rcl_interfaces.ParameterType.PARAMETER_INTEGER if LOWEST <= value <= HIGHEST else None
+            return _KIND.PARAMETER_INTEGER if LOWEST <= value <= HIGHEST else None
         case float():
-            return rcl_interfaces.ParameterType.PARAMETER_DOUBLE
+            return _KIND.PARAMETER_DOUBLE
         case str() | Enum(value=str()):
-            return rcl_interfaces.ParameterType.PARAMETER_STRING
+            return _KIND.PARAMETER_STRING
         case tuple() | list():
             return _array_type(value)
     return None
@@ -85,29 +72,23 @@ def parameter_type(value: object) -> int | None:
 
 def _array_type(values: Sequence[object]) -> int | None:
     numbers = {parameter_type(each) for each in values}
-    if numbers == {rcl_interfaces.ParameterType.PARAMETER_INTEGER, rcl_interfaces.ParameterType.PARAMETER_DOUBLE}:
-        return rcl_interfaces.ParameterType.PARAMETER_DOUBLE_ARRAY
+    if numbers == {_KIND.PARAMETER_INTEGER, _KIND.PARAMETER_DOUBLE}:
+        return _KIND.PARAMETER_DOUBLE_ARRAY
     if not numbers:
-        return rcl_interfaces.ParameterType.PARAMETER_STRING_ARRAY
+        return _KIND.PARAMETER_STRING_ARRAY
     number = numbers.pop()
     if numbers or any(isinstance(each, Enum) for each in values):
         return None
-    return {
-        rcl_interfaces.ParameterType.PARAMETER_BOOL: rcl_interfaces.ParameterType.PARAMETER_BOOL_ARRAY,
-        rcl_interfaces.ParameterType.PARAMETER_INTEGER: rcl_interfaces.ParameterType.PARAMETER_INTEGER_ARRAY,
-        rcl_interfaces.ParameterType.PARAMETER_DOUBLE: rcl_interfaces.ParameterType.PARAMETER_DOUBLE_ARRAY,
-        rcl_interfaces.ParameterType.PARAMETER_STRING: rcl_interfaces.ParameterType.PARAMETER_STRING_ARRAY,
-    }.get(number or 0)
+    return _TYPES.get(number or 0, ("", "", 0))[2] or None
 
 
 def from_message(message: rcl_interfaces.ParameterValue) -> object:
     """Return the value in a message, lists as tuples; None if it is not set."""
-    if name := _SINGLE.get(message.type):
-        return getattr(message, name)
-    if name := _ARRAYS.get(message.type):
-        values = getattr(message, name)
-        return tuple(values.tolist() if hasattr(values, "tolist") else values)
-    return None
+    if message.type not in _TYPES:
+        return None
+    field, _, several = _TYPES[message.type]
+    value = getattr(message, field)
+    return value if several else tuple(value.tolist() if hasattr(value, "tolist") else value)
 
 
 Configs = Mapping[str, Config]  # by component
@@ -155,7 +136,6 @@ class RobotRules(Protocol):
 
     def why_not(self, now: Configs, new: Configs) -> ChangeRefusal | None:
         """Return what `new` configurations break that was not broken before, where others have those of `now`."""
-        ...
 
 
 C = TypeVar("C", bound=Config)
@@ -302,9 +282,8 @@ def settings(config: Config, bounds: SettingBounds = NO_BOUNDS) -> dict[str, Par
     for name, field in type(config).model_fields.items():
         for setting in _settings_of(name, getattr(config, name), field, type(config)):
             is_whole = setting.name in fields
-            found[setting.name] = replace(
-                setting, is_whole=is_whole, bounds=bounds.get(setting.name, ()) if is_whole else ()
-            )
+            own = bounds.get(setting.name, ()) if is_whole else ()
+            found[setting.name] = replace(setting, is_whole=is_whole, bounds=own)
     return found
 
 

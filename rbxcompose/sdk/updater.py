@@ -112,9 +112,8 @@ class CompositeTask:
         messages = [
             item.message for item in found if item.message and (level is Level.OK or item.level is not Level.OK)
         ]
-        return TaskStatus(
-            level, "; ".join(messages), {key: value for item in found for key, value in item.values.items()}
-        )
+        values = {key: value for item in found for key, value in item.values.items()}
+        return TaskStatus(level, "; ".join(messages), values)
 
 
 def heartbeat(now: float) -> TaskStatus:

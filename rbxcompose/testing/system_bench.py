@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 from rbxcompose.base.clock import SteppedClock
-from rbxcompose.compiler.systems.exchange import exchanges
 from rbxcompose.compiler.systems.model import System
+from rbxcompose.compiler.systems.share import exchanges
 from rbxcompose.msgs import registry
 from rbxcompose.runtime.process_group.exchange import Way, carry
 from rbxcompose.testing.bench import Bench

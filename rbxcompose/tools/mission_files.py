@@ -38,7 +38,7 @@ from rbxcompose.missions.program.program import Skill
 from rbxcompose.missions.sources import SkillSource, SkillWay
 from rbxcompose.missions.view.picture import MissionPicture, picture_from_data, picture_of
 from rbxcompose.missions.view.replica import joined, status_list
-from rbxcompose.sdk.skills import skill_names
+from rbxcompose.sdk.registry import skill_names
 from rbxcompose.tools.inspection.mission_text import mission_dot, mission_mermaid, mission_sentences, mission_text
 from rbxcompose.tools.inspection.pages import mission_html
 from rbxcompose.tools.mission_tests.explorer import ExplorationLimits, text_of

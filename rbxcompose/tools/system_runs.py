@@ -17,9 +17,8 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.bundle import NOT_EXPORTED, Bundle, bundle_of
 from rbxcompose.compiler.systems.certificates import NO_SECURITY, common_name, folder_of, tls_of
-from rbxcompose.compiler.systems.exchange import exchange_of
 from rbxcompose.compiler.systems.model import PlacedRobot, System
-from rbxcompose.compiler.systems.share import robots_on, share_of
+from rbxcompose.compiler.systems.share import exchange_of, robots_on, share_of
 from rbxcompose.runtime.folder import ChosenLayers, RobotFolder, RunOptions
 from rbxcompose.runtime.supervision.plan_change import Fate
 from rbxcompose.tools.commands.security import certificate_findings

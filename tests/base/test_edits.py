@@ -7,8 +7,7 @@ import difflib
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.base.findings import Edit, Finding, Fix, Span, replacement
-from rbxcompose.base.fixes import apply, exact, safe_fixes
+from rbxcompose.base.findings import Edit, Finding, Fix, Span, apply_fixes, exact_fix, replacement, safe_fixes
 
 TEXTS = st.text(st.sampled_from("ab:漢é \n"), max_size=60)
 
@@ -18,7 +17,7 @@ def span(line: int, column: int, length: int, file: str = "f") -> Span:
 
 
 def fixed(text: str, *fixes: Fix) -> str:
-    return apply(fixes, {"f": text}).texts["f"]
+    return apply_fixes(fixes, {"f": text}).texts["f"]
 
 
 def span_at(text: str, start: int, end: int) -> Span:
@@ -54,7 +53,7 @@ def test_edits_of_one_run_never_meet(text: str, places: list[tuple[int, int]]) -
         Fix((Edit(span_at(text, start, end), text[start:end], f"<{number}>"),), True, str(number))
         for number, (start, end) in enumerate(ranges)
     ]
-    out = apply(fixes, {"f": text})
+    out = apply_fixes(fixes, {"f": text})
     assert len(out.done) + len(out.postponed) == len(fixes)
     kept = out.texts["f"]
     for fix in out.done:
@@ -80,7 +79,7 @@ def test_a_value_in_quotes_is_changed_within_them() -> None:
 
 def test_of_two_fixes_that_meet_the_first_is_applied_and_the_other_told() -> None:
     first, second = replacement(span(1, 1, 2), "ab", "x"), replacement(span(1, 2, 2), "bc", "y")
-    out = apply([first, second, first], {"f": "abc"})
+    out = apply_fixes([first, second, first], {"f": "abc"})
     assert (out.texts, out.done, out.postponed) == ({"f": "xc"}, [first], [second])
 
 
@@ -106,11 +105,11 @@ def test_only_safe_fixes_that_fit_and_lie_in_files_count() -> None:
 
 
 def test_an_exact_fix_says_where_it_lands() -> None:
-    moved = exact(replacement(span(1, 4, 5), "dok", "dock"), {"f": "a: 'dok'"})
+    moved = exact_fix(replacement(span(1, 4, 5), "dok", "dock"), {"f": "a: 'dok'"})
     assert moved
     assert moved.edits[0].span == span(1, 5, 3)
-    assert exact(replacement(span(1, 4, 5), "dok", "dock"), {"f": "a: other"}) is None
-    assert exact(None, {}) is None
+    assert exact_fix(replacement(span(1, 4, 5), "dok", "dock"), {"f": "a: other"}) is None
+    assert exact_fix(None, {}) is None
 
 
 def test_the_difference_is_the_line_that_was_wrong() -> None:

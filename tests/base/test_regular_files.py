@@ -15,7 +15,6 @@ PACKAGE = Path(rbxcompose.__file__).parent
 OPENING = re.compile(r"(?<![\w.])(?<!def )open\(|\bos\.open\(|\.open\(\s*[a-zA-Z]*[\"']|\.read_(?:text|bytes)\(")
 # What these open is no file that a user names: the package's own data, what the system tells, files of a running robot.
 MAY_OPEN = {
-    "base/fenced_answers.py",
     "base/files.py",
     "base/plugins.py",
     "base/processes.py",

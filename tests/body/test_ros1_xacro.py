@@ -10,8 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.base.findings import KINDS, Finding, Span
-from rbxcompose.base.fixes import apply
+from rbxcompose.base.findings import KINDS, Finding, Span, apply_fixes
 from rbxcompose.commands.finding_pages import body_of
 from rbxcompose.domains.body.xacro import Expanded
 from rbxcompose.manifest.files import library_root, shown_name
@@ -198,7 +197,7 @@ def test_the_fix_of_any_file_gives_back_the_prefixes_that_it_lost(inside: str, t
     assert read.text.replace("cart.xacro", "modern.xacro").split() == found.text.split()
     assert len(read.notes) == ("[" in whole)
     file = shown_name(tmp_path / "cart.xacro")
-    assert apply([note.fix for note in read.notes if note.fix], {file: old}).texts[file] == modern
+    assert apply_fixes([note.fix for note in read.notes if note.fix], {file: old}).texts[file] == modern
 
 
 def test_a_pattern_includes_the_files_that_fit_it_in_their_order(tmp_path: Path) -> None:

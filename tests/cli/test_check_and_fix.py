@@ -14,8 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.base.files import replace_file
-from rbxcompose.base.findings import Finding, Fix, Sources
-from rbxcompose.base.fixes import safe_fixes
+from rbxcompose.base.findings import Finding, Fix, Sources, safe_fixes
 from rbxcompose.commands import main as command
 from rbxcompose.tools.commands import check as fixes
 from tests.soak import rare

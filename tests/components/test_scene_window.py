@@ -16,7 +16,7 @@ from rbxcompose.msgs.moveit_msgs import CollisionObject
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm
 from rbxcompose.msgs.shape_msgs import SolidPrimitive
 from rbxcompose.runtime.process_group.host import Host
-from rbxcompose.sdk.key_feed import KeyFeed, added, whole
+from rbxcompose.sdk.bound import KeyFeed, added, whole
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import instance
 from tests.bus.conftest import Network, network

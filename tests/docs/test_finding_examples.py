@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.base.findings import FindingKind
-from rbxcompose.base.fixes import safe_fixes
+from rbxcompose.base.findings import FindingKind, safe_fixes
 from rbxcompose.commands.finding_pages import all_kinds, body_of
 from rbxcompose.testing.manifests import Checked
 from tests.docs.examples import HEADER, ROBOT, check_mission, check_robot, profiles_of, with_sections

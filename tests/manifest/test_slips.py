@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from rbxcompose.base.config import Config, Length
-from rbxcompose.base.findings import Finding, Report
-from rbxcompose.base.fixes import apply, safe_fixes
+from rbxcompose.base.findings import Finding, Report, apply_fixes, safe_fixes
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import validate
@@ -38,7 +37,7 @@ def told(text: str) -> Finding:
 
 
 def cured(text: str) -> str:
-    return apply(safe_fixes([told(text)], {FILE: text}), {FILE: text}).texts.get(FILE, text)
+    return apply_fixes(safe_fixes([told(text)], {FILE: text}), {FILE: text}).texts.get(FILE, text)
 
 
 @pytest.mark.parametrize(
@@ -129,7 +128,7 @@ def test_the_first_line_is_written_where_it_is_missing(above: str, tmp_path: Pat
     (finding,) = checked.compilation.report
     assert finding.help == "write 'rbx: 1' in the first line: the version of the language"
     sources = checked.compilation.sources
-    (text,) = apply(safe_fixes([finding], sources), sources).texts.values()
+    (text,) = apply_fixes(safe_fixes([finding], sources), sources).texts.values()
     assert text == f"{above}rbx: 1\n{ROBOT}"
     assert not check_text(text, tmp_path).compilation.report.has_errors
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.base.findings import Report
-from rbxcompose.base.fixes import apply, safe_fixes
+from rbxcompose.base.findings import Report, apply_fixes, safe_fixes
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
@@ -63,7 +62,7 @@ def report_of(text: str) -> Report:
 def cured(text: str) -> str:
     """Return a text after all safe fixes."""
     for _ in range(5):
-        text = apply(safe_fixes(report_of(text), {FILE: text}), {FILE: text}).texts.get(FILE, text)
+        text = apply_fixes(safe_fixes(report_of(text), {FILE: text}), {FILE: text}).texts.get(FILE, text)
     return text
 
 

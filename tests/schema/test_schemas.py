@@ -20,7 +20,7 @@ from referencing import Registry, Resource
 from rbxcompose.base.config import Config, Length, Time
 from rbxcompose.commands.main import main as command
 from rbxcompose.compiler.schema.documents import as_text, files, makers
-from rbxcompose.compiler.schema.settle import referred
+from rbxcompose.compiler.schema.scalars import referred
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.registry import FILES, file_model
 from rbxcompose.manifest.validate import to_plain

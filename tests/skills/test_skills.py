@@ -10,10 +10,10 @@ import pytest
 
 from rbxcompose.base.expressions.types import COUNT, FLAG, PLACE, TEXT, TYPES, choice_of
 from rbxcompose.sdk import Activity, Place, Speed, skill
-from rbxcompose.sdk.skills import PLUGINS, skill_names, skill_type
+from rbxcompose.sdk.registry import SKILL_PLUGINS, skill_names, skill_type
 from rbxcompose.testing import clock_uses
 
-all_skills = pytest.mark.parametrize("name", sorted(PLUGINS.names()))
+all_skills = pytest.mark.parametrize("name", sorted(SKILL_PLUGINS.names()))
 
 
 @all_skills

@@ -10,8 +10,8 @@ import pytest
 
 from rbxcompose.commands.main import main
 from rbxcompose.compiler.plan.model import LinkTls
-from rbxcompose.compiler.systems.audit import NETWORK, ReachableKey, listeners, reachable_keys
 from rbxcompose.compiler.systems.certificates import common_name, make_authority, make_certificate, tls_of
+from rbxcompose.compiler.systems.share import NETWORK, ReachableKey, listeners, reachable_keys
 from rbxcompose.tools.commands.security import certificate_findings
 from tests.systems.test_shares import SYSTEM
 

@@ -17,8 +17,8 @@ from rbxcompose.bus.names import data_key
 from rbxcompose.bus.zenoh_session import RouterLink, exchange_settings, open_exchange, open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.compiler.plan.model import BusPlan, Exchange, SharedWire
-from rbxcompose.compiler.systems.exchange import exchange_of
 from rbxcompose.compiler.systems.reader import compile_system
+from rbxcompose.compiler.systems.share import exchange_of
 from rbxcompose.msgs.std_msgs import Int64, String
 from rbxcompose.runtime.process_group.connection import CallbackInbox
 from rbxcompose.runtime.process_group.exchange import RobotExchange

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.base.findings import Severity
-from rbxcompose.compiler.systems.exchange import exchange_of
 from rbxcompose.compiler.systems.reader import compile_system
+from rbxcompose.compiler.systems.share import exchange_of
 from rbxcompose.manifest.system_file import HostModel, LinkModel, SystemFile, SystemRobotModel
 from tests.conftest import ROOT
 

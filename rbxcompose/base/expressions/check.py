@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from rbxcompose.base import units
 from rbxcompose.base.dataclass import dataclass
@@ -49,7 +49,14 @@ def missing_unit(node: tree.ExpressionNode, dimension: units.Dimension) -> str:
     return units.bare_number_help(dimension, sign * node.value) if isinstance(node, tree.Number) else ""
 
 
-def other_unit(left: tuple[tree.ExpressionNode, Type], right: tuple[tree.ExpressionNode, Type]) -> str:
+class _Typed(NamedTuple):
+    """A node with its type."""
+
+    node: tree.ExpressionNode
+    type: Type
+
+
+def other_unit(left: _Typed, right: _Typed) -> str:
     """Return the units of a literal quantity next to one that is not, or where a name gets its unit."""
     for (written, bare), (other, kind) in ((left, right), (right, left)):
         dimension = kind.dimension
@@ -71,23 +78,23 @@ _DECLARED = "'inputs' or 'data' of the mission, as 'save' of a step, or as 'valu
 
 
 class StaticScope(Protocol):
-    """The names that exist, and their types."""
+    """The names that exist, and their types; a subclass knows what it overrides, and nothing else."""
 
     def variable(self, name: str) -> Type | None:
         """Return the type of `$name`; None if there is no such name."""
-        ...
+        return None
 
     def word(self, name: str) -> Type | None:
         """Return the type of what a bare word names; None if it names nothing. Choices need not be known."""
-        ...
+        return None
 
     def variables(self) -> Iterable[str]:
         """Return the names that `variable` knows, without '$'."""
-        ...
+        return ()
 
     def words(self) -> Iterable[str]:
         """Return the names that `word` knows."""
-        ...
+        return ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -310,11 +317,7 @@ class _Checker:
                 if fix := missing_unit(bare.node, measured.type.dimension):
                     return self.wrong(node, f"{measured.type.phrase} {verb} a bare number", fix)
                 return measured.type
-        return self.wrong(
-            node,
-            f"{left.type.phrase} {verb} {right.type.phrase}",
-            other_unit((left.node, left.type), (right.node, right.type)),
-        )
+        return self.wrong(node, f"{left.type.phrase} {verb} {right.type.phrase}", other_unit(left, right))
 
     def is_measured(self, typed: _Typed) -> bool:
         """Return whether a value can be computed with; report it if not."""
@@ -387,14 +390,6 @@ class _Checker:
         if group.kind not in (TypeKind.LIST, TypeKind.UNKNOWN):
             return self.wrong(first, f"{node.function}() needs several values or a list; this is {group.phrase}")
         return group.entry if self.is_measured(_Typed(first, group.entry)) else UNKNOWN
-
-
-@dataclass(frozen=True, slots=True)
-class _Typed:
-    """A node with its type."""
-
-    node: tree.ExpressionNode
-    type: Type
 
 
 _NAMES = frozenset({TypeKind.TEXT, TypeKind.CHOICE, TypeKind.PLACE, TypeKind.UNKNOWN})

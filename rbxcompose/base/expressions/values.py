@@ -34,12 +34,10 @@ class Located(Protocol):
     @property
     def x(self) -> float:
         """Return x in `map` [m]."""
-        ...
 
     @property
     def y(self) -> float:
         """Return y in `map` [m]."""
-        ...
 
 
 @runtime_checkable
@@ -49,12 +47,10 @@ class NamedPose(Located, Protocol):
     @property
     def name(self) -> str:
         """Return the name that missions use."""
-        ...
 
     @property
     def heading(self) -> float:
         """Return the heading in `map` [rad]."""
-        ...
 
 
 _LOCATED: dict[type, bool] = {}
@@ -78,23 +74,23 @@ def is_named_pose(value: Value) -> TypeGuard[NamedPose]:
 
 
 class Scope(Protocol):
-    """What is known while the robot runs."""
+    """What is known while the robot runs; a subclass knows what it overrides, and nothing else."""
 
     def variable(self, name: str) -> Value | NotArrived:
         """Return the value of `$name`; raise KeyError if there is no such name."""
-        ...
+        raise KeyError(name)
 
     def word(self, name: str) -> Value:
         """Return what a bare word names: a place, else (a choice, a result) its own text; raise KeyError if nothing."""
-        ...
+        raise KeyError(name)
 
     def age(self, name: str) -> float | NotArrived:
         """Return the time since the last message of `$name` [s]; raise KeyError if there is no such name."""
-        ...
+        raise KeyError(name)
 
     def is_new(self, name: str) -> bool:
         """Return whether a message of `$name` came since this node started; raise KeyError if there is no such name."""
-        ...
+        raise KeyError(name)
 
 
 class EvaluationError(Exception):
@@ -197,10 +193,6 @@ def _number(value: Value) -> float:
     raise ValueError("needs numbers")
 
 
-def _absolute(value: Value) -> float:
-    return abs(_number(value))
-
-
 def _rounded(value: Value) -> float:
     """Round to a whole number, halves away from zero as people do."""
     number = _number(value)
@@ -229,6 +221,6 @@ FUNCTIONS: Mapping[str, Function] = {
     "distance": Function(2, 2, "distance(a, b)", "The length between two places or poses.", _distance),
     "min": Function(1, _MANY, "min(a, b, ...)", "The smallest of several values, or of one list.", _least),
     "max": Function(1, _MANY, "max(a, b, ...)", "The largest of several values, or of one list.", _greatest),
-    "abs": Function(1, 1, "abs(x)", "A number or quantity without its sign.", _absolute),
+    "abs": Function(1, 1, "abs(x)", "A number or quantity without its sign.", lambda value: abs(_number(value))),
     "round": Function(1, 1, "round(x)", "The nearest whole number, halves away from zero; of a bare number.", _rounded),
 }

@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from rbxcompose.base.findings import Finding, Report, Sources, Span
-from rbxcompose.base.fixes import COMMAND_LINE
+from rbxcompose.base.findings import COMMAND_LINE, Finding, Report, Sources, Span
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.formats import output_format
 

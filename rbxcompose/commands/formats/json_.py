@@ -2,8 +2,7 @@
 
 import json
 
-from rbxcompose.base.findings import Finding, Fix, Report, Sources, Span
-from rbxcompose.base.fixes import exact
+from rbxcompose.base.findings import Finding, Fix, Report, Sources, Span, exact_fix
 from rbxcompose.commands.formats import output_format
 
 
@@ -15,7 +14,7 @@ def render_json(report: Report, sources: Sources, colour: bool = False) -> str:
 
 def as_data(finding: Finding, sources: Sources) -> dict[str, object]:
     """Return all that is known of a finding."""
-    fix = exact(finding.fix, sources)
+    fix = exact_fix(finding.fix, sources)
     return {
         "code": finding.code,
         "severity": finding.severity,

@@ -6,8 +6,7 @@ from pathlib import Path, PurePath
 from urllib.parse import quote
 
 import rbxcompose
-from rbxcompose.base.findings import KINDS, Finding, Fix, Related, Report, Sources, Span
-from rbxcompose.base.fixes import COMMAND_LINE, exact
+from rbxcompose.base.findings import COMMAND_LINE, KINDS, Finding, Fix, Related, Report, Sources, Span, exact_fix
 from rbxcompose.commands.finding_pages import page_of
 from rbxcompose.commands.formats import output_format
 
@@ -70,7 +69,7 @@ def _result(finding: Finding, codes: list[str], sources: Sources, main: str | No
     related = dict.fromkeys(one for one in finding.related if not one.span.file.startswith(COMMAND_LINE))
     if related:
         result["relatedLocations"] = [_related(number, one) for number, one in enumerate(related, 1)]
-    fix = exact(finding.fix, sources)
+    fix = exact_fix(finding.fix, sources)
     if fix and not any(edit.span.file.startswith(COMMAND_LINE) for edit in fix.edits):
         result["fixes"] = [_fix(fix)]
     return result

@@ -2,8 +2,7 @@
 
 from collections.abc import Callable, Iterator
 
-from rbxcompose.base.findings import Finding, Related, Report, Severity, Sources, Span
-from rbxcompose.base.fixes import safe_fixes
+from rbxcompose.base.findings import Finding, Related, Report, Severity, Sources, Span, safe_fixes
 from rbxcompose.base.printable import columns, plain
 from rbxcompose.commands.formats import output_format
 

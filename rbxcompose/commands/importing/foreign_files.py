@@ -15,7 +15,7 @@ from rbxcompose.base.units import MOST
 from rbxcompose.commands.new_files import LONGEST_NAME, name_like
 from rbxcompose.manifest import validate
 from rbxcompose.manifest.files import shown_name
-from rbxcompose.manifest.reader import read_source, read_text
+from rbxcompose.manifest.reader import TAG, read_source, read_text
 from rbxcompose.manifest.tree import (
     KEY,
     Entry,
@@ -26,7 +26,6 @@ from rbxcompose.manifest.tree import (
     number_trouble,
     plain_value,
 )
-from rbxcompose.manifest.walk import TAG
 
 PYTHON_OBJECT = kind("RBX2292", Severity.WARNING)
 _AS_TEXT = (".srdf", ".urdf", ".xml", ".launch", ".py")  # others are YAML

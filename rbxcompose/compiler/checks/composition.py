@@ -10,8 +10,8 @@ from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_manifest import About, Claim, HistoryStep, IncludedPart
 from rbxcompose.compiler.model.robot import PortEnd, Robot, resolve
 from rbxcompose.manifest.files import PREFIX
+from rbxcompose.manifest.reader import REPLACE
 from rbxcompose.manifest.tree import ScalarNode, SequenceNode, TreeNode, at
-from rbxcompose.manifest.walk import REPLACE
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Serves, ServesAction, ServesTopic
 
 

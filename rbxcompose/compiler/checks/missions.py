@@ -56,12 +56,10 @@ def beyond_list(robot: Robot) -> Iterator[Finding]:
     for mission in robot.missions.values():
         known = constants(mission)
         for scalar, expression in _expressions(mission.program):
-            if any(
-                isinstance(tree, syntax.FunctionCall) and tree.function == "count"
-                for tree, _ in syntax.walk(expression.tree)
-            ):
+            parts = [part for part, _ in syntax.walk(expression.tree)]
+            if any(isinstance(part, syntax.FunctionCall) and part.function == "count" for part in parts):
                 continue  # the expression checks how long the list is before it takes the item
-            for tree, _ in syntax.walk(expression.tree):
+            for tree in parts:
                 match tree:
                     case syntax.Index(of=syntax.Variable(name=name), index=syntax.Number(value=index)):
                         items, datum = known.get(name), mission.program.data.get(name)
@@ -237,9 +235,8 @@ def start_mission(robot: Robot) -> Iterator[Finding]:
 
 def _files(places: Iterable[Span], start: str) -> list[str]:
     """Return the project's mission files of this name, as the first existing file of `places` has to write them."""
-    writer = next(
-        (path for place in places if (path := Path(place.file)).is_file()), None
-    )  # `--set` and the library: none
+    # `--set` and the library have no file.
+    writer = next((path for place in places if (path := Path(place.file)).is_file()), None)
     found = files_named(f"{start}{_ENDING}", writer) if writer else []
     return [text for text in found if writer and _is_mission(writer.resolve().parent / text)]
 

@@ -8,7 +8,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.evaluate import evaluate
 from rbxcompose.base.expressions.tree import ExpressionError
 from rbxcompose.base.expressions.types import Type, TypeKind
-from rbxcompose.base.expressions.values import EvaluationError, Value
+from rbxcompose.base.expressions.values import EvaluationError, Scope, Value
 from rbxcompose.base.findings import NAMES, OUR_CODES, Finding, Related, Severity
 from rbxcompose.base.units import TIME, format_quantity
 from rbxcompose.compiler.check_runner import check, checks_of
@@ -134,8 +134,8 @@ def parameter_value(robot: Robot) -> Iterator[Finding]:
             yield from found or _beyond(component, setting.parameter.text, value, wanted, known)
 
 
-class _Constants:
-    """What is known before the mission runs."""
+class _Constants(Scope):
+    """What is known before the mission runs: values that nothing changes, no places and no messages."""
 
     def __init__(self, known: Constants) -> None:
         self._known = known
@@ -143,18 +143,6 @@ class _Constants:
     def variable(self, name: str) -> Value:
         """Return a value that nothing changes."""
         return self._known[name]
-
-    def word(self, name: str) -> Value:
-        """Know no places."""
-        raise KeyError(name)
-
-    def age(self, name: str) -> float:
-        """Know no messages."""
-        raise KeyError(name)
-
-    def is_new(self, name: str) -> bool:
-        """Know no messages."""
-        raise KeyError(name)
 
 
 def _beyond(

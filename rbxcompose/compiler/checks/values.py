@@ -339,10 +339,7 @@ def _compared_with_distance(asked: Asked) -> Iterator[Number]:
     """Yield the numbers without a unit that a distance is compared with."""
     for node, _ in walk(asked.expression.tree):
         sides: tuple[ExpressionNode, ...] = (node.left, node.right) if isinstance(node, Comparison) else ()
-        if any(
-            isinstance(expression_node, FunctionCall) and expression_node.function == "distance"
-            for expression_node in sides
-        ):
+        if any(isinstance(side, FunctionCall) and side.function == "distance" for side in sides):
             for side in sides:
                 if isinstance(side, Number) and side.dimension != LENGTH:
                     yield side

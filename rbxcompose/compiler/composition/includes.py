@@ -102,23 +102,14 @@ class Renaming:
 
     def values(self, given: tree.MappingNode) -> tree.MappingNode:
         """Return the renamed values that a part gives to one that it includes."""
-        entries = {
-            name: tree.Entry(entry.key, self.texts(entry.value, self.any_name)) for name, entry in given.entries.items()
-        }
-        return replace(given, entries=entries)
+        return tree.with_children(given, lambda _, value: self.texts(value, self.any_name))
 
     def texts(self, node: tree.TreeNode, change: Rename) -> tree.TreeNode:
         """Return a node with every text below it changed, except those that are filled in later."""
-        match node:
-            case tree.ScalarNode(text=text):
-                changed = text if "${" in text else change(text)
-                return node if changed == text else replace(node, text=changed)
-            case tree.SequenceNode(items=items):
-                return replace(node, items=tuple(self.texts(item, change) for item in items))
-            case tree.MappingNode(entries=entries):
-                return replace(
-                    node, entries={n: tree.Entry(e.key, self.texts(e.value, change)) for n, e in entries.items()}
-                )
+        if not isinstance(node, tree.ScalarNode):
+            return tree.with_children(node, lambda _, inner: self.texts(inner, change))
+        changed = node.text if "${" in node.text else change(node.text)
+        return node if changed == node.text else replace(node, text=changed)
 
     def topics(self, node: tree.TreeNode, above: str = "") -> tree.TreeNode:
         """Return a map with its keys renamed as topics (below `above`, if given); other nodes stay unchanged."""
@@ -276,8 +267,8 @@ class Parts:
 
     def _inside(self, instance: str, file: _File, above: tuple[_Open, ...]) -> Iterator[PartInstance]:
         """Yield the instances that a part includes itself."""
-        included = replace(file.root, entries={n: e for n, e in file.root.entries.items() if n == include.name})
-        yield from self.instances(in_scope(settled(included, self.documents.report), instance), instance, above)
+        included = settled(tree.only(file.root, include.name), self.documents.report)
+        yield from self.instances(in_scope(included, instance), instance, above)
 
     @property
     def _is_full(self) -> bool:
@@ -376,8 +367,8 @@ def _instance(name: str, file: _File, opened: _Open, entry: tree.Entry) -> PartI
         name=name,
         file=shown_name(opened.file),
         span=opened.span,
-        root=replace(scoped, entries={key: one for key, one in scoped.entries.items() if key not in own}),
-        arguments=replace(scoped, entries={key: one for key, one in scoped.entries.items() if key == args.name}),
+        root=tree.without(scoped, *own),
+        arguments=tree.only(scoped, args.name),
         given=given if isinstance(given, tree.MappingNode) else tree.MappingNode({}, opened.span),
         claims=file.claims,
     )
@@ -394,20 +385,12 @@ def _circle(chain: list[_Open], span: Span) -> Finding:
 def in_scope(root: tree.MappingNode, scope: str) -> tree.MappingNode:
     """Return a tree whose `${args...}` refer to the arguments of the instance `scope`."""
 
-    def scoped(node: tree.TreeNode) -> tree.TreeNode:
-        match node:
-            case tree.ScalarNode(text=text):
-                return replace(node, scope=scope) if "$" in text else node
-            case tree.SequenceNode(items=items):
-                return replace(node, items=tuple(map(scoped, items)))
-            case tree.MappingNode(entries=entries):
-                return replace(
-                    node, entries={name: tree.Entry(entry.key, scoped(entry.value)) for name, entry in entries.items()}
-                )
+    def scoped(_: tree.Key, node: tree.TreeNode) -> tree.TreeNode:
+        if not isinstance(node, tree.ScalarNode):
+            return tree.with_children(node, scoped)
+        return replace(node, scope=scope) if "$" in node.text else node
 
-    return replace(
-        root, entries={name: tree.Entry(entry.key, scoped(entry.value)) for name, entry in root.entries.items()}
-    )
+    return tree.with_children(root, scoped)
 
 
 def included_parts(instances: Sequence[PartInstance]) -> dict[str, IncludedPart]:

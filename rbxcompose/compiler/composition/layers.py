@@ -17,7 +17,19 @@ from rbxcompose.manifest.files import PROFILE, find, shown_name
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.registry import model_for, section_named, sections
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Contents, SetScope
-from rbxcompose.manifest.tree import KEYS, Entry, Key, MappingNode, ScalarNode, TreeNode, all_nodes, with_children
+from rbxcompose.manifest.tree import (
+    KEYS,
+    Entry,
+    Key,
+    MappingNode,
+    ScalarNode,
+    TreeNode,
+    all_nodes,
+    entries_of,
+    only,
+    with_children,
+    without,
+)
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 
 BAD_SET = kind("RBX1303")
@@ -136,11 +148,11 @@ def compose_robot(root: MappingNode, file: Path, chosen: Chosen, documents: Docu
     """Return a robot's file with its parts below and the chosen layers on top."""
     report, history = documents.report, History()
     overlays = [*_profiles(root, file, chosen.profiles, documents), *_overlays(chosen.overlays, documents)]
-    own = _without(root, profiles.name)
+    own = without(root, profiles.name)
     included = _include(own, overlays, chosen.sets, history, documents)
     parts = Parts(documents, file)
     instances = tuple(parts.instances(included))
-    own = _without(own, INCLUDE)
+    own = without(own, INCLUDE)
     if instances:
         brought = join([(instance.root, instance.name, instance.span) for instance in instances], report, history)
         composed = compose(replace(brought, span=root.span), [(own, ROBOT_LAYER)], report, history)
@@ -150,7 +162,7 @@ def compose_robot(root: MappingNode, file: Path, chosen: Chosen, documents: Docu
         composed = settled(own, report)
         for name, entry in composed.entries.items():
             history.write((name,), HistoryStep(ROBOT_LAYER, entry.value, entry.value.span))
-    composed = compose(composed, [(_without(tree, INCLUDE), name) for tree, name in overlays], report, history)
+    composed = compose(composed, [(without(tree, INCLUDE), name) for tree, name in overlays], report, history)
     if chosen.sets:
         composed = compose(composed, read_sets(chosen.sets, composed, report, documents.sources), report, history)
     return Composed(_with_few_keys(composed, report), included, instances, parts, history)
@@ -189,15 +201,6 @@ def _include(
     return compose(included, lines, documents.report, history)
 
 
-def only(root: MappingNode, key: str) -> MappingNode:
-    """Return a tree with only one of its keys."""
-    return replace(root, entries={name: entry for name, entry in root.entries.items() if name == key})
-
-
-def _without(root: MappingNode, key: str) -> MappingNode:
-    return replace(root, entries={name: entry for name, entry in root.entries.items() if name != key})
-
-
 def _profiles(
     root: MappingNode, file: Path, chosen: Sequence[str], documents: Documents
 ) -> Iterator[tuple[MappingNode, str]]:
@@ -226,15 +229,13 @@ def chosen_profiles(
 
 def profile_keys(root: MappingNode) -> dict[str, frozenset[str]]:
     """Return the names of the sections that each profile in a robot's file changes."""
-    there = root.get(profiles.name)
-    named = there.entries if isinstance(there, MappingNode) else {}
+    named = entries_of(root.get(profiles.name))
     return {name: frozenset(one.value.entries) for name, one in named.items() if isinstance(one.value, MappingNode)}
 
 
 def profile_spans(root: MappingNode) -> dict[str, Span]:
     """Return the span of each profile in a robot's file, from its name to its end."""
-    there = root.get(profiles.name)
-    named = there.entries if isinstance(there, MappingNode) else {}
+    named = entries_of(root.get(profiles.name))
     return {
         name: entry.key.span._replace(end_line=entry.value.span.end_line, end_column=entry.value.span.end_column)
         for name, entry in named.items()

@@ -9,6 +9,7 @@ from operator import is_
 
 from rbxcompose.base.findings import Related, Report, Span, correction, kind, suggest
 from rbxcompose.compiler.composition.robot_manifest import History, HistoryStep
+from rbxcompose.manifest.reader import REMOVE
 from rbxcompose.manifest.registry import section_named
 from rbxcompose.manifest.tree import (
     BROKEN,
@@ -21,7 +22,6 @@ from rbxcompose.manifest.tree import (
     plain_value,
 )
 from rbxcompose.manifest.validate import WRONG_TYPE, label_of
-from rbxcompose.manifest.walk import REMOVE
 
 NOTHING_TO_CHANGE = kind("RBX1302", is_fixable=True)
 NOT_AN_OVERLAY = kind("RBX1305")

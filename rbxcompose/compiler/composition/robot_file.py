@@ -12,7 +12,7 @@ from rbxcompose.base.expressions.types import UNKNOWN
 from rbxcompose.base.findings import Finding, Related, Report, Severity, Span, kind, nearest
 from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.compiler.composition.includes import PartInstance, included_parts
-from rbxcompose.compiler.composition.layers import Chosen, Composed, compose_robot, only, profile_keys, profile_spans
+from rbxcompose.compiler.composition.layers import Chosen, Composed, compose_robot, profile_keys, profile_spans
 from rbxcompose.compiler.composition.robot_manifest import (
     ROBOT_LAYER,
     History,
@@ -31,7 +31,19 @@ from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.fill import SHOWN_SECRET, Names, Secrets, Typed, fill, names_of, with_arguments
 from rbxcompose.manifest.registry import sections_in_use
 from rbxcompose.manifest.section import ROBOT, Contents, Section
-from rbxcompose.manifest.tree import BROKEN, MappingNode, ScalarNode, all_nodes, at, is_empty, key_span
+from rbxcompose.manifest.tree import (
+    BROKEN,
+    MappingNode,
+    ScalarNode,
+    all_nodes,
+    at,
+    entries_of,
+    is_empty,
+    key_span,
+    only,
+    text_at,
+    without,
+)
 from rbxcompose.manifest.validate import UNKNOWN_KEY
 from rbxcompose.manifest.yaml_nodes import is_moderate
 from rbxcompose.msgs import registry as types
@@ -75,9 +87,8 @@ def fill_scopes(composed: Composed, names: Names) -> FilledScopes:
         }
         may_have = (lambda name: True) if args.is_unreadable(instance.arguments) else None
         names = with_arguments(names, _given_values(instance, declared, names, report), instance.name, may_have)
-    others = {name: entry for name, entry in root.entries.items() if name != args.name}
     running = {section.name: section.running for section in sections_in_use(ROBOT) if section.running}
-    filled = {**arguments.entries, **fill(replace(root, entries=others), names, report, running=running).entries}
+    filled = {**arguments.entries, **fill(without(root, args.name), names, report, running=running).entries}
     return FilledScopes(replace(root, entries={name: filled[name] for name in root.entries}), include, bounds)
 
 
@@ -127,18 +138,10 @@ def _given_values(
 
 def without_strayed(root: MappingNode, keys: Container[str], report: Report) -> MappingNode:
     """Return a tree without keys that are the names of entries of its sections, after a finding for each."""
-    left = dict(root.entries)
-    empty = [
-        section
-        for section in registry.sections_in_use(ROBOT)
-        if section.names and (node := root.get(section.name)) and is_empty(node)
-    ]
+    left, in_use = dict(root.entries), registry.sections_in_use(ROBOT)
+    empty = [one for one in in_use if one.names and (node := root.get(one.name)) and is_empty(node)]
     for name, entry in root.entries.items():
-        home = (
-            None
-            if name in keys
-            else next((section for section in registry.sections_in_use(ROBOT) if name in section.names_in(root)), None)
-        )
+        home = next((one for one in in_use if name not in keys and name in one.names_in(root)), None)
         if name not in keys and home is None and len(empty) == 1 and isinstance(entry.value, MappingNode):
             home = empty[0]
         if home and isinstance(entry.value, MappingNode):
@@ -201,14 +204,8 @@ def read_sections(
     for section in registry.sections_in_use(ROBOT):
         if section.is_composed:
             contents.of(section)
-    return RobotManifest(
-        name=_text(root, "name"), about=_text(root, "about"), path=file, root=root, is_simulated=sim, contents=contents
-    )
-
-
-def _text(root: MappingNode, key: str) -> str:
-    value = root.get(key)
-    return value.text if isinstance(value, ScalarNode) else ""
+    name, about = text_at(root.get("name")), text_at(root.get("about"))
+    return RobotManifest(name=name, about=about, path=file, root=root, is_simulated=sim, contents=contents)
 
 
 def _shown_secrets(root: MappingNode) -> Iterator[Finding]:
@@ -236,7 +233,7 @@ def _taken_names(contents: Contents) -> Iterator[Finding]:
 def _placed_names(contents: Contents, section: Section[Any, Any]) -> Iterator[str]:
     """Yield the names in a section, but not those of sections that were indented too far."""
     named = at(contents.root, (section.name, *section.at))
-    for name, entry in named.entries.items() if isinstance(named, MappingNode) else ():
+    for name, entry in entries_of(named).items():
         if not contents.is_misplaced(section, entry):
             yield name
 
@@ -317,7 +314,7 @@ def _manifest(
 ) -> RobotManifest | None:
     keys = registry.model_for(ROBOT, composed.root)
     documents.check(keys, without_strayed(composed.root, keys.model_fields, documents.report))
-    names = names_of(_name(composed.root), sim, environment, Secrets(project_of(file), environment))
+    names = names_of(text_at(composed.root.get("name")), sim, environment, Secrets(project_of(file), environment))
     filled = fill_scopes(composed, names)
     report = documents.report
     read_so_far = len(report.findings)
@@ -355,12 +352,6 @@ def read_mission(
     root = documents.read(path, MISSION, span)
     if root is None:
         return None
-    header = {name: entry for name, entry in root.entries.items() if name in ManifestHeader.model_fields}
-    documents.check(ManifestHeader, replace(root, entries=header))
+    documents.check(ManifestHeader, only(root, *ManifestHeader.model_fields))
     filled = fill(root, names_of(robot, sim, environment or {}), report, runs=True)
     return filled if is_moderate(filled.get("data"), "datum", report) else None
-
-
-def _name(root: MappingNode) -> str:
-    name = root.get("name")
-    return name.text if isinstance(name, ScalarNode) else ""

@@ -117,17 +117,13 @@ def build_robot(
     """Return the whole robot, with what it has of others; errors in its mission files go into `report`."""
     written = written_components(manifest, report)
     components = {**written, **own_components(manifest, written)}
-    values, topics, services = (
-        values_of(manifest, components),
-        topics_of(manifest, components),
-        services_of(manifest, components),
-    )
+    values = values_of(manifest, components)
+    topics, services = topics_of(manifest, components), services_of(manifest, components)
     missions = read_missions(manifest, environment, report, sources, names_of_skills(components, outside))
     skills = skills_of(components, [mission.program for mission in missions.read.values()], outside)
     changed = settings_of(node for mission in missions.read.values() for node in mission.program.nodes)
-    services |= {setting.service: CHANGE for setting in changed if setting.component.text in components} | {
-        **outside.services
-    }
+    services |= {setting.service: CHANGE for setting in changed if setting.component.text in components}
+    services |= outside.services
     robot = Robot(manifest, components, values, skills, missions.read, missions.unread, topics, services, outside)
     report.extend(findings_about(robot))
     if manifest.missions:

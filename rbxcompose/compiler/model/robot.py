@@ -188,16 +188,12 @@ class Robot:
     @cached_property
     def written(self) -> frozenset[str]:
         """Return the names of all components that sections of the manifest request, including those with mistakes."""
-        return frozenset(
-            name for declaration in naming_in_use(COMPONENT) for name in declaration.names_in(self.manifest.root)
-        )
+        return frozenset(name for one in naming_in_use(COMPONENT) for name in one.names_in(self.manifest.root))
 
     @cached_property
     def brought(self) -> frozenset[str]:
         """Return the names of components that sections bring because they are there, including those with mistakes."""
-        return frozenset(
-            name for section in sections_in_use() if section.name in self.manifest.root for name in section.brings
-        )
+        return frozenset(name for one in sections_in_use() if one.name in self.manifest.root for name in one.brings)
 
     @cached_property
     def writers(self) -> Mapping[str, list[PortEnd]]:

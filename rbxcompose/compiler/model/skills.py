@@ -23,7 +23,7 @@ from rbxcompose.missions.program.program import Program, Skill
 from rbxcompose.missions.sources import Orders, OrderTopic, SkillSource, SkillWay, TopicSource
 from rbxcompose.sdk.capabilities import CommandsMotion, Drains, Navigates
 from rbxcompose.sdk.ports import In, Out, Qos, Serves, ServesAction, ServesTopic
-from rbxcompose.sdk.skills import SkillType, skill_names, skill_type
+from rbxcompose.sdk.registry import SkillType, skill_names, skill_type
 
 
 def skills_of(
@@ -91,11 +91,7 @@ def _topics(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
 
 def _orders(components: Mapping[str, RobotComponent], end: PortEnd, port: ServesTopic[Any]) -> Orders:
     """Return the components that carry out orders, and the topics of the ports for their ends and halts."""
-    servers = [
-        port_end
-        for port_end in _ends(components)
-        if isinstance(port_end.port, ServesTopic) and port_end.topic == end.topic
-    ]
+    servers = [one for one in _ends(components) if isinstance(one.port, ServesTopic) and one.topic == end.topic]
     own = components[end.instance].ends
     return Orders(
         str(port.qos),

@@ -12,7 +12,7 @@ from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, Robo
 from rbxcompose.compiler.sections.missions import TriggerModel, triggers
 from rbxcompose.compiler.sections.values import ValueModel
 from rbxcompose.manifest.shapes import exact
-from rbxcompose.manifest.tree import BROKEN, MappingNode, ScalarNode, at
+from rbxcompose.manifest.tree import BROKEN, ScalarNode, at, entries_of
 from rbxcompose.missions import codes
 from rbxcompose.missions.analysis.examined import base_scope, findings_of
 from rbxcompose.missions.engine.inputs import bind_inputs
@@ -175,8 +175,7 @@ def findings_about(robot: Robot) -> Iterator[Finding]:
 
 
 def _about_inputs(robot: Robot, name: str, mission: RobotMission) -> Iterator[Finding]:
-    given = at(robot.manifest.root, ("triggers", name, "with"))
-    entries = given.entries if isinstance(given, MappingNode) else {}
+    entries = entries_of(at(robot.manifest.root, ("triggers", name, "with")))
     open_inputs = {
         key: one for key, one in mission.program.inputs.items() if key in entries or key not in mission.inputs
     }
@@ -193,8 +192,7 @@ def _about_inputs(robot: Robot, name: str, mission: RobotMission) -> Iterator[Fi
 
 def _inputs(robot: Robot, name: str) -> dict[str, str]:
     """Return the inputs that a trigger gives, as people write them."""
-    given = at(robot.manifest.root, ("triggers", name, "with"))
-    entries = given.entries if isinstance(given, MappingNode) else {}
+    entries = entries_of(at(robot.manifest.root, ("triggers", name, "with")))
     return {key: _text(entry.value) for key, entry in entries.items() if isinstance(entry.value, ScalarNode)}
 
 

@@ -9,6 +9,7 @@ from rbxcompose.base.config import Bound, Config
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.types import Type
 from rbxcompose.base.levels import log_word
+from rbxcompose.base.requests import to_data
 from rbxcompose.base.units import Quantity, format_number, format_quantity, to_si
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.manifest.shapes import dimension_at
@@ -73,16 +74,12 @@ class Difference:
     def data(self) -> dict[str, Any]:
         """Return the difference as data for programs."""
         return {
-            "plan": list(map(_data, self.plan)),
+            "plan": to_data(self.plan),
             "added": [instance.name for instance in self.added],
             "removed": [instance.name for instance in self.removed],
-            "changed": {name: list(map(_data, changes)) for name, changes in self.changed.items()},
+            "changed": {name: to_data(changes) for name, changes in self.changed.items()},
             "processes": {"start": list(self.starts), "end": list(self.ends), "restart": list(self.restarts)},
         }
-
-
-def _data(change: Change) -> dict[str, Any]:
-    return {"key": change.key, "before": change.before, "after": change.after}
 
 
 def difference(before: Plan, after: Plan) -> Difference:
@@ -137,15 +134,13 @@ def _fills(key: str, empty: Mapping[str, str], full: Mapping[str, str]) -> bool:
 def _of_instance(instance: Instance) -> dict[str, str]:
     """Return the properties of an instance, by key; settings as a person writes them."""
     wires = {f"topic of {wire.port}": f"{wire.topic} ({wire.type})" for wire in instance.wires if wire.topic}
-    options = {
+
+    bounds = {f"{BOUNDS}{name}": _bounds(instance.config, name, each) for name, each in instance.bounds.items()}
+    return {
         "type": instance.type,
         "process": instance.process,
         "starts_after": ", ".join(instance.starts_after) or "nothing",
-    }
-    options["log"] = log_word(instance.log)
-    bounds = {f"{BOUNDS}{name}": _bounds(instance.config, name, each) for name, each in instance.bounds.items()}
-    return {
-        **options,
+        "log": log_word(instance.log),
         **dict(_flat(instance.restart, "restart")),
         **dict(_flat(instance.config, "")),
         **wires,

@@ -14,8 +14,7 @@ from rbxcompose.base.config import Name, Time, field_docs
 from rbxcompose.base.files import replace_file
 from rbxcompose.compiler.schema.mission import mission_schema
 from rbxcompose.compiler.schema.robot import document, or_empty, overlay_schema, part_schema, robot_schema
-from rbxcompose.compiler.schema.scalars import DEFINITIONS, SHARED, Schema
-from rbxcompose.compiler.schema.settle import opened, schemas_of
+from rbxcompose.compiler.schema.scalars import DEFINITIONS, SHARED, Schema, opened, schemas_of
 from rbxcompose.manifest import system_file, test_file
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.registry import sections
@@ -35,11 +34,7 @@ _WIDTH = 120  # of a line in a file
 
 def system_schema(types: Iterable[str]) -> Schema:
     """Return the schema of a system; it is the same for all types of components."""
-    keys = {
-        name: field.annotation
-        for name, field in system_file.SystemFile.model_fields.items()
-        if name == system_file.SECURITY
-    }
+    keys = {system_file.SECURITY: system_file.SystemFile.model_fields[system_file.SECURITY].annotation}
     schemas, definitions = schemas_of({**system_file.SECTIONS, **system_file.LINKS, **system_file.PROFILES, **keys})
     about = field_docs(system_file.SystemFile)
     sections = {

@@ -7,9 +7,8 @@ from typing import Any
 
 from rbxcompose.base.units import DIMENSIONS, Dimension
 from rbxcompose.compiler.schema.overlays import SECTION, WHOLE
-from rbxcompose.compiler.schema.scalars import DIMENSION, Schema
-from rbxcompose.compiler.schema.settle import referred
-from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode, at
+from rbxcompose.compiler.schema.scalars import DIMENSION, Schema, referred
+from rbxcompose.manifest.tree import KeyPath, MappingNode, TreeNode, at, text_at
 
 _DEEPEST = 12  # nested references and choices
 
@@ -102,7 +101,7 @@ class Guide:
         value = node.get(name)
         if value is None and name == "type" and path:
             return self.types.get(str(path[-1]), "")
-        return value.text if isinstance(value, ScalarNode) else ""
+        return text_at(value)
 
 
 def _below(schema: Schema, key: str | int) -> Iterator[Schema]:

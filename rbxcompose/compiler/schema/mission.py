@@ -9,8 +9,7 @@ from rbxcompose.base.config import NAMES, Name
 from rbxcompose.base.expressions.types import COUNT, FLAG, TYPES, Type, TypeKind, quantity_of
 from rbxcompose.base.units import TIME
 from rbxcompose.compiler.schema.robot import document
-from rbxcompose.compiler.schema.scalars import DEFINITIONS, Schema, computed
-from rbxcompose.compiler.schema.settle import schemas_of
+from rbxcompose.compiler.schema.scalars import DEFINITIONS, Schema, computed, schemas_of
 from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.missions.kinds.machine import RESULTS

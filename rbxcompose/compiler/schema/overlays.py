@@ -8,8 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from rbxcompose.compiler.schema.entries import COMPONENT, TYPE
-from rbxcompose.compiler.schema.scalars import DEFINITIONS, Schema, quantities
+from rbxcompose.compiler.schema.scalars import COMPONENT, DEFINITIONS, TYPE, Schema, quantities
 from rbxcompose.compiler.sections.components import components
 from rbxcompose.manifest.registry import sections as all_sections
 from rbxcompose.manifest.section import OPTIONS

@@ -36,7 +36,7 @@ from rbxcompose.manifest.section import (
     WantedComponent,
     Wiring,
 )
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at, entries_of
 from rbxcompose.manifest.validate import (
     MISSING_KEY,
     UNKNOWN_KEY,
@@ -105,7 +105,7 @@ def _rename(renames: Renames, name: str, node: TreeNode) -> TreeNode:
 
 def _topics(name: str, node: TreeNode) -> Iterable[str]:
     connect = at(node, ("connect",))
-    written = connect.entries.items() if isinstance(connect, MappingNode) else ()
+    written = entries_of(connect).items()
     given = {port: entry.value.text for port, entry in written if isinstance(entry.value, ScalarNode)}
     return {**_own_topics(node), **given}.values()
 

@@ -23,14 +23,15 @@ INPUT = "input"
 """An input of the mission that an entry names."""
 
 
+Inputs = dict[Annotated[Name, Refers(INPUT, is_reported=True)], Annotated[Any, Refers(ANYTHING, is_reported=True)]]
+
+
 class MissionModel(Config):
     """A mission that the robot has."""
 
     file: FileName
     """The mission's file, relative to this one."""
-    with_: dict[
-        Annotated[Name, Refers(INPUT, is_reported=True)], Annotated[Any, Refers(ANYTHING, is_reported=True)]
-    ] = Field({}, alias="with")
+    with_: Inputs = Field({}, alias="with")
     """Values of its inputs, by name."""
     after_crash: Literal["restart", "ask", "continue"] = "restart"
     """After a crash of its process or a loss of power it starts again, waits for `mission resume`, or continues."""
@@ -160,9 +161,7 @@ class TriggerModel(Config):
     """What happens while a mission that runs needs the same part of the robot, or is the same: this one is not started,
     waits for the other's end, or cancels it.
     """
-    with_: dict[
-        Annotated[Name, Refers(INPUT, is_reported=True)], Annotated[Any, Refers(ANYTHING, is_reported=True)]
-    ] = Field({}, alias="with")
+    with_: Inputs = Field({}, alias="with")
     """Values of the mission's inputs, by name; they override those under `missions`."""
 
     @model_validator(mode="after")

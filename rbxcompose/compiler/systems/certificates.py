@@ -109,18 +109,8 @@ def make_certificate(folder: Path, system: str, host: str, address: str | None, 
     subject = ("-subj", f"/CN={common_name(system, host)}")
     _openssl(folder, "req", *_NEW_KEY, *subject, "-keyout", f"{host}/{KEY}", "-out", request)
     signed = ("-CA", AUTHORITY, "-CAkey", AUTHORITY_KEY, "-CAcreateserial", "-days", str(days))
-    _openssl(
-        folder,
-        "x509",
-        "-req",
-        "-in",
-        request,
-        *signed,
-        "-extfile",
-        f"{host}/extensions",
-        "-out",
-        f"{host}/{CERTIFICATE}",
-    )
+    files = ("-in", request, "-extfile", f"{host}/extensions", "-out", f"{host}/{CERTIFICATE}")
+    _openssl(folder, "x509", "-req", *files, *signed)
     replace_file(own / AUTHORITY, read_regular(folder / AUTHORITY, LARGEST))
     for name in ("extensions", "request.pem"):
         (own / name).unlink()

@@ -19,8 +19,6 @@ from rbxcompose.compiler.model.robot import resolve as absolute
 from rbxcompose.compiler.model.skills import served_skills
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.certificates import NO_SECURITY
-from rbxcompose.compiler.systems.consoles import ports_of, with_free_ports
-from rbxcompose.compiler.systems.exchange import shared_name
 from rbxcompose.compiler.systems.model import (
     PORTS,
     HostOffer,
@@ -32,15 +30,22 @@ from rbxcompose.compiler.systems.model import (
     next_port,
     place,
 )
-from rbxcompose.compiler.systems.neighbours import PLACE_IN_WORLD, ROBOTS_IN_WORLD, with_others
+from rbxcompose.compiler.systems.neighbours import (
+    PLACE_IN_WORLD,
+    ROBOTS_IN_WORLD,
+    ports_of,
+    with_free_ports,
+    with_others,
+)
 from rbxcompose.compiler.systems.rules import UNKNOWN_HOST, system_findings
+from rbxcompose.compiler.systems.share import shared_name
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.files import PREFIX, PROFILE, find, resolve, shown_name
 from rbxcompose.manifest.fill import fill, names_of
 from rbxcompose.manifest.reader import Texts
 from rbxcompose.manifest.section import SYSTEM, help_with_names
 from rbxcompose.manifest.system_file import LINKS, PROFILES, SECTIONS, SystemFile, SystemRobotModel
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, key_span, value_span
+from rbxcompose.manifest.tree import MappingNode, SequenceNode, entries_of, key_span, text_at, value_span, without
 from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of, validate
 from rbxcompose.missions.sources import SkillWay
 from rbxcompose.sdk.capabilities import ConnectedBy
@@ -114,8 +119,8 @@ def compile_system(
     out.root = root = documents.placed(SystemFile, root, {**SECTIONS, **LINKS})
     documents.check(SystemFile, root)
     root, overlays = _with_profiles(root, out, documents)
-    out.root = root = fill(root, names_of(_text(root, "name"), not real, environment), out.report)
-    out.path, out.name, out.security = file, _text(root, "name"), _text(root, "security") or NO_SECURITY
+    out.root = root = fill(root, names_of(text_at(root.get("name")), not real, environment), out.report)
+    out.path, out.name, out.security = file, text_at(root.get("name")), text_at(root.get("security")) or NO_SECURITY
     sections = {key: _section(key, model, out, overlays) for key, model in SECTIONS.items()}
     if sections["hosts"] is None or sections["robots"] is None:
         return out
@@ -156,7 +161,7 @@ class _Member:
 def in_one_world(members: Sequence[_Member], out: System, *, real: bool) -> list[_Member]:
     """Return the robots of a system, those with a `spawn` in its world, where they tell each other where they are."""
     there = [member.name for member in members if member.model.spawn]
-    file = _text(out.root, "world")
+    file = text_at(out.root.get("world"))
     for entry in dict.fromkeys(member.entry for member in members if member.model.spawn and not file):
         span = value_span(out.root, ("robots", entry, "spawn"))
         out.report.add(MISSING_KEY.at(span, "a robot with a 'spawn' needs a 'world' of the system"))
@@ -206,18 +211,13 @@ Overlays = list[tuple[MappingNode, str]]  # profiles, each with its name for fin
 def _with_profiles(root: MappingNode, out: System, documents: Documents) -> tuple[MappingNode, Overlays]:
     """Return a system changed by the profiles that were chosen, in the order of the command, and these."""
     there = root.get("profiles")
-    own = replace(root, entries={key: entry for key, entry in root.entries.items() if key != "profiles"})
+    own = without(root, "profiles")
     if there is not None and validate(PROFILES["profiles"], there, ("profiles",), out.report) is None:
         return own, []
-    named = there.entries if isinstance(there, MappingNode) else {}
+    named = entries_of(there)
     out.known_profiles = tuple(named)
     overlays = [(node, f"profile '{name}'") for name, node in chosen_profiles(out.profiles, named, "system", documents)]
     return compose(settled(own, out.report), overlays, out.report) if overlays else own, overlays
-
-
-def _text(root: MappingNode, key: str) -> str:
-    value = root.get(key)
-    return value.text if isinstance(value, ScalarNode) else ""
 
 
 def _section(key: str, model: Any, out: System, overlays: Overlays) -> Any:
@@ -321,9 +321,8 @@ def _placed_robot(member: _Member, out: System, compiling: _Compiling) -> Placed
     robot, plan = (compilation.robot, compilation.plan) if compilation else (None, None)
     if compilation is None or robot is None or plan is None:
         return None
-    bus = replace(
-        plan.bus, port=next_port(plan.bus.port, {placed_robot.plan.bus.port for placed_robot in out.robots.values()})
-    )
+    taken = {other.plan.bus.port for other in out.robots.values()}
+    bus = replace(plan.bus, port=next_port(plan.bus.port, taken))
     plan, link_port = replace(plan, robot=name, bus=bus), _link_port(model, plan, out)
     plan = with_free_ports(plan, {port for robot in out.robots.values() for port in ports_of(robot.plan)})
     names = [instance.name for instance in plan.instances]

@@ -5,13 +5,12 @@ from collections.abc import Collection, Iterable, Iterator
 from rbxcompose.base.findings import Finding, Related, Severity, Span, kind
 from rbxcompose.base.units import BIT_RATE, FREQUENCY, TIME, format_quantity
 from rbxcompose.compiler.model.robot import resolve
-from rbxcompose.compiler.systems import exchange
+from rbxcompose.compiler.systems import share
 from rbxcompose.compiler.systems.certificates import MUTUAL, NO_SECURITY
 from rbxcompose.compiler.systems.cut_link import slow_stops
-from rbxcompose.compiler.systems.model import PlacedRobot, System
+from rbxcompose.compiler.systems.model import Crossing, PlacedRobot, System, TopicEnd
 from rbxcompose.compiler.systems.neighbours import overlapping_starts
 from rbxcompose.compiler.systems.share import hosts_of, listens
-from rbxcompose.compiler.systems.traffic import Crossing, TopicEnd
 from rbxcompose.manifest.tree import key_span, value_span
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import type_hash
@@ -32,7 +31,7 @@ _WORDS = {"msg": "topic", "srv": "service", "action": "action"}
 
 def share_findings(system: System) -> Iterator[Finding]:
     """Yield what is wrong with what robots share, and with what they take from each other."""
-    takers = exchange.takers_of(system)
+    takers = share.takers_of(system)
     labels = {label for robot in system.robots.values() for label in robot.labels}
     for robot in system.robots.values():
         for index, name in enumerate(robot.model.callers):
@@ -41,22 +40,22 @@ def share_findings(system: System) -> Iterator[Finding]:
                 yield UNKNOWN_CALLER.misspelt(span, message, name, sorted(labels), "robots and labels")
         for index, name in enumerate(robot.model.share):
             span = robot.span(system.root, "share", index)
-            givers = exchange.givers_of(robot, exchange.full_name(robot, name))
+            givers = share.givers_of(robot, share.full_name(robot, name))
             if givers:
-                own = [pair for pair in takers.get(exchange.shared_name(robot.name, name), ()) if pair[0] is not robot]
+                own = [pair for pair in takers.get(share.shared_name(robot.name, name), ()) if pair[0] is not robot]
                 yield from _wrong_takers(system, robot, name, own, span)
             else:
                 valid = sorted({end.topic.removeprefix("/") for end in robot.ends if _gives(end)})
                 message = f"no component of '{robot.name}' publishes or serves '{name}'"
                 yield NOT_PUBLISHED.misspelt(span, message, name.removeprefix("/"), valid, "what it has")
-            if givers and exchange.is_called(givers[0]) and not robot.model.callers:
+            if givers and share.is_called(givers[0]) and not robot.model.callers:
                 message = f"'{name}' is {_kind(givers[0])}, which no other robot may call"
                 yield NO_CALLER.at(span, message, help="add 'callers' with the robots that may")
         yield from _unshared(system, robot)
 
 
 def _gives(topic_end: TopicEnd) -> bool:
-    return isinstance(topic_end.end.port, tuple(exchange.TAKEN_BY))
+    return isinstance(topic_end.end.port, tuple(share.TAKEN_BY))
 
 
 def _kind(end: TopicEnd) -> str:
@@ -67,22 +66,19 @@ def _kind(end: TopicEnd) -> str:
 def _wrong_takers(
     system: System, robot: PlacedRobot, name: str, takers: Iterable[tuple[PlacedRobot, TopicEnd]], span: Span
 ) -> Iterator[Finding]:
-    shared, first = (
-        exchange.shared_name(robot.name, name),
-        exchange.givers_of(robot, exchange.full_name(robot, name))[0],
-    )
+    shared, first = (share.shared_name(robot.name, name), share.givers_of(robot, share.full_name(robot, name))[0])
     for taker, end in takers:
         where, given = f"'{end.end.component}' of '{taker.name}'", first.end.host
         if end.type != first.type:
             yield OTHER_TYPE.at(span, f"{where} takes {shared} for {_typed(end)}, and it is {_typed(first)}")
         elif len({_definition(taker, end.type), _definition(robot, end.type), ""}) > 2:
             yield OTHER_TYPE.at(span, f"{where} has another definition of {end.type} than '{robot.name}'")
-        elif exchange.is_called(first) and robot.model.callers and not exchange.may_call(robot, taker):
+        elif share.is_called(first) and robot.model.callers and not share.may_call(robot, taker):
             message = f"{where} calls {shared}, and '{taker.name}' is not among the callers of '{robot.name}'"
             names = ", ".join([*robot.model.callers, taker.name])
             at = robot.span(system.root, "callers")
             yield NOT_A_CALLER.at(at, message, help=f"if it may: callers: [{names}]")
-        if not exchange.endpoint_for(system, robot, given, is_local=given == end.end.host):
+        if not share.endpoint_for(system, robot, given, is_local=given == end.end.host):
             message = f"{where} runs on '{end.end.host}' and needs {shared} from '{given}', which has no address"
             yield UNREACHED_SHARE.at(span, message, help=f"give '{given}' an 'address'")
         for placed_robot in (robot, taker):
@@ -90,7 +86,7 @@ def _wrong_takers(
                 message = f"'{placed_robot.name}' has 'bus.router', so {shared} cannot get to {where}"
                 yield UNREACHED_SHARE.at(span, message, help="remove 'bus.router'")
     for other in system.robots.values():
-        for end in exchange.givers_of(other, shared) if other is not robot else ():
+        for end in share.givers_of(other, shared) if other is not robot else ():
             does = "publishes" if isinstance(end.end.port, Out) else "serves"
             message = f"'{end.end.component}' of '{other.name}' {does} {shared}, which '{robot.name}' shares"
             yield TAKEN_NAME.at(span, message, help="give it another name there")
@@ -109,16 +105,14 @@ def _typed(topic_end: TopicEnd) -> str:
 
 def _unshared(system: System, robot: PlacedRobot) -> Iterator[Finding]:
     """Yield a finding for each end that takes something of another robot that this one does not share."""
-    for topic_end in robot.ends:
-        name, _, own = topic_end.topic.removeprefix("/").partition("/")
+    for end in robot.ends:
+        name, _, own = end.topic.removeprefix("/").partition("/")
         other = system.robots.get(name)
-        if _gives(topic_end) or other is None or other is robot or exchange.givers_of(robot, topic_end.topic):
+        if _gives(end) or other is None or other is robot or share.givers_of(robot, end.topic):
             continue
-        if topic_end.topic not in {exchange.shared_name(name, each) for each in other.model.share}:
-            does = "listens to" if isinstance(topic_end.end.port, In) else "calls"
-            message = (
-                f"'{topic_end.end.component}' of '{robot.name}' {does} {topic_end.topic}, which '{name}' does not share"
-            )
+        if end.topic not in {share.shared_name(name, each) for each in other.model.share}:
+            does = "listens to" if isinstance(end.end.port, In) else "calls"
+            message = f"'{end.end.component}' of '{robot.name}' {does} {end.topic}, which '{name}' does not share"
             yield NOT_SHARED.at(other.span(system.root), message, help=_cure(other, own))
 
 
@@ -256,7 +250,7 @@ def _bulk(system: System, robot: PlacedRobot, crossing: Crossing) -> Iterator[Fi
 
 def _ports(system: System) -> Iterator[Finding]:
     seen: dict[tuple[str, str], PlacedRobot] = {}
-    shared = exchange.exchanges(system)
+    shared = share.exchanges(system)
     for robot in system.robots.values():
         for host in hosts_of(system, robot):
             carried = shared.get((robot.name, host))

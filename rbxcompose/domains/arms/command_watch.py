@@ -19,7 +19,7 @@ from rbxcompose.commands.lookup import NO_ANSWER, known_state, place_of
 from rbxcompose.domains.arms.scene_view import ARM, ARM_WINDOW, SCENE_WINDOW
 from rbxcompose.missions.view.replica import Replica
 from rbxcompose.runtime.folder import RobotFolder
-from rbxcompose.sdk.key_feed import added
+from rbxcompose.sdk.bound import added
 from rbxcompose.sdk.ports import Qos
 
 _LONGEST = 300  # letters of a goal or a reason

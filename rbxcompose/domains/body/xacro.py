@@ -171,7 +171,7 @@ def _digest(path: str) -> str:
 
 
 def _asked(requests: Sequence[XacroRequest]) -> list[XacroAnswer | None]:
-    from rbxcompose.base.fenced_answers import fenced_answers  # which few robots need
+    from rbxcompose.base.processes import fenced_answers  # which few robots need
 
     written = fenced_answers("rbxcompose.domains.body.xacro_child", [item.text for item in requests])
     return [read_answer(data, request.roots) for data, request in zip(written, requests, strict=True)]

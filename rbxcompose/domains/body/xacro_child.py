@@ -16,9 +16,8 @@ from xml.dom import expatbuilder, minidom
 import xacro
 from xacro import substitution_args
 
-from rbxcompose.base.fenced_answers import answer_all
 from rbxcompose.base.files import read_regular
-from rbxcompose.base.processes import fence, is_below
+from rbxcompose.base.processes import answer_all, fence, is_below
 from rbxcompose.base.requests import to_data
 from rbxcompose.domains.body.xacro_answer import BareFile, BareTag, XacroAnswer
 from rbxcompose.manifest.tree import DEPTH

@@ -22,8 +22,8 @@ from rbxcompose.domains.diagnostics.settings import (
     is_glob,
     matches,
 )
+from rbxcompose.manifest.reader import REPLACE
 from rbxcompose.manifest.tree import KeyPath, SequenceNode
-from rbxcompose.manifest.walk import REPLACE
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.sdk.capabilities import ExpectsRate
 from rbxcompose.sdk.component import Component

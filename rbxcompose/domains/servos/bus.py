@@ -201,6 +201,4 @@ def bus_type(name: str) -> BusType:
         KeyError: if no type has this name.
         BrokenPluginError: if it belongs to another package and cannot be used.
     """
-    if name not in _TYPES and PLUGINS.load(name) and name not in _TYPES:
-        raise PLUGINS.broken(name, f"its module declares no type by @bus_type_declared({name!r}, ...)")
-    return _TYPES[name]
+    return PLUGINS.find(name, _TYPES, f"type by @bus_type_declared({name!r}, ...)")

@@ -240,6 +240,4 @@ def controller_type(name: str) -> type[Controller[Any]]:
         KeyError: if no type has this name.
         BrokenPluginError: if it belongs to another package and cannot be used.
     """
-    if name not in _TYPES and PLUGINS.load(name) and name not in _TYPES:
-        raise PLUGINS.broken(name, f"its module declares no class by @controller({name!r})")
-    return _TYPES[name]
+    return PLUGINS.find(name, _TYPES, f"class by @controller({name!r})")

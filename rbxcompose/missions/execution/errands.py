@@ -15,7 +15,7 @@ from rbxcompose.missions.sources import OUTCOME, SkillSource
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.sdk.bound import REASONS, Ended, OrderSender, Outcome, Reply, SentGoal
-from rbxcompose.sdk.skills import Activity, Returned, SkillType
+from rbxcompose.sdk.registry import Activity, Returned, SkillType
 
 
 class Shell(Protocol):

@@ -15,7 +15,7 @@ from rbxcompose.missions.program.goals import filled, goal_of, message_of
 from rbxcompose.missions.program.outcomes import Result
 from rbxcompose.missions.sources import SkillWay, ValueSource
 from rbxcompose.msgs import registry
-from rbxcompose.sdk.skills import skill_type
+from rbxcompose.sdk.registry import skill_type
 
 
 class Arrivals:

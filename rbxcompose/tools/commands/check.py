@@ -16,8 +16,7 @@ from pathlib import Path
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
-from rbxcompose.base.findings import Finding, Fix, Report, Sources, nearest
-from rbxcompose.base.fixes import apply, safe_fixes
+from rbxcompose.base.findings import Finding, Fix, Report, Sources, apply_fixes, nearest, safe_fixes
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, emit, good, has_colour, misused
 from rbxcompose.commands.formats import format_names, renderer
@@ -193,7 +192,7 @@ def _apply(fixes: list[Fix], sources: Sources, say: PrintLine) -> bool:
             say(f"left {plain(file)} as it is: it has changed since it was read, or can no longer be read")
         else:
             texts[file] = text
-    out = apply(fixes, texts)
+    out = apply_fixes(fixes, texts)
     written = {file for file, text in out.texts.items() if text != texts[file] and _write(file, text, say)}
     for one in out.done:
         if all(edit.span.file in written for edit in one.edits):

@@ -16,7 +16,7 @@ from rbxcompose.commands.console import FINDINGS, emit, table, write_report
 from rbxcompose.commands.options import add_json_option
 from rbxcompose.commands.targets import add_layer_options, compiled, targets
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.sdk import registry, skills
+from rbxcompose.sdk import registry
 from rbxcompose.sdk.capabilities import NeedsExtra
 
 GROUP = "run"
@@ -80,7 +80,7 @@ def requirements(robots: Sequence[Robot], version: str) -> list[str]:
     """Return what pip must install: rbxcompose with the extras of robots, and packages of their types and skills."""
     extras = ",".join(item.name for item in needed(robots))
     types = {component.type_name for robot in robots for component in robot.components.values()}
-    used = ((registry.PLUGINS, types), (skills.PLUGINS, {name for robot in robots for name in robot.skills}))
+    used = ((registry.PLUGINS, types), (registry.SKILL_PLUGINS, {name for robot in robots for name in robot.skills}))
     entries = [
         entry
         for plugins, names in used

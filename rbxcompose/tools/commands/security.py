@@ -22,8 +22,8 @@ from rbxcompose.commands.options import Subcommand, add_actions, add_system_opti
 from rbxcompose.commands.targets import system_without_errors
 from rbxcompose.compiler.plan.model import LinkTls
 from rbxcompose.compiler.systems import certificates
-from rbxcompose.compiler.systems.audit import listeners, reachable_keys
 from rbxcompose.compiler.systems.model import System
+from rbxcompose.compiler.systems.share import listeners, reachable_keys
 
 GROUP = "system"
 NOT_MADE = kind("RBX6116")

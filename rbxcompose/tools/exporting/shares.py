@@ -16,9 +16,8 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.bundle import BundledFile
 from rbxcompose.compiler.systems.certificates import AUTHORITY, CERTIFICATE, KEY, NO_SECURITY
-from rbxcompose.compiler.systems.exchange import exchange_of
 from rbxcompose.compiler.systems.model import System
-from rbxcompose.compiler.systems.share import hosts_of, share_of
+from rbxcompose.compiler.systems.share import exchange_of, hosts_of, share_of
 from rbxcompose.manifest.fill import VARIABLE
 from rbxcompose.sdk.capabilities import OpensPort
 from rbxcompose.sdk.registry import component_type

@@ -15,10 +15,8 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.diff import Change
 from rbxcompose.compiler.plan.model import BusPlan, Instance, Plan, Wire, extent
 from rbxcompose.compiler.systems.cut_link import every_stop, stops_after_cut, stops_of_goals
-from rbxcompose.compiler.systems.exchange import exchange_of, shared_crossings
-from rbxcompose.compiler.systems.model import PlacedRobot, System
-from rbxcompose.compiler.systems.share import hosts_of, robots_on, share_of
-from rbxcompose.compiler.systems.traffic import Crossing
+from rbxcompose.compiler.systems.model import Crossing, PlacedRobot, System
+from rbxcompose.compiler.systems.share import exchange_of, hosts_of, robots_on, share_of, shared_crossings
 from rbxcompose.manifest.tree import KeyPath, TreeNode, at, key_span, value_span
 from rbxcompose.sdk.ports import Looks, Port
 from rbxcompose.sdk.registry import component_type

@@ -76,7 +76,7 @@ def _program(spot: Spot) -> Program | None:
 
 def _declared(spot: Spot, root: tree.MappingNode, section: str) -> Iterator[tuple[str, str]]:
     program = _program(spot)
-    for name, entry in tree.entries_of(root.get(section)):
+    for name, entry in tree.entries_of(root.get(section)).items():
         known = base_names(program, spot.known.robot.names).get(name) if program and spot.known.robot else None
         word = tree.at(entry.value, ("type",))
         yield name, known.phrase if known else word.text if isinstance(word, tree.ScalarNode) else UNKNOWN.phrase
@@ -125,8 +125,8 @@ def _section(name: str, entry: tree.Entry, is_mission: bool) -> OutlineEntry:
 
 
 def _named(node: tree.TreeNode) -> Iterator[OutlineEntry]:
-    for _, entry in tree.entries_of(node):
-        inner = (one for _, one in tree.entries_of(entry.value) if not isinstance(one.value, tree.ScalarNode))
+    for _, entry in tree.entries_of(node).items():
+        inner = (one for _, one in tree.entries_of(entry.value).items() if not isinstance(one.value, tree.ScalarNode))
         yield _made(entry, "name", tuple(_made(item, "value", tuple(_named(item.value))) for item in inner))
 
 

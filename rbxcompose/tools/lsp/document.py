@@ -141,7 +141,7 @@ class Cursor:
         """Return the tree without the key being written."""
 
         def without_key(node: TreeNode) -> TreeNode:
-            others = {name: entry for name, entry in entries_of(node) if name != self.text}
+            others = {name: entry for name, entry in entries_of(node).items() if name != self.text}
             return replace(node, entries=others) if isinstance(node, MappingNode) else node
 
         tree = _changed(self.root, self.path, without_key) if self.is_key else self.root
@@ -208,7 +208,7 @@ def _without_mark(node: TreeNode) -> TreeNode:
     if isinstance(node, ScalarNode):
         return replace(node, text=node.text.replace(MARK, ""))
     renamed: dict[str, Entry] = {}
-    for name, entry in entries_of(node):
+    for name, entry in entries_of(node).items():
         own = name.replace(MARK, "")
         renamed.setdefault(own, replace(entry, key=replace(entry.key, text=own)))
     return replace(node, entries=renamed) if isinstance(node, MappingNode) else node
@@ -320,7 +320,7 @@ class KnownNames:
     def _in_text(self, kind: str) -> dict[str, str]:
         found: dict[str, str] = {}
         for section in naming(kind):
-            named = entries_of(at(self.root, (section.name, *section.at)))
+            named = entries_of(at(self.root, (section.name, *section.at))).items()
             found |= {name: text_at(entry.value, ("type",)) for name, entry in named if name.isidentifier()}
         return found
 
@@ -358,7 +358,7 @@ class KnownNames:
         path = resolve(written.text, self.path, written.span) if isinstance(written, ScalarNode) else None
         part = read_file(path, str(path), {})[0] if isinstance(path, Path) else None
         named = part.get(args.name) if isinstance(part, MappingNode) else None
-        return {name: text_at(entry.value, ("type",)) for name, entry in entries_of(named)}
+        return {name: text_at(entry.value, ("type",)) for name, entry in entries_of(named).items()}
 
 
 @dataclass(frozen=True, slots=True)

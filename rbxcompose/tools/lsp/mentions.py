@@ -34,7 +34,7 @@ from rbxcompose.manifest.tree import (
     text_at,
 )
 from rbxcompose.missions.language.grammar import BODIES, STATE_KEYS, Takes
-from rbxcompose.missions.language.reader import BODIES, INTERRUPT_KEYS, read_program
+from rbxcompose.missions.language.reader import INTERRUPT_KEYS, read_program
 from rbxcompose.missions.program.parts import DEEDS, MACHINE_KEYS, Asked, WrittenArgument
 from rbxcompose.missions.program.program import Program, Skill
 from rbxcompose.missions.program.registry import keys_taking, kinds, modifier_keys
@@ -115,7 +115,7 @@ class ManifestMentions(_FileMentions):
                     yield from self._of_section(section, layer, entry.value)
 
     def _of_section(self, section: Section[Any, Any], layer: MappingNode, node: TreeNode) -> Iterator[Mention]:
-        for name, entry in entries_of(at(layer, (section.name, *section.at)) if section.names else None):
+        for name, entry in entries_of(at(layer, (section.name, *section.at)) if section.names else None).items():
             for scope in self.scopes:
                 meanings = self.files.visible(scope, section.name).get(name, frozenset())
                 yield from self._meant(entry.key, 0, meanings, is_definition=True)
@@ -136,9 +136,9 @@ class ManifestMentions(_FileMentions):
             yield from self._meant(scalar, 0, self.files.meanings(scope, kind, scalar.text))
 
     def _given_to_parts(self, node: TreeNode) -> Iterator[Mention]:
-        for instance, entry in entries_of(node):
+        for instance, entry in entries_of(node).items():
             parts = [part for scope in self.scopes for part in self.files.parts(scope).get(instance, ())]
-            for name, given in entries_of(at(entry.value, ("with",))):
+            for name, given in entries_of(at(entry.value, ("with",))).items():
                 for part in parts:
                     own = Symbol(part, args.name, name)
                     if own.name in self.files.visible(part, args.name):
@@ -149,8 +149,8 @@ class ManifestMentions(_FileMentions):
 
     def _given_to_missions(self, node: TreeNode) -> Iterator[Mention]:
         there = [one for scope in self.scopes for one in self.files.missions(scope)]
-        for mission, entry in entries_of(node):
-            for name, given in entries_of(at(entry.value, ("with",))):
+        for mission, entry in entries_of(node).items():
+            for name, given in entries_of(at(entry.value, ("with",))).items():
                 for file in dict.fromkeys(file for one, file in there if one == mission):
                     declared = at(self.files.tree(file), ("inputs", name))
                     if declared is None:
@@ -162,7 +162,7 @@ class ManifestMentions(_FileMentions):
                             yield from self._reference(PLACE, scalar)
 
     def _defaults(self, node: TreeNode) -> Iterator[Mention]:
-        for name, entry in entries_of(node):
+        for name, entry in entries_of(node).items():
             value = at(entry.value, ("default",)) or entry.value
             kinds = {kind for scope in self.scopes for kind in kinds_of_argument(self.files, scope, name)}
             for scalar in scalars(value) if not isinstance(value, MappingNode) else ():
@@ -223,8 +223,8 @@ def kinds_of_argument(files: ProjectFiles, part: Path, name: str, level: int = 0
             section = section_named(key)
             if section is not None:
                 found |= {kind for kind, node in references(files, part, section, entry.value) if node.text == filler}
-        for instance, entry in entries_of(layer.get(include.name)):
-            for inner, given in entries_of(at(entry.value, ("with",))):
+        for instance, entry in entries_of(layer.get(include.name)).items():
+            for inner, given in entries_of(at(entry.value, ("with",))).items():
                 if isinstance(given.value, ScalarNode) and given.value.text == filler:
                     for other in files.parts(part).get(instance, ()):
                         found |= kinds_of_argument(files, other, inner, level + 1)
@@ -276,7 +276,7 @@ class MissionMentions(_FileMentions):
     def all(self) -> Iterator[Mention]:
         """Yield every place where a name is written."""
         for section in ("inputs", "data"):
-            for name, entry in entries_of(self.root.get(section)):
+            for name, entry in entries_of(self.root.get(section)).items():
                 yield self._mention(entry.key, Symbol(self.path, VARIABLE, name), is_definition=True)
         for key in ("data", "interrupts", "outputs", *BODIES):
             if (node := self.root.get(key)) is not None:
@@ -291,7 +291,7 @@ class MissionMentions(_FileMentions):
         yield from self._places()
 
     def _keys(self, node: TreeNode | None, sort: str, place: KeyPath) -> Iterator[Mention]:
-        for name, entry in entries_of(node):
+        for name, entry in entries_of(node).items():
             yield self._mention(entry.key, Symbol(self.path, sort, name, place), is_definition=True)
 
     def _walk(self, node: TreeNode, around: StepSurroundings) -> Iterator[Mention]:
@@ -310,7 +310,7 @@ class MissionMentions(_FileMentions):
                 yield from self._walk(entry.value, around.below(name, are_steps=False))
 
     def _walk_named(self, node: TreeNode, around: StepSurroundings) -> Iterator[Mention]:
-        for name, entry in entries_of(node):
+        for name, entry in entries_of(node).items():
             yield from self._walk(entry.key, around)
             yield from self._walk(entry.value, around.below(name))
 
@@ -344,7 +344,7 @@ class MissionMentions(_FileMentions):
     def _word(self, key: str, value: TreeNode, around: StepSurroundings) -> Iterator[Mention]:
         """Yield the name that a word of the language takes."""
         if key == "set":
-            for _, entry in entries_of(value):
+            for _, entry in entries_of(value).items():
                 yield from self._own(entry.key, (VARIABLE,))
         if not isinstance(value, ScalarNode):
             return
@@ -361,7 +361,7 @@ class MissionMentions(_FileMentions):
             yield from self._given(at(self.root, (*around.path, "with")), value.text)
 
     def _given(self, given: TreeNode | None, mission: str) -> Iterator[Mention]:
-        for name, entry in entries_of(given):
+        for name, entry in entries_of(given).items():
             for file in self._files_of(mission):
                 if any(symbol.sort == VARIABLE for symbol in mission_names(self.files, file).get(name, ())):
                     yield self._mention(entry.key, Symbol(file, VARIABLE, name))
@@ -373,7 +373,7 @@ class MissionMentions(_FileMentions):
         """Yield the names in the call of a skill: a controller is one, and its arguments are its joints."""
         found = list(self._of_robots(CONTROLLER, key))
         yield from found
-        for _, argument in entries_of(value) if found else ():
+        for _, argument in entries_of(value).items() if found else ():
             yield from self._of_robots(JOINT, argument.key)
         yield from self._walk(value, around.below("", are_steps=False))
 
@@ -422,7 +422,7 @@ class MissionMentions(_FileMentions):
         """Return the types of the arguments of a skill or mission; the main one has no name."""
         if used is not None:
             inputs = (self.files.tree(file).get("inputs") for file in self._files_of(used.text))
-            named = (pair for input_ in inputs for pair in entries_of(input_))
+            named = (pair for input_ in inputs for pair in entries_of(input_).items())
             return {name: TypeKind.PLACE if is_placed(entry.value) else TypeKind.TEXT for name, entry in named}
         known = self.skills.get(skill)
         types = {name: argument.kind for name, argument in known.arguments.items()} if known else {}
@@ -439,11 +439,11 @@ class MissionMentions(_FileMentions):
 
     def _known_places(self, section: str) -> Iterator[Mention]:
         """Yield the places in the values of inputs and data: a map or list that has nothing else, or a single word."""
-        for _, entry in entries_of(self.root.get(section)):
+        for _, entry in entries_of(self.root.get(section)).items():
             value: TreeNode | None = entry.value
             if section == "inputs":
                 value = at(entry.value, ("default",)) if is_placed(entry.value) else None
-            keys = [one.key for _, one in entries_of(value)]
+            keys = [one.key for _, one in entries_of(value).items()]
             items = list(value.items) if isinstance(value, SequenceNode) else [value]
             for group in (keys, [item for item in items if isinstance(item, ScalarNode)]):
                 if group and (not isinstance(value, SequenceNode) or len(group) == len(items)):
@@ -481,7 +481,7 @@ def mission_names(files: ProjectFiles, path: Path) -> dict[str, list[Symbol]]:
 
     root = files.tree(path)
     for section in ("inputs", "data"):
-        for name, _ in entries_of(root.get(section)):
+        for name, _ in entries_of(root.get(section)).items():
             add(VARIABLE, name)
     walk(root, ())
     return {name: list(symbols) for name, symbols in found.items()}
@@ -540,10 +540,10 @@ class TrialMentions(_FileMentions):
         if self.mission is None:
             return
         yield from self._of_robots(MISSION, self.mission)
-        for _, entry in entries_of(self.root.get("with")):
+        for _, entry in entries_of(self.root.get("with")).items():
             yield from self._own(entry.key, (VARIABLE,))
             yield from self._values(entry.value)
-        for _, entry in entries_of(self.root.get("mocks")):
+        for _, entry in entries_of(self.root.get("mocks")).items():
             yield from self._of_robots(CONTROLLER, entry.key)
             yield from self._set(at(entry.value, ("sets",)))
             if self._takes_places(entry.key.text, ""):
@@ -562,10 +562,10 @@ class TrialMentions(_FileMentions):
             listed = at(self.root, ("expect", key))
             for item in listed.items if isinstance(listed, SequenceNode) else ():
                 yield from self._step(item)
-        for _, entry in entries_of(at(self.root, ("expect", "count"))):
+        for _, entry in entries_of(at(self.root, ("expect", "count"))).items():
             yield from self._own(entry.key, _STEPS)
             yield from self._of_robots(CONTROLLER, entry.key)
-        for _, entry in entries_of(at(self.root, ("expect", "data"))):
+        for _, entry in entries_of(at(self.root, ("expect", "data"))).items():
             yield from self._own(entry.key, (VARIABLE,))
             yield from self._values(entry.value)
 
@@ -573,14 +573,14 @@ class TrialMentions(_FileMentions):
         if isinstance(item, ScalarNode):
             yield from self._own(item, _STEPS)
             yield from self._of_robots(CONTROLLER, item)
-        for _, entry in entries_of(item):
+        for _, entry in entries_of(item).items():
             name = entry.key.text
             if name in STEP_KEYS:
                 continue
             yield from self._own(entry.key, _STEPS)
             is_controller = list(self._of_robots(CONTROLLER, entry.key))
             yield from is_controller
-            for _, argument in entries_of(entry.value):
+            for _, argument in entries_of(entry.value).items():
                 yield from self._of_robots(JOINT, argument.key) if is_controller else ()
                 if self._takes_places(name, argument.key.text):
                     yield from self._values(argument.value)
@@ -593,7 +593,7 @@ class TrialMentions(_FileMentions):
         return wanted is None or wanted.kind not in (TypeKind.TEXT, TypeKind.CHOICE)
 
     def _set(self, node: TreeNode | None) -> Iterator[Mention]:
-        for _, entry in entries_of(node):
+        for _, entry in entries_of(node).items():
             yield from self._of_robots(VALUE, entry.key)
             yield from self._values(entry.value)
 

@@ -164,7 +164,7 @@ class ProjectFiles:
         """Yield the maps of a file that have sections: the file itself, and its profiles."""
         root = self.tree(path)
         yield root
-        for _, entry in entries_of(root.get(profiles.name)):
+        for _, entry in entries_of(root.get(profiles.name)).items():
             if isinstance(entry.value, MappingNode):
                 yield entry.value
 
@@ -186,7 +186,7 @@ class ProjectFiles:
             return self._parts[scope]
         found: dict[str, dict[Path, None]] = {}
         for layer in self._all_layers(scope):
-            for name, entry in entries_of(layer.get(include.name)):
+            for name, entry in entries_of(layer.get(include.name)).items():
                 file = self._file(at(entry.value, ("part",)) or entry.value, scope)
                 if file is not None and file != scope:
                     found.setdefault(name, {})[file] = None
@@ -201,7 +201,7 @@ class ProjectFiles:
 
     def _listed(self, scope: Path) -> Iterator[tuple[str, Path]]:
         for layer in self._all_layers(scope):
-            for name, entry in entries_of(layer.get(missions.name)):
+            for name, entry in entries_of(layer.get(missions.name)).items():
                 if (file := self._file(at(entry.value, ("file",)) or entry.value, scope)) is not None:
                     yield name, file
 

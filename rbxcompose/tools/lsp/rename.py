@@ -5,8 +5,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Severity
-from rbxcompose.base.fixes import apply
+from rbxcompose.base.findings import Finding, Severity, apply_fixes
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.registry import section_named
@@ -46,7 +45,7 @@ def actions(project: Project, findings: Iterable[Finding], first: int, last: int
             continue
         files = {edit.span.file: Path(edit.span.file).resolve() for edit in fix.edits}
         texts = {file: project.text(path) for file, path in files.items()}
-        after = apply([fix], texts).texts
+        after = apply_fixes([fix], texts).texts
         changes = {files[file]: change_of(texts[file], after[file]) for file in files if texts[file] != after[file]}
         if changes:
             yield CodeAction(fix.title, finding, fix.is_safe, changes)

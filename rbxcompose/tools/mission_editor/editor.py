@@ -13,8 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from rbxcompose.base.findings import Finding, Severity, Span
-from rbxcompose.base.fixes import EditPlace, places
+from rbxcompose.base.findings import EditPlace, Finding, Severity, Span, places_of_fixes
 from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.base.requests import Refused
 from rbxcompose.compiler.compile import Compilation, look_at_mission, with_text_of_mission
@@ -187,7 +186,7 @@ class MissionEditor:
         own = [one for one in found if one.span is not None and one.span.file == shown]
         others = [one for one in found if one.span is None or one.span.file != shown]
         fixes = [one.fix for one in own if one.fix is not None]
-        applied = dict(zip(map(id, fixes), places(fixes, {shown: text}), strict=True))
+        applied = dict(zip(map(id, fixes), places_of_fixes(fixes, {shown: text}), strict=True))
         findings = [self._finding(one, units) for one in own[:MOST_FINDINGS]]
         for data, one in zip(findings, own, strict=False):
             if one.fix is not None and (edits := applied[id(one.fix)]):

@@ -106,7 +106,7 @@ class TrialContext:
         """Return the settings by name; besides the robot's values, expressions see what is `known`."""
         found: dict[str, ValueSetting] = {}
         valid = names_of(self.names)
-        for name, entry in entries_of(node):
+        for name, entry in entries_of(node).items():
             message = f"the robot has no value '{name}'"
             if not self.knows(entry.key.span, name, valid, message, "values of this robot"):
                 continue
@@ -187,7 +187,9 @@ def _bars(never: ExpectedStep, step: ExpectedStep) -> bool:
 
 def read_mocks(context: TrialContext, node: TreeNode | None, models: Mapping[str, trials.MockModel]) -> dict[str, Mock]:
     """Return the mocks by the name of the skill or service that they replace."""
-    return {name: _mock(context, name, entry, models[name]) for name, entry in entries_of(node) if name in models}
+    return {
+        name: _mock(context, name, entry, models[name]) for name, entry in entries_of(node).items() if name in models
+    }
 
 
 def _mock(context: TrialContext, name: str, entry: Entry, model: trials.MockModel) -> Mock:
@@ -334,7 +336,7 @@ def _arguments(context: TrialContext, name: str, node: TreeNode) -> dict[str, Va
         context.report.add(codes.NO_STEP.at(node.span, f"'{name}' is not a skill, so it has no arguments"))
         return {}
     is_map, nothing = isinstance(node, MappingNode), "single value" if skill.arguments else "argument"
-    written = {key: entry.value for key, entry in entries_of(node)} if is_map else {skill.main: node}
+    written = {key: entry.value for key, entry in entries_of(node).items()} if is_map else {skill.main: node}
     found: dict[str, Value] = {}
     for key, value in written.items():
         message = f"the skill '{name}' has no argument '{key}'" if key else f"the skill '{name}' takes no {nothing}"
@@ -345,7 +347,7 @@ def _arguments(context: TrialContext, name: str, node: TreeNode) -> dict[str, Va
 
 def _counts(context: TrialContext, node: TreeNode | None, counts: Mapping[str, int]) -> list[ExpectedValue]:
     found = []
-    for name, entry in entries_of(node):
+    for name, entry in entries_of(node).items():
         if not context.knows_step(entry.key):
             continue
         if counts.get(name, -1) < 0:
@@ -357,7 +359,7 @@ def _counts(context: TrialContext, node: TreeNode | None, counts: Mapping[str, i
 
 def _data(context: TrialContext, node: TreeNode | None) -> list[ExpectedValue]:
     found = []
-    for name, entry in entries_of(node):
+    for name, entry in entries_of(node).items():
         wanted = context.type_of_datum(name)
         if wanted is None:
             message, known = f"the mission '{context.program.name}' has no datum '{name}'", context.program.data
@@ -406,7 +408,7 @@ def read_events(
 
 
 def _event(context: TrialContext, node: TreeNode, model: trials.EventModel) -> TrialEvent:
-    words = [word for word, _ in entries_of(node) if word != AT]
+    words = [word for word, _ in entries_of(node).items() if word != AT]
     if not words:
         context.report.add(codes.NEVER.at(node.span, "nothing happens here", help="give 'set', 'publish', 'stop', ..."))
     deeds = (_deed(context, word, node, model) for word in words)

@@ -13,8 +13,7 @@ from typing import Any
 from rbxcompose.base.config import Config, key_of, leaves, value_at, with_values
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
-from rbxcompose.base.findings import Fix, Related, Span, kind
-from rbxcompose.base.fixes import apply
+from rbxcompose.base.findings import Fix, Related, Span, apply_fixes, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import Dimension
 from rbxcompose.bus.names import resolve
@@ -258,7 +257,7 @@ def _edited(live: LiveSettings, fix: Fix) -> NewTexts:
     texts = {shown: data.decode("utf-8") for shown, data in before.items()}
     ends = {shown: "\r\n" if "\r\n" in text else "\n" for shown, text in texts.items()}
     edits = (replace(edit, text=edit.text.replace("\n", ends[edit.span.file])) for edit in fix.edits)
-    out = apply([replace(fix, edits=tuple(edits))], texts)
+    out = apply_fixes([replace(fix, edits=tuple(edits))], texts)
     if not out.done:
         raise NotDoneError(NOT_SAVED.at(None, "nothing is saved: the values are written in an unusual way"))
     after = {files[shown]: text.encode("utf-8") for shown, text in out.texts.items() if text != texts[shown]}

@@ -42,7 +42,7 @@ from rbxcompose.msgs.rbxcompose_msgs import (
 )
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_seconds
-from rbxcompose.sdk.key_feed import KeyFeed, whole
+from rbxcompose.sdk.bound import KeyFeed, whole
 
 MOVE, REACH, TRACE, FOLLOW, LOCATE = "move", "reach", "trace", "follow", "locate"  # its ports
 FORWARD, INVERSE, MOTION, GIVEN = "forward", "inverse", "motion", "given"  # those of programs for MoveIt

@@ -34,7 +34,7 @@ from rbxcompose.msgs.rbxcompose_msgs import AttachObject, DetachObject, SceneObj
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.visualization_msgs import MarkerArray
 from rbxcompose.sdk import Component, Config, In, Looks, Out, Port, Refused, Serves, answers, component
-from rbxcompose.sdk.key_feed import KeyFeed, whole
+from rbxcompose.sdk.bound import KeyFeed, whole
 
 ROUNDING = 1e-6  # of a period
 PERIOD = 0.1  # [s] after which it is looked where frames outside of the body are

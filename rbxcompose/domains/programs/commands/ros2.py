@@ -19,8 +19,7 @@ from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
-from rbxcompose.base.findings import Edit, Fix, Span, kind
-from rbxcompose.base.fixes import apply
+from rbxcompose.base.findings import Edit, Fix, Span, apply_fixes, kind
 from rbxcompose.base.requests import OutsideError
 from rbxcompose.commands import options
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, write_report
@@ -101,7 +100,7 @@ def _pin(arguments: argparse.Namespace) -> int:
     if not edits:
         emit(f"'{arguments.component}' declares all that {wanted} has")
         return 0
-    out = apply([Fix(edits, is_safe=True, title=f"what {wanted} has")], {shown: text})
+    out = apply_fixes([Fix(edits, is_safe=True, title=f"what {wanted} has")], {shown: text})
     if not out.done or read_regular(path, FILE_BYTES).decode("utf-8") != text:
         message = f"'{shown}' cannot be changed: it is written in an unusual way, or has changed meanwhile"
         raise NotDoneError(NO_NODE.at(written.span, message))

@@ -8,9 +8,9 @@ from dataclasses import field
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.fenced_answers import fenced_answers
 from rbxcompose.base.findings import Finding, Report, Span, kind
 from rbxcompose.base.printable import plain
+from rbxcompose.base.processes import fenced_answers
 from rbxcompose.commands.importing.foreign_files import ForeignFile, Given
 from rbxcompose.commands.importing.importer import OTHER_PROGRAM
 from rbxcompose.domains.body.xml_reader import XmlElement, read_xml

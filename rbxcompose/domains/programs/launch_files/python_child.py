@@ -17,8 +17,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from rbxcompose.base.fenced_answers import answer_all
-from rbxcompose.base.processes import fence
+from rbxcompose.base.processes import answer_all, fence
 from rbxcompose.domains.programs.launch_files.substitutions import (
     LaunchText,
     SubstitutionCall,
