@@ -164,8 +164,7 @@ def device_answers(
         yield from _link_findings(name, port, ports, span, rules_are_right)
         file = look(port.path)
         if file.exists and not file.may_open:
-            todo = f"sudo usermod -aG {file.group or 'dialout'} $USER, then log in again"
-            yield FORBIDDEN.at(span, f"'{name}' is {plain(port.path)}, which may not be opened by this user", help=todo)
+            yield _forbidden(f"'{name}' is {plain(port.path)}, which", file, span)
     for group in same_serials(ports):
         places = ", ".join(serial_port.path for serial_port in group)
         serial = group[0].device.serial if group[0].device else ""
@@ -239,10 +238,14 @@ def _of_port(name: str, ports: Sequence[SerialPort], look: LookAt, span: Span) -
     elif not file.is_device:
         yield UNFIT.at(span, f"{shown} is not a serial port", help=connected(ports, "serial port"))
     elif not file.may_open:
-        todo = f"sudo usermod -aG {file.group or 'dialout'} $USER, then log in again"
-        yield FORBIDDEN.at(span, f"{shown} may not be opened by this user", help=todo)
+        yield _forbidden(shown, file, span)
     elif warning := slow_adapter(path, file.latency, span):
         yield warning
+
+
+def _forbidden(what: str, file: PortFile, span: Span | None) -> Finding:
+    todo = f"sudo usermod -aG {file.group or 'dialout'} $USER, then log in again"
+    return FORBIDDEN.at(span, f"{what} may not be opened by this user", help=todo)
 
 
 def look_at(path: str) -> PortFile:

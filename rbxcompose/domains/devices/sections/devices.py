@@ -134,10 +134,14 @@ def _shared(name: str, other: str, wanted: Mapping[str, UsbDevice], spans: Mappi
 
 def port_name(contents: Contents, port: str) -> str:
     """Return the name by which a port is opened: that of the device for `dev:NAME`, else the path."""
+    known: dict[str, DeviceModel] = contents.of(devices)
+    return _port_name(known, port)
+
+
+def _port_name(known: Mapping[str, object], port: str) -> str:
     prefix, _ = PREFIXED[DEVICE_PORT]
-    name = port.removeprefix(prefix)
-    one = contents.of(devices).get(name) if port.startswith(prefix) else None
-    return one.wanted(name).port if one else port
+    device = known.get(name := port.removeprefix(prefix)) if port.startswith(prefix) else None
+    return device.wanted(name).port if isinstance(device, DeviceModel) else port
 
 
 def with_folder(text: str) -> str:
@@ -149,10 +153,7 @@ def with_folder(text: str) -> str:
 
 def _device(text: str, info: ValidationInfo) -> str:
     """Return the name by which a port is opened, as `port_name` does."""
-    prefix, kind = PREFIXED[DEVICE_PORT]
-    known = {} if info.context is None else info.context.get(kind, {})
-    device = known.get(name := text.removeprefix(prefix)) if text.startswith(prefix) else None
-    return device.wanted(name).port if isinstance(device, DeviceModel) else text
+    return _port_name({} if info.context is None else info.context.get(DEVICE, {}), text)
 
 
 SerialPortName = Annotated[str, Refers(DEVICE_PORT), AfterValidator(with_folder), AfterValidator(_device)]
