@@ -14,16 +14,8 @@ from numpy.typing import NDArray
 
 from rbxcompose.domains.arms.motion import numba_cache
 from rbxcompose.domains.arms.motion.compiled_collisions import near_pairs, workspace
-from rbxcompose.domains.arms.motion.numba_cache import (
-    CompiledFunction,
-    Library,
-    borrowed,
-    can_link,
-    compiled,
-    flat,
-    inlined,
-    is_empty,
-)
+from rbxcompose.domains.arms.motion.library import Library, flat
+from rbxcompose.domains.arms.motion.numba_cache import CompiledFunction, borrowed, can_link, compiled, inlined, is_empty
 from tests.motion.toy_arm import fast_planner
 from tests.soak import rare
 

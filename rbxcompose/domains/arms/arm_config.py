@@ -20,7 +20,7 @@ from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, Array, Joi
 from rbxcompose.domains.arms.motion.hand_task import PlanningHelper
 from rbxcompose.domains.arms.motion.inverse_kinematics import ANGLE_TOLERANCE, RESTARTS, TOLERANCE, SolverSettings
 from rbxcompose.domains.arms.motion.numba_cache import is_installed, keep_libraries
-from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
+from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings, can_search
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
 from rbxcompose.domains.arms.section_models import AUTOMATIC, FAST, HandConfig, PlannerModel
 from rbxcompose.domains.body.description import Description
@@ -190,7 +190,7 @@ class ArmWorks:
         self.solver, own = config.kinematics.settings, config.planner
         settings = PlannerSettings(own.type, own.time, own.attempts, own.seed, own.simplify)
         self.planner = MotionPlanner(self.space, self._fast(self._checker), settings, now, unlikely)
-        if collisions.can_search(self.planner.checker):
+        if can_search(self.planner.checker):
             self.planner.checker.prepare(self.space)
         keep_libraries()
 

@@ -6,7 +6,7 @@ import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, Self, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, Protocol, Self, TypeVar, get_args
 
 from pydantic import PrivateAttr
 
@@ -19,7 +19,6 @@ from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.ports import Port
 
 if TYPE_CHECKING:  # `check` needs none of them
-    from rbxcompose.domains.servos.components.servo_bus import ServoBusDriver
     from rbxcompose.domains.servos.joint_drive import JointDrive
     from rbxcompose.domains.servos.servo_cycle import ServoItem
 
@@ -73,10 +72,33 @@ C = TypeVar("C", bound=ControllerConfig)
 T = TypeVar("T", bound="type[Controller[Any]]")
 
 
+class ControllerHost(Protocol):
+    """The component that runs controllers, as their sites see it."""
+
+    bound: dict[str, Any]
+
+    @property
+    def now(self) -> float:
+        """Return robot time [s]."""
+
+    @property
+    def stamp(self) -> int:
+        """Return the time for message headers [ns]."""
+
+    def warn(self, text: str) -> None:
+        """Log something that a person should look at."""
+
+    def objection(self, controller: str) -> str:
+        """Return why a controller may command nothing now, or nothing."""
+
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ServoItem:
+        """Return an item of a servo."""
+
+
 class ControllerSite:
     """What a controller uses of the component that runs it."""
 
-    def __init__(self, bus: ServoBusDriver, name: str, joints: Mapping[str, JointDrive]) -> None:
+    def __init__(self, bus: ControllerHost, name: str, joints: Mapping[str, JointDrive]) -> None:
         self._bus, self._name, self.joints = bus, name, joints
 
     @property

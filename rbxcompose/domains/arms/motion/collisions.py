@@ -10,7 +10,7 @@ from importlib import import_module
 from itertools import chain, combinations, product
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,9 +27,6 @@ from rbxcompose.domains.body.link_pairs import CollisionMatrix, LinkPair, PairRe
 from rbxcompose.domains.body.meshes import read_mesh
 from rbxcompose.domains.body.model import Body, BodyJoint, Geometry
 from rbxcompose.domains.servos.limits import MotionLimits
-
-if TYPE_CHECKING:
-    from rbxcompose.domains.arms.motion.sphere_checker import SphereChecker
 
 Coal = Any  # of an extra, without types
 STL = ".stl"
@@ -174,11 +171,6 @@ class Checker(Protocol):
 
     def in_the_way(self, values: Array, shape: Geometry, at: Transform3, ignored: Collection[str]) -> list[str]:
         """Return the links and objects but those `ignored` that a shape, at a pose in the root's frame, is within."""
-
-
-def can_search(checker: Checker) -> TypeGuard[SphereChecker]:
-    """Return whether a checker is one that searches; `isinstance` of a protocol takes as long as 50 positions."""
-    return hasattr(checker, "ways")
 
 
 def pairs_shown(pairs: Collection[LinkPair], most: int = 3) -> str:

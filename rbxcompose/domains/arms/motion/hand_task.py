@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Generator, Iterable, Iterator,
 from contextlib import closing
 from dataclasses import replace
 from itertools import product
-from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
+from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -36,9 +36,6 @@ from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.reasons import GraspReason, MotionFailure, MotionReason, StageFailure
 from rbxcompose.domains.body.link_pairs import LinkPair
 from rbxcompose.domains.body.model import Geometry
-
-if TYPE_CHECKING:
-    from rbxcompose.domains.arms.arm_config import ArmWorks
 
 STEP = 0.005  # [m] between poses of the tip
 TURN = 0.1  # [rad] between them
@@ -281,6 +278,19 @@ class PlanningHelper(Protocol):
         """Let go of the job."""
 
 
+class HandWorks(Protocol):
+    """What plans for an arm among objects, and who helps it."""
+
+    kinematics: ArmKinematics
+    planner: MotionPlanner
+    objects: tuple[PlacedObject, ...]
+    paddings: Mapping[str, float]
+    helpers: Sequence[PlanningHelper]
+
+    def checker(self, objects: Iterable[PlacedObject]) -> Checker:
+        """Return a checker among these objects."""
+
+
 class _Found:
     """What was found, and who plans the motion to it."""
 
@@ -307,7 +317,7 @@ class WaysAhead:
     """One search for ways. Close it at the end."""
 
     def __init__(
-        self, search: ContactSearch, contacts: Iterable[Contact], checkers: ContactCheckers, works: ArmWorks
+        self, search: ContactSearch, contacts: Iterable[Contact], checkers: ContactCheckers, works: HandWorks
     ) -> None:
         self._search, self._contacts, self._checkers, self._works = search, list(contacts), checkers, works
         self._scene = (works.objects, works.paddings)
@@ -485,7 +495,7 @@ class HandTask:
     stages: ClassVar[tuple[str, ...]]
     """Names of its stages, in order; each is carried out by the method of that name."""
 
-    def __init__(self, site: HandSite, works: ArmWorks, hand: Hand, pace: ArmGoal) -> None:
+    def __init__(self, site: HandSite, works: HandWorks, hand: Hand, pace: ArmGoal) -> None:
         """Begin; `pace` has the shares of speed and acceleration."""
         self.failure: StageFailure | None = None
         self.is_over = self.is_canceled = False
@@ -709,7 +719,7 @@ class PickTask(HandTask):
 
     stages = ("choose", "open", "approach", "grasp", "close", "attach", "lift")
 
-    def __init__(self, site: HandSite, works: ArmWorks, hand: Hand, goal: PickGoal, pace: ArmGoal) -> None:
+    def __init__(self, site: HandSite, works: HandWorks, hand: Hand, goal: PickGoal, pace: ArmGoal) -> None:
         super().__init__(site, works, hand, pace)
         self._goal = goal
         self._grasps: list[Grasp] = []
@@ -874,7 +884,7 @@ class PlaceTask(HandTask):
 
     stages = ("choose", "approach", "lower", "open", "detach", "retreat")
 
-    def __init__(self, site: HandSite, works: ArmWorks, hand: Hand, goal: PlaceGoal, pace: ArmGoal) -> None:
+    def __init__(self, site: HandSite, works: HandWorks, hand: Hand, goal: PlaceGoal, pace: ArmGoal) -> None:
         super().__init__(site, works, hand, pace)
         self._goal = goal
 

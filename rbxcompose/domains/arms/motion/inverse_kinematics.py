@@ -19,12 +19,10 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, angle_between
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker
+from rbxcompose.domains.arms.motion.damped_steps import DAMPING, LEAST_DAMPING, LONGEST, PATIENCE, PROGRESS
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
 
-LEAST_DAMPING, DAMPING = 1e-6, 1e-2  # the second one times the square of the error
-LONGEST = 1.0  # [rad or m] that a joint moves in one iteration, at most
-PATIENCE, PROGRESS = 4, 0.8  # iterations without the error's square shrinking to this share, which end a descent
 TOLERANCE, ANGLE_TOLERANCE = 1e-3, math.radians(0.5)  # [m], [rad]
 RESTARTS = 60
 ENOUGH = 3  # solutions, of which the nearest one is taken

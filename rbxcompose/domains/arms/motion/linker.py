@@ -1,13 +1,12 @@
-"""Makes shared libraries of functions that numba has compiled, and code of `borrowed`; importing it imports numba.
+"""Makes shared libraries of functions that numba has compiled; importing it imports numba.
 
-A library has what `Library` of `numba_cache.py` calls, the code of all functions that this needs, and two functions of
-numba's runtime, which count references to arrays that compiled code makes for itself.
+A library has what `library.py` calls, the code of all functions that this needs, and two functions of numba's runtime,
+which count references to arrays that compiled code makes for itself.
 """
 
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,11 +16,10 @@ from llvmlite import binding
 from numba import types
 from numba.core.codegen import get_host_cpu_features
 from numba.core.runtime.nrtdynmod import _meminfo_struct_type
-from numba.extending import lower_builtin, type_callable
 from numba.np.numpy_support import as_dtype
 
 from rbxcompose.base.files import replace_file
-from rbxcompose.domains.arms.motion.numba_cache import ENTRY, FAILED, KINDS, OTHER, REAL, WHOLE, array_kind, borrowed
+from rbxcompose.domains.arms.motion.library import ENTRY, FAILED, KINDS, OTHER, REAL, WHOLE, array_kind
 
 Numba = Any  # its types and code
 _RUNTIME = """
@@ -124,25 +122,3 @@ def _link(code: bytes, path: Path) -> None:
         words = ["ld", "-shared", "-z", "noexecstack", "-o", str(made), str(source)]
         subprocess.run(words, check=True, capture_output=True)
         replace_file(path, made.read_bytes(), mode=0o600)
-
-
-@type_callable(borrowed)
-def _typed(_: Numba) -> Callable[[Numba], Numba]:
-    return lambda value: value
-
-
-@lower_builtin(borrowed, types.Any)  # type: ignore[no-untyped-call, untyped-decorator]
-def _code(context: Numba, builder: Numba, signature: Numba, given: Numba) -> Numba:
-    return _without_owner(context, builder, signature.args[0], given[0])
-
-
-def _without_owner(context: Numba, builder: Numba, type_: Numba, value: Numba) -> Numba:
-    if isinstance(type_, types.BaseTuple):
-        for index, each in enumerate(type_.types):  # type: ignore[attr-defined]
-            part = _without_owner(context, builder, each, builder.extract_value(value, index))
-            value = builder.insert_value(value, part, index)
-        return value
-    array = context.make_array(type_)(context, builder, value)
-    array.meminfo = array.meminfo.type(None)
-    array.parent = array.parent.type(None)
-    return array._getvalue()

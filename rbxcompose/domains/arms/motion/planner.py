@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator, Iterator
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeGuard, TypeVar
 
 import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.domains.arms.motion.collisions import Checker, can_search, pairs_shown
+from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace, interpolated
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory, curve, jerks_of, speeds_of, timed
 from rbxcompose.domains.arms.motion.path_constraints import KeptTip
@@ -48,6 +48,11 @@ def examined(points: Array, space: JointSpace, checker: Checker) -> Generator[No
     if len(inside) < len(points):
         return Rejected(False, space.outside(points[len(inside)], ROUNDING), len(inside) / len(points))
     return None
+
+
+def can_search(checker: Checker) -> TypeGuard[SphereChecker]:
+    """Return whether a checker examines many positions at once, and searches ways by itself."""
+    return hasattr(checker, "ways")
 
 
 def first_bad(checker: Checker, points: Array) -> int | None:
