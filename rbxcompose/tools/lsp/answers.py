@@ -125,7 +125,7 @@ def _section(name: str, entry: tree.Entry, is_mission: bool) -> OutlineEntry:
 
 
 def _named(node: tree.TreeNode) -> Iterator[OutlineEntry]:
-    for _, entry in tree.entries_of(node).items():
+    for entry in tree.entries_of(node).values():
         inner = (one for _, one in tree.entries_of(entry.value).items() if not isinstance(one.value, tree.ScalarNode))
         yield _made(entry, "name", tuple(_made(item, "value", tuple(_named(item.value))) for item in inner))
 

@@ -344,7 +344,7 @@ class MissionMentions(_FileMentions):
     def _word(self, key: str, value: TreeNode, around: StepSurroundings) -> Iterator[Mention]:
         """Yield the name that a word of the language takes."""
         if key == "set":
-            for _, entry in entries_of(value).items():
+            for entry in entries_of(value).values():
                 yield from self._own(entry.key, (VARIABLE,))
         if not isinstance(value, ScalarNode):
             return
@@ -439,7 +439,7 @@ class MissionMentions(_FileMentions):
 
     def _known_places(self, section: str) -> Iterator[Mention]:
         """Yield the places in the values of inputs and data: a map or list that has nothing else, or a single word."""
-        for _, entry in entries_of(self.root.get(section)).items():
+        for entry in entries_of(self.root.get(section)).values():
             value: TreeNode | None = entry.value
             if section == "inputs":
                 value = at(entry.value, ("default",)) if is_placed(entry.value) else None
@@ -481,7 +481,7 @@ def mission_names(files: ProjectFiles, path: Path) -> dict[str, list[Symbol]]:
 
     root = files.tree(path)
     for section in ("inputs", "data"):
-        for name, _ in entries_of(root.get(section)).items():
+        for name in entries_of(root.get(section)).keys():
             add(VARIABLE, name)
     walk(root, ())
     return {name: list(symbols) for name, symbols in found.items()}
@@ -540,10 +540,10 @@ class TrialMentions(_FileMentions):
         if self.mission is None:
             return
         yield from self._of_robots(MISSION, self.mission)
-        for _, entry in entries_of(self.root.get("with")).items():
+        for entry in entries_of(self.root.get("with")).values():
             yield from self._own(entry.key, (VARIABLE,))
             yield from self._values(entry.value)
-        for _, entry in entries_of(self.root.get("mocks")).items():
+        for entry in entries_of(self.root.get("mocks")).values():
             yield from self._of_robots(CONTROLLER, entry.key)
             yield from self._set(at(entry.value, ("sets",)))
             if self._takes_places(entry.key.text, ""):
@@ -562,10 +562,10 @@ class TrialMentions(_FileMentions):
             listed = at(self.root, ("expect", key))
             for item in listed.items if isinstance(listed, SequenceNode) else ():
                 yield from self._step(item)
-        for _, entry in entries_of(at(self.root, ("expect", "count"))).items():
+        for entry in entries_of(at(self.root, ("expect", "count"))).values():
             yield from self._own(entry.key, _STEPS)
             yield from self._of_robots(CONTROLLER, entry.key)
-        for _, entry in entries_of(at(self.root, ("expect", "data"))).items():
+        for entry in entries_of(at(self.root, ("expect", "data"))).values():
             yield from self._own(entry.key, (VARIABLE,))
             yield from self._values(entry.value)
 
@@ -573,14 +573,14 @@ class TrialMentions(_FileMentions):
         if isinstance(item, ScalarNode):
             yield from self._own(item, _STEPS)
             yield from self._of_robots(CONTROLLER, item)
-        for _, entry in entries_of(item).items():
+        for entry in entries_of(item).values():
             name = entry.key.text
             if name in STEP_KEYS:
                 continue
             yield from self._own(entry.key, _STEPS)
             is_controller = list(self._of_robots(CONTROLLER, entry.key))
             yield from is_controller
-            for _, argument in entries_of(entry.value).items():
+            for argument in entries_of(entry.value).values():
                 yield from self._of_robots(JOINT, argument.key) if is_controller else ()
                 if self._takes_places(name, argument.key.text):
                     yield from self._values(argument.value)
@@ -593,7 +593,7 @@ class TrialMentions(_FileMentions):
         return wanted is None or wanted.kind not in (TypeKind.TEXT, TypeKind.CHOICE)
 
     def _set(self, node: TreeNode | None) -> Iterator[Mention]:
-        for _, entry in entries_of(node).items():
+        for entry in entries_of(node).values():
             yield from self._of_robots(VALUE, entry.key)
             yield from self._values(entry.value)
 

@@ -164,7 +164,7 @@ class ProjectFiles:
         """Yield the maps of a file that have sections: the file itself, and its profiles."""
         root = self.tree(path)
         yield root
-        for _, entry in entries_of(root.get(profiles.name)).items():
+        for entry in entries_of(root.get(profiles.name)).values():
             if isinstance(entry.value, MappingNode):
                 yield entry.value
 
