@@ -33,6 +33,13 @@ _EVENTS = "/parameter_events"
 _HEAD = ("change", "time", "parameter", "before", "after", "by")
 _SECOND = 1e9  # [ns]
 Dimensions = dict[tuple[str, str], Dimension | None]
+NO_VALUES = kind("RBX9048")
+PIPED = "-"
+_ROS = "ros__parameters"
+HALF_DONE = kind("RBX9047")
+BREAKS_RULE = kind("RBX9030")
+_WORDS = 3  # of a single change: component, parameter, value
+Wanted = Mapping[str, Sequence[rcl_interfaces.Parameter]]  # by node
 
 
 def changes_of(nodes: ParameterNodes, wanted: Sequence[str] | None = None) -> list[ParameterChange]:
@@ -143,14 +150,6 @@ def _data(change: ParameterChange) -> dict[str, object]:
     }
 
 
-NO_VALUES = kind("RBX9048")
-PIPED = "-"
-_ROS = "ros__parameters"
-HALF_DONE = kind("RBX9047")
-BREAKS_RULE = kind("RBX9030")
-_WORDS = 3  # of a single change: component, parameter, value
-
-
 def value_of(text: str) -> rcl_interfaces.ParameterValue:
     """Read a number, a flag or a list in YAML; anything else is text."""
     root, findings = read_text(text, "VALUE")
@@ -205,9 +204,6 @@ def _message(node: TreeNode) -> rcl_interfaces.ParameterValue | None:
 
 def _no_map(span: Span, what: str) -> Finding:
     return NO_VALUES.at(span, f"{what} must be a map", help="'rbxcompose param dump' shows the form")
-
-
-Wanted = Mapping[str, Sequence[rcl_interfaces.Parameter]]  # by node
 
 
 def change_values(
