@@ -1,16 +1,19 @@
-"""The output of commands: answers go to stdout, errors to stderr.
+"""The output of commands: answers go to stdout, errors to stderr; and what interrupts them.
 
 With `--json`, stdout has JSON in any case: errors without an answer are one document, too, besides the text on stderr.
+Interrupts are Ctrl-C, SIGTERM, and the end of the terminal.
 """
 
 import argparse
 import json
 import os
 import re
+import signal
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import field
+from types import FrameType
 from typing import Any, NoReturn, TextIO
 
 from rbxcompose.base.dataclass import dataclass
@@ -18,7 +21,8 @@ from rbxcompose.base.findings import Finding, Report, Severity, Sources
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.formats.text import render_text
 
-FINDINGS, USAGE = 1, 2  # exit codes
+FINDINGS, USAGE, INTERRUPTED = 1, 2, 130  # exit codes
+ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _OF_OTHERS = {"list": "ls", "info": "show"}  # actions as ROS 2 calls them
 _ROBOT = "--robot"
 _NO_ACTION = re.compile(r"-(?!h$|-help$)|.*[./]")  # an option, a path or a type
@@ -161,6 +165,25 @@ class ReportedError(Exception):
     def __init__(self, exit_code: int = FINDINGS) -> None:
         super().__init__(exit_code)
         self.exit_code = exit_code
+
+
+@contextmanager
+def handling(handle: Callable[[int, FrameType | None], None], numbers: Sequence[int] = ENDINGS) -> Iterator[None]:
+    """Let signals call `handle`; at the end they do what they did before."""
+    before = {number: signal.signal(number, handle) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def noted_interrupts() -> Iterator[list[int]]:
+    """Yield a list to which interrupts are added; they do not end the process meanwhile."""
+    interrupts: list[int] = []
+    with handling(lambda number, frame: interrupts.append(number)):
+        yield interrupts
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:

@@ -32,8 +32,7 @@ from rbxcompose.bus.transport import Arrival
 from rbxcompose.bus.zenoh_session import open_client, open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport, direct
 from rbxcompose.commands import options
-from rbxcompose.commands.console import NotDoneError, emit, table
-from rbxcompose.commands.interrupts import ENDINGS, handling
+from rbxcompose.commands.console import ENDINGS, NotDoneError, emit, handling, table
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place
 from rbxcompose.runtime.process_group.connection import CallbackInbox
 from rbxcompose.sdk.ports import Qos

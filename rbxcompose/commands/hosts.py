@@ -24,8 +24,16 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import alone_in, read_regular, replace_file
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.base.printable import plain
-from rbxcompose.commands.console import NotDoneError, ReportedError, emit, refuse, write_report
-from rbxcompose.commands.interrupts import INTERRUPTED, handling, noted_interrupts
+from rbxcompose.commands.console import (
+    INTERRUPTED,
+    NotDoneError,
+    ReportedError,
+    emit,
+    handling,
+    noted_interrupts,
+    refuse,
+    write_report,
+)
 from rbxcompose.commands.lookup import NOT_UP, find_robot
 from rbxcompose.commands.options import BUS, EACH, system_and_robot
 from rbxcompose.runtime.folder import made_base, system_record

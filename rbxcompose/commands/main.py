@@ -16,10 +16,9 @@ from typing import Any, NoReturn
 import rbxcompose
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.garbage_collection import collect_rarely
-from rbxcompose.commands.interrupts import INTERRUPTED
 from rbxcompose.commands.verbs import about, in_groups, load, module_of, parser_of, verbs
 
-USAGE = 2
+USAGE, INTERRUPTED = 2, 130  # as in `console`, which takes longer to import
 _ABOUT = "Docker Compose for robots: YAML in, a checked and running robot out."
 
 

@@ -15,9 +15,8 @@ from rbxcompose.base.findings import Finding, Report, kind
 from rbxcompose.base.printable import FORBIDDEN
 from rbxcompose.bus.graph import GraphName, WireType, find
 from rbxcompose.bus.names import name_problem
-from rbxcompose.commands.console import NotDoneError, emit, refuse, write_report
+from rbxcompose.commands.console import INTERRUPTED, NotDoneError, emit, refuse, write_report
 from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, SAID_NO, Guest, ReceivedMessage, wanted
-from rbxcompose.commands.interrupts import INTERRUPTED
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode, NodePlaces, ScalarNode, TreeNode, plain_value
 from rbxcompose.msgs import registry

@@ -13,7 +13,7 @@ from types import FrameType
 from typing import Self, TextIO
 
 from rbxcompose.base.findings import kind
-from rbxcompose.commands.interrupts import handling
+from rbxcompose.commands.console import handling
 
 NO_TERMINAL = kind("RBX9027")
 _MOST_READ = 4096  # bytes of keys per read

@@ -13,8 +13,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import alone_in
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.base.printable import plain
-from rbxcompose.commands.console import NotDoneError, ReportedError, emit, refuse
-from rbxcompose.commands.interrupts import INTERRUPTED, noted_interrupts
+from rbxcompose.commands.console import INTERRUPTED, NotDoneError, ReportedError, emit, noted_interrupts, refuse
 from rbxcompose.domains.policies.episode import Episode, NoEpisodeError, Sample, features_of, role_of, sample_of
 from rbxcompose.domains.policies.lerobot import Dataset, DatasetError
 from rbxcompose.msgs import registry

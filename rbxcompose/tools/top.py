@@ -45,7 +45,7 @@ _WIDEST = 200  # columns per line of a mission
 _PATH = "missions"
 
 
-Picture = Mapping[str, Any]
+TopData = Mapping[str, Any]
 """All that is shown of a robot, as `--json` writes it, with levels by name: `processes` with their shares of one
 processor and their memory [B], `diagnostics` by group, `missions` that run with their running nodes as lines from the
 outside in, and of each component the rate of its outgoing messages [1/s]; None where unknown."""
@@ -59,7 +59,7 @@ class PictureLine:
     colour: str = ""
 
 
-def lines_of(picture: Picture, width: int, height: int, *, colour: bool = False) -> list[str]:
+def lines_of(picture: TopData, width: int, height: int, *, colour: bool = False) -> list[str]:
     """Return at most `height` lines of at most `width` columns; count what does not fit.
 
     Missions get the room that all else leaves; components go last.
@@ -80,25 +80,25 @@ def lines_of(picture: Picture, width: int, height: int, *, colour: bool = False)
     return [painted(line, width, colour) for line in shown]
 
 
-def _components(components: Sequence[Picture]) -> list[PictureLine]:
+def _components(components: Sequence[TopData]) -> list[PictureLine]:
     rows = [(each["name"], each["type"], each["state"], each["process"], *_facts(each)) for each in components]
     return _table([("component", "type", "state", "process", "restarts", "msg/s", ""), *rows], map(_alarm, components))
 
 
-def _facts(component: Picture) -> tuple[str, str, str]:
+def _facts(component: TopData) -> tuple[str, str, str]:
     """Return how often it was restarted, the rate of its messages, and what is wrong with it, in words."""
     rate = "-" if component["rate"] is None else f"{component['rate']:.1f}"
     is_fine = component["level"] in (None, Level.OK.name)
     return str(component["restarts"]), rate, "" if is_fine else f"{component['level']}: {component['message']}"
 
 
-def _alarm(component: Picture) -> str:
+def _alarm(component: TopData) -> str:
     if component["state"] in _FAILED:
         return RED
     return YELLOW if component["state"] != "active" else ALARMS.get(component["level"], "")
 
 
-def _loads(loads: Sequence[Picture]) -> list[PictureLine]:
+def _loads(loads: Sequence[TopData]) -> list[PictureLine]:
     rows = []
     for load in loads:
         cpu = "-" if load["cpu"] is None else f"{load['cpu']:.1%}"
@@ -106,7 +106,7 @@ def _loads(loads: Sequence[Picture]) -> list[PictureLine]:
     return _table([("process", "pid", "cpu", "memory"), *rows], repeat(""))
 
 
-def _missions(missions: Sequence[Picture], room: int) -> list[PictureLine]:
+def _missions(missions: Sequence[TopData], room: int) -> list[PictureLine]:
     lines = []
     for mission in missions:
         lines.append(PictureLine(f"mission {plain(mission['mission'])}: {plain(mission['state'])}", FAINT))
@@ -114,7 +114,7 @@ def _missions(missions: Sequence[Picture], room: int) -> list[PictureLine]:
     return [PictureLine(""), *shortened(lines, room - 1)] if lines and room > 1 else []
 
 
-def _health(groups: Sequence[Picture]) -> list[PictureLine]:
+def _health(groups: Sequence[TopData]) -> list[PictureLine]:
     fine = [plain(group["group"]) for group in groups if group["level"] == Level.OK.name]
     lines = [
         PictureLine(f"{group['level']} {plain(group['group'])}: {plain(group['message'])}", ALARMS[group["level"]])
@@ -125,7 +125,7 @@ def _health(groups: Sequence[Picture]) -> list[PictureLine]:
     return _apart(lines)
 
 
-def _warnings(warnings: Sequence[Picture]) -> list[PictureLine]:
+def _warnings(warnings: Sequence[TopData]) -> list[PictureLine]:
     lines = []
     for warning in warnings[-MOST_WARNINGS:]:
         text = f"{warning['time']:8.1f}  {plain(warning['source'])}: {plain(warning['text'])}"
@@ -173,7 +173,7 @@ class ShareView:
 
     robot: str
     host: str
-    answer: Picture | None
+    answer: TopData | None
     age: float
     problem: str = ""
 
@@ -268,7 +268,7 @@ class Sampler:
         is_charged = self._charges.keys() >= self._gauges.keys() & self._listened
         return is_healthy and is_charged and (self._missions is None or self._missions.is_complete)
 
-    def sample(self) -> Picture | None:
+    def sample(self) -> TopData | None:
         """Return the current picture, or None if the robot is down."""
         now, state = self._guest.clock.now(), known_state(self._folder)
         if state is None:
@@ -285,7 +285,7 @@ class Sampler:
         self._warnings.extend(record for record in self._follower.read() if record.level is not Level.OK)
         return self._picture(state, self._rates(graph, elapsed), self._loads(state, elapsed))
 
-    def _running(self, state: RobotState) -> list[Picture]:
+    def _running(self, state: RobotState) -> list[TopData]:
         """Follow the missions, if the robot has any, and return the running ones while their process lives."""
         alive = state.alive()
         if not any(component.name == state.executive and component.process in alive for component in state.components):
@@ -324,8 +324,8 @@ class Sampler:
         self._counts.clear()
         return rates
 
-    def _loads(self, state: RobotState, elapsed: float | None) -> list[Picture]:
-        loads, times = list[Picture](), {}
+    def _loads(self, state: RobotState, elapsed: float | None) -> list[TopData]:
+        loads, times = list[TopData](), {}
         for name, process in {_SUPERVISOR: state.supervisor, **state.processes}.items():
             usage = process.usage
             if usage is not None:
@@ -336,7 +336,7 @@ class Sampler:
         self._times = times
         return loads
 
-    def _picture(self, state: RobotState, rates: Mapping[str, float], loads: list[Picture]) -> Picture:
+    def _picture(self, state: RobotState, rates: Mapping[str, float], loads: list[TopData]) -> TopData:
         leaves = {name.rpartition("/")[2]: status for name, status in self._statuses.items() if name.count("/") > 1}
         alive = state.alive()
         components = [
@@ -387,7 +387,7 @@ def _charge(gauge: Gauge, received: ReceivedMessage) -> float | None:
     return unit.to_si(values[0]) if unit else float(values[0])
 
 
-def _running_mission(name: str, seen: Mapping[str, Any]) -> Picture:
+def _running_mission(name: str, seen: Mapping[str, Any]) -> TopData:
     picture = picture_from_data(seen["picture"])
     running = running_lines(picture, status_list(seen, picture.count), _WIDEST)
     return {"mission": name, "state": seen["state"], "running": running}
@@ -395,7 +395,7 @@ def _running_mission(name: str, seen: Mapping[str, Any]) -> Picture:
 
 def _picture_of(
     state: ComponentState, is_alive: bool, rates: Mapping[str, float], status: DiagnosticStatus | None
-) -> Picture:
+) -> TopData:
     return {
         "name": state.name,
         "type": state.type,

@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import FORBIDDEN, columns
 from rbxcompose.testing.golden import Golden
-from rbxcompose.tools.top import Picture, lines_of
+from rbxcompose.tools.top import TopData, lines_of
 from tests.commands import command
 from tests.forked import RBXCOMPOSE, Forked, run_command
 from tests.soak import rare
@@ -34,13 +34,13 @@ STRANGERS = Path(__file__).parents[1] / "checks" / "strangers.py"
 PATIENCE = 20.0  # [s]
 
 
-def component(name: str, type_: str, state: str, process: str, restarts: int, *heard: Any) -> Picture:
+def component(name: str, type_: str, state: str, process: str, restarts: int, *heard: Any) -> TopData:
     rate, level, message = heard or (None, None, "")
     facts = {"process": process, "restarts": restarts, "rate": rate, "level": level, "message": message}
     return {"name": name, "type": type_, "state": state, **facts}
 
 
-def group(name: str, level: str, message: str) -> Picture:
+def group(name: str, level: str, message: str) -> TopData:
     return {"group": name, "level": level, "message": message}
 
 
@@ -55,7 +55,7 @@ LOADS = [
     {"process": "world", "pid": 104, "cpu": None, "memory": 58_000_000},
 ]
 RUNNING = ["▶ repeat", "  ▶ for corner in $route", "    ▶ go_to $corner  (retry 2)"]
-PICTURE: Picture = {
+PICTURE: TopData = {
     "robot": "turtlebot",
     "is_supervised": True,
     "router": "tcp/127.0.0.1:7447",
@@ -74,10 +74,10 @@ PICTURE: Picture = {
         {"time": 70.0, "level": "ERROR", "source": "go_to", "text": "died"},
     ],
 }
-DEAD: Picture = {"is_supervised": False, "router": None, "mission": "", "batteries": {}, "diagnostics": []}
+DEAD: TopData = {"is_supervised": False, "router": None, "mission": "", "batteries": {}, "diagnostics": []}
 
 
-def text_of(picture: Picture, width: int, height: int) -> str:
+def text_of(picture: TopData, width: int, height: int) -> str:
     return "".join(f"{line}\n" for line in lines_of(picture, width, height))
 
 
@@ -93,7 +93,7 @@ def text_of(picture: Picture, width: int, height: int) -> str:
         ("top_dead.txt", {**PICTURE, **DEAD}),
     ],
 )
-def test_a_picture_is_its_golden_text(name: str, picture: Picture, golden: Golden) -> None:
+def test_a_picture_is_its_golden_text(name: str, picture: TopData, golden: Golden) -> None:
     golden.check(name, text_of(picture, 80, 24))
 
 
@@ -105,7 +105,7 @@ groups = st.builds(group, words, st.sampled_from([level.name for level in Level]
 
 
 @given(st.lists(components, max_size=8), st.lists(groups, max_size=4), st.integers(4, 200), st.integers(1, 60))
-def test_a_picture_fits_whatever_it_shows(shown: list[Picture], health: list[Picture], width: int, height: int) -> None:
+def test_a_picture_fits_whatever_it_shows(shown: list[TopData], health: list[TopData], width: int, height: int) -> None:
     lines = lines_of({**PICTURE, "components": shown, "diagnostics": health}, width, height)
     assert len(lines) <= height
     assert all(columns(line) <= width for line in lines)

@@ -14,8 +14,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
 from rbxcompose.base.printable import plain
 from rbxcompose.commands import new_files
-from rbxcompose.commands.console import ReportedError, emit, refuse, write_report
-from rbxcompose.commands.interrupts import INTERRUPTED
+from rbxcompose.commands.console import INTERRUPTED, ReportedError, emit, refuse, write_report
 from rbxcompose.commands.options import argument
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot

@@ -18,7 +18,7 @@ from rbxcompose.commands.lookup import NOT_UP, add_addressed_robot, find_robot, 
 from rbxcompose.commands.messages import to_json
 from rbxcompose.commands.options import EACH, add_json_option
 from rbxcompose.commands.terminal import LiveScreen, is_terminal
-from rbxcompose.tools.top import Picture, Sampler, ShareView, lines_of, system_lines
+from rbxcompose.tools.top import Sampler, ShareView, TopData, lines_of, system_lines
 
 GROUP = "look"
 IS_COMMON = True
@@ -90,7 +90,7 @@ def _live(guest: Guest, sampler: Sampler) -> int:
                 return 0
 
 
-def _sampled(sampler: Sampler) -> Picture:
+def _sampled(sampler: Sampler) -> TopData:
     picture = sampler.sample()
     if picture is None:
         raise NotDoneError(NOT_UP.at(None, "the robot is down"))
@@ -103,7 +103,7 @@ class LiveShare:
     def __init__(self, host: str, robot: str, remote: Remote) -> None:
         self._host, self._robot = host, robot
         self._command = remote.rbxcompose(["top", robot, "--json", "--follow"])
-        self._answer: Picture | None = None
+        self._answer: TopData | None = None
         self._since = time.monotonic()
         self._ended: float | None = None
         self._problem = self._last = ""

@@ -221,10 +221,8 @@ class _Exporter:
             return self.in_turn(mapping, key)
         if maker := _MAKERS.get(key):
             return maker(self, mapping)
-        span = mapping.entries[key].key.span
-        raise _CannotError(
-            span, f"BehaviorTree.CPP has nothing for '{key}'", "make it a skill of the robot, or leave it out"
-        )
+        help_text = "make it a skill of the robot, or leave it out"
+        raise _CannotError(mapping.entries[key].key.span, f"BehaviorTree.CPP has nothing for '{key}'", help_text)
 
     def options(self, mapping: MappingNode, *allowed: str) -> dict[str, str]:
         """Return the options of a step that differ from their defaults; one that is not allowed cannot be said."""
@@ -303,9 +301,8 @@ class _Exporter:
             tree = _tree(entry.value)
             if done & {node.name for node, _ in syntax.walk(tree) if isinstance(node, syntax.Variable)}:
                 words = f"'{name}' reads what is set before it in a script"
-                raise _CannotError(
-                    entry.key.span, words, "keep the old value under another name, with an earlier 'set'"
-                )
+                help_text = "keep the old value under another name, with an earlier 'set'"
+                raise _CannotError(entry.key.span, words, help_text)
             done.add(name)
         try:
             code = assignments_script(texts)
@@ -347,9 +344,8 @@ class _Exporter:
 
     def set(self, mapping: MappingNode) -> MadeElement:
         assigned = mapping.get("set")
-        return self.assigned(
-            MadeElement("Script"), "code", assigned if isinstance(assigned, MappingNode) else MappingNode()
-        )
+        found = assigned if isinstance(assigned, MappingNode) else MappingNode()
+        return self.assigned(MadeElement("Script"), "code", found)
 
     def log(self, mapping: MappingNode) -> MadeElement:
         options = self.options(mapping, "level")
@@ -474,9 +470,8 @@ class _Exporter:
         elif isinstance(given, SequenceNode) or given.text or not given.plain:
             found.attributes = {"value": self.value(given)}
         if found.attributes.keys() & {"name", "ID"}:
-            raise _CannotError(
-                mapping.entries[key].key.span, "no port of BehaviorTree.CPP can be called 'name' or 'ID'"
-            )
+            words = "no port of BehaviorTree.CPP can be called 'name' or 'ID'"
+            raise _CannotError(mapping.entries[key].key.span, words)
         ports = dict.fromkeys(found.attributes, "input")
         outputs = self.outputs(mapping, found, ("on_success",))
         self.model(found.name, "Action", {**ports, **dict.fromkeys(outputs, "output")})

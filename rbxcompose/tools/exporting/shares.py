@@ -29,6 +29,40 @@ CONFIGURATION = "/run/config"  # in a container: where `CERTIFICATES` are, as in
 FILE = "{file}"
 LONGEST = 63  # characters of a label in Kubernetes, or of a name there
 _DIGITS = 8
+WATCHDOG = 10  # [s]
+_SANDBOX = """
+NoNewPrivileges=yes
+CapabilityBoundingSet=
+ProtectSystem=strict
+ProtectHome=read-only
+PrivateTmp=yes
+ProtectKernelTunables=yes
+ProtectKernelModules=yes
+ProtectKernelLogs=yes
+ProtectControlGroups=yes
+ProtectClock=yes
+ProtectHostname=yes
+RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_NETLINK
+RestrictNamespaces=yes
+RestrictSUIDSGID=yes
+LockPersonality=yes
+SystemCallArchitectures=native
+UMask=0077
+DevicePolicy=closed
+"""
+PROJECT = "/robot"  # the folder of the manifests in the image
+_DOCKERFILE = """FROM python:3.11-slim
+RUN pip install --no-cache-dir {requirements} && useradd --create-home robot
+COPY project {project}
+USER robot
+WORKDIR {project}
+ENV XDG_RUNTIME_DIR=/run/robot XDG_CONFIG_HOME={configuration} NO_COLOR=1
+ENTRYPOINT ["rbxcompose"]
+"""
+MOST_BYTES = 1_000_000  # of a ConfigMap, which etcd limits
+KUSTOMIZATION = "kustomization.yaml"
+ROBOT, HOST = "rbxcompose/robot", "rbxcompose/host"  # labels
+USER, DIALOUT = 1000, 20  # numbers of the image's user, and of the group that opens serial ports
 
 
 def joined_name(*names: str) -> str:
@@ -114,29 +148,6 @@ def _rest_time(plan: Plan) -> float:
     return max((component_type(instance.type).rest_time(instance.config) for instance in plan.instances), default=0.0)
 
 
-WATCHDOG = 10  # [s]
-_SANDBOX = """
-NoNewPrivileges=yes
-CapabilityBoundingSet=
-ProtectSystem=strict
-ProtectHome=read-only
-PrivateTmp=yes
-ProtectKernelTunables=yes
-ProtectKernelModules=yes
-ProtectKernelLogs=yes
-ProtectControlGroups=yes
-ProtectClock=yes
-ProtectHostname=yes
-RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_NETLINK
-RestrictNamespaces=yes
-RestrictSUIDSGID=yes
-LockPersonality=yes
-SystemCallArchitectures=native
-UMask=0077
-DevicePolicy=closed
-"""
-
-
 def unit_name(share: ExportedShare) -> str:
     """Return the file name of a share's unit."""
     return f"rbxcompose-{share.name}.service"
@@ -190,17 +201,6 @@ def _quoted(word: str) -> str:
     """Return a word as systemd reads it."""
     plain = word.replace("%", "%%").replace("$", "$$")
     return f'"{plain}"' if " " in plain or '"' in plain or "\\" in plain else plain
-
-
-PROJECT = "/robot"  # the folder of the manifests in the image
-_DOCKERFILE = """FROM python:3.11-slim
-RUN pip install --no-cache-dir {requirements} && useradd --create-home robot
-COPY project {project}
-USER robot
-WORKDIR {project}
-ENV XDG_RUNTIME_DIR=/run/robot XDG_CONFIG_HOME={configuration} NO_COLOR=1
-ENTRYPOINT ["rbxcompose"]
-"""
 
 
 def dockerfile(requirements: Iterable[str]) -> str:
@@ -259,12 +259,6 @@ def _service(share: ExportedShare, file: str) -> dict[str, Any]:
     if share.secrets:
         service["environment"] = [f"{VARIABLE}{name.upper()}" for name in share.secrets]  # as the host has them
     return service
-
-
-MOST_BYTES = 1_000_000  # of a ConfigMap, which etcd limits
-KUSTOMIZATION = "kustomization.yaml"
-ROBOT, HOST = "rbxcompose/robot", "rbxcompose/host"  # labels
-USER, DIALOUT = 1000, 20  # numbers of the image's user, and of the group that opens serial ports
 
 
 def kubernetes_manifests(

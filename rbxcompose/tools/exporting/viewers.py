@@ -14,6 +14,43 @@ from rbxcompose.sdk.ports import In, Out, Qos
 from rbxcompose.sdk.registry import component_type
 
 TWIST = "geometry_msgs/msg/Twist"
+DESCRIPTION = "/robot_description"
+_DISPLAYS = {
+    "geometry_msgs/msg/PointStamped": "PointStamped",
+    "geometry_msgs/msg/PolygonStamped": "Polygon",
+    "geometry_msgs/msg/PoseArray": "PoseArray",
+    "geometry_msgs/msg/PoseStamped": "Pose",
+    "geometry_msgs/msg/PoseWithCovarianceStamped": "PoseWithCovariance",
+    "geometry_msgs/msg/TwistStamped": "TwistStamped",
+    "nav_msgs/msg/OccupancyGrid": "Map",
+    "nav_msgs/msg/Odometry": "Odometry",
+    "nav_msgs/msg/Path": "Path",
+    "sensor_msgs/msg/Image": "Image",
+    "sensor_msgs/msg/LaserScan": "LaserScan",
+    "sensor_msgs/msg/PointCloud2": "PointCloud2",
+    "sensor_msgs/msg/Range": "Range",
+    "visualization_msgs/msg/Marker": "Marker",
+    "visualization_msgs/msg/MarkerArray": "MarkerArray",
+}
+_TOOLS = {  # by the last part of the topic to which they send, and its type
+    ("goal_pose", "geometry_msgs/msg/PoseStamped"): "SetGoal",
+    ("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped"): "SetInitialPose",
+}
+SPEED, TURN_RATE = 0.3, 0.8  # [m/s, rad/s] of the buttons at most
+SEND_RATE = 10  # [Hz], while a button is held
+_IN_SCENE = {
+    "geometry_msgs/msg/PoseArray",
+    "geometry_msgs/msg/PoseStamped",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "nav_msgs/msg/OccupancyGrid",
+    "nav_msgs/msg/Path",
+    "sensor_msgs/msg/LaserScan",
+    "sensor_msgs/msg/PointCloud2",
+    "visualization_msgs/msg/Marker",
+    "visualization_msgs/msg/MarkerArray",
+}
+_PICTURES = {"sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"}
+Panel = tuple[str, dict[str, Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,30 +138,6 @@ def _declared(plan: Plan) -> Iterator[tuple[Any, Capability]]:
             yield instance.topic, each
 
 
-DESCRIPTION = "/robot_description"
-_DISPLAYS = {
-    "geometry_msgs/msg/PointStamped": "PointStamped",
-    "geometry_msgs/msg/PolygonStamped": "Polygon",
-    "geometry_msgs/msg/PoseArray": "PoseArray",
-    "geometry_msgs/msg/PoseStamped": "Pose",
-    "geometry_msgs/msg/PoseWithCovarianceStamped": "PoseWithCovariance",
-    "geometry_msgs/msg/TwistStamped": "TwistStamped",
-    "nav_msgs/msg/OccupancyGrid": "Map",
-    "nav_msgs/msg/Odometry": "Odometry",
-    "nav_msgs/msg/Path": "Path",
-    "sensor_msgs/msg/Image": "Image",
-    "sensor_msgs/msg/LaserScan": "LaserScan",
-    "sensor_msgs/msg/PointCloud2": "PointCloud2",
-    "sensor_msgs/msg/Range": "Range",
-    "visualization_msgs/msg/Marker": "Marker",
-    "visualization_msgs/msg/MarkerArray": "MarkerArray",
-}
-_TOOLS = {  # by the last part of the topic to which they send, and its type
-    ("goal_pose", "geometry_msgs/msg/PoseStamped"): "SetGoal",
-    ("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped"): "SetInitialPose",
-}
-
-
 def rviz_config(plan: Plan) -> str:
     """Return the text of the file, for `rviz2 -d`."""
     displays = [
@@ -174,23 +187,6 @@ def _quality(topic: ViewedTopic) -> dict[str, Any]:
         "Reliability Policy": "Best Effort" if topic.qos is Qos.BULK else "Reliable",
         "Durability Policy": "Transient Local" if topic.qos is Qos.LATCHED else "Volatile",
     }
-
-
-SPEED, TURN_RATE = 0.3, 0.8  # [m/s, rad/s] of the buttons at most
-SEND_RATE = 10  # [Hz], while a button is held
-_IN_SCENE = {
-    "geometry_msgs/msg/PoseArray",
-    "geometry_msgs/msg/PoseStamped",
-    "geometry_msgs/msg/PoseWithCovarianceStamped",
-    "nav_msgs/msg/OccupancyGrid",
-    "nav_msgs/msg/Path",
-    "sensor_msgs/msg/LaserScan",
-    "sensor_msgs/msg/PointCloud2",
-    "visualization_msgs/msg/Marker",
-    "visualization_msgs/msg/MarkerArray",
-}
-_PICTURES = {"sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"}
-Panel = tuple[str, dict[str, Any]]
 
 
 def foxglove_layout(plan: Plan) -> str:

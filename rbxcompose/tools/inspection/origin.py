@@ -26,6 +26,8 @@ from rbxcompose.manifest.tree import (
 )
 
 LONGEST = 60  # characters of a text shown beside a value
+WIDEST = 60  # columns within which comments are aligned
+_MARK = "\0"  # precedes a comment: no manifest contains it
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,10 +101,6 @@ def as_data(node: TreeNode) -> object:
         case ScalarNode(filled=None):
             return plain_value(node)
     return shown(node)
-
-
-WIDEST = 60  # columns within which comments are aligned
-_MARK = "\0"  # precedes a comment: no manifest contains it
 
 
 def expand(manifest: RobotManifest, *, has_origins: bool = True) -> str:

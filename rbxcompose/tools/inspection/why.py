@@ -30,6 +30,19 @@ from rbxcompose.tools.inspection.diagram import does, keys_of, qos_of
 from rbxcompose.tools.inspection.origin import Origin, as_data, expand_below, indexed, origin_of, placed, shown
 
 NO_SUCH_PATH = kind("RBX9011")
+LABEL = 15  # width of the labels
+_OTHER = {  # the first one that matches a port counts
+    ServesTopic: (Out, "ordered by"),
+    Out: (In, "read by"),
+    In: (Out, "sent by"),
+    Serves: (Calls, "called by"),
+    Calls: (Serves, "served by"),
+    ServesAction: (CallsAction, "asked by"),
+    CallsAction: (ServesAction, "served by"),
+}
+_ARGUMENT = re.compile(r"\bargs\.([a-z][a-z0-9_]*)")
+_MEASURED = ("args", "missions", "include")  # sections in which only the value itself shows its dimension
+_schema = lru_cache(maxsize=1)(robot_schema)  # one robot is asked about many values
 
 
 def path_of(robot: Robot, text: str) -> KeyPath:
@@ -89,20 +102,6 @@ def no_such_path(robot: Robot, path: KeyPath, guide: Guide) -> Finding:
 def is_known(manifest: RobotManifest, guide: Guide, path: KeyPath) -> bool:
     """Return whether a path exists, or is a key that could be written there."""
     return found_at(manifest, path) is not None or str(path[-1]) in guide.keys(path[:-1])
-
-
-LABEL = 15  # width of the labels
-_OTHER = {  # the first one that matches a port counts
-    ServesTopic: (Out, "ordered by"),
-    Out: (In, "read by"),
-    In: (Out, "sent by"),
-    Serves: (Calls, "called by"),
-    Calls: (Serves, "served by"),
-    ServesAction: (CallsAction, "asked by"),
-    CallsAction: (ServesAction, "served by"),
-}
-_ARGUMENT = re.compile(r"\bargs\.([a-z][a-z0-9_]*)")
-_MEASURED = ("args", "missions", "include")  # sections in which only the value itself shows its dimension
 
 
 @dataclass(frozen=True, slots=True)
@@ -294,9 +293,6 @@ def why(robot: Robot, text: str) -> PathAnswer | Finding:
 def _guide(manifest: RobotManifest, path: KeyPath) -> Guide:
     types = {name: entry.type for name, entry in manifest.components.items()}
     return Guide(_schema(frozenset(types.values())), tree_of(manifest, path), types)
-
-
-_schema = lru_cache(maxsize=1)(robot_schema)  # one robot is asked about many values
 
 
 def _written(robot: Robot, guide: Guide, path: KeyPath, node: TreeNode) -> PathAnswer:

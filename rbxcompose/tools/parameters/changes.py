@@ -19,10 +19,9 @@ from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.reader import read_file, read_text
 from rbxcompose.manifest.tree import MappingNode, TreeNode
 from rbxcompose.manifest.validate import to_plain
-from rbxcompose.msgs import rcl_interfaces
+from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.cdr import CdrError, decode
 from rbxcompose.msgs.rbxcompose_parameters import ChangeParameters, NodeChange, ParameterChange
-from rbxcompose.msgs.rcl_interfaces import ParameterEvent
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.runtime.settings_history import MARK, ROS_TOOL, NothingToUndoError, identity, in_order, to_undo
 from rbxcompose.sdk.parameters import SEPARATOR, dimension_in, from_message, shown, to_message
@@ -33,6 +32,13 @@ _EVENTS = "/parameter_events"
 _HEAD = ("change", "time", "parameter", "before", "after", "by")
 _SECOND = 1e9  # [ns]
 Dimensions = dict[tuple[str, str], Dimension | None]
+NO_VALUES = kind("RBX9048")
+PIPED = "-"
+_ROS = "ros__parameters"
+HALF_DONE = kind("RBX9047")
+BREAKS_RULE = kind("RBX9030")
+_WORDS = 3  # of a single change: component, parameter, value
+Wanted = Mapping[str, Sequence[rcl.Parameter]]  # by node
 
 
 def changes_of(nodes: ParameterNodes, wanted: Sequence[str] | None = None) -> list[ParameterChange]:
@@ -63,11 +69,11 @@ def param_watch(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     wanted = nodes.find(arguments.component) if arguments.component else ""
     asked = [wanted] if wanted else nodes.names
     seen = {node: _last_number(changes_of(nodes, [node])) for node in asked}
-    events: list[ParameterEvent] = []
+    events: list[rcl.ParameterEvent] = []
 
     def received(message: ReceivedMessage) -> None:
         try:
-            event = decode(ParameterEvent, message.arrival.payload)
+            event = decode(rcl.ParameterEvent, message.arrival.payload)
         except CdrError:
             return  # another definition of the type
         if not wanted or event.node == wanted:
@@ -89,7 +95,7 @@ def param_watch(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _of_event(nodes: ParameterNodes, event: ParameterEvent, seen: dict[str, int]) -> list[ParameterChange]:
+def _of_event(nodes: ParameterNodes, event: rcl.ParameterEvent, seen: dict[str, int]) -> list[ParameterChange]:
     """Return the changes that an event reports; a foreign node reports neither who did it nor what was before."""
     if not nodes.serves(event.node, CHANGE):
         name = event.node.removeprefix("/")
@@ -143,24 +149,16 @@ def _data(change: ParameterChange) -> dict[str, object]:
     }
 
 
-NO_VALUES = kind("RBX9048")
-PIPED = "-"
-_ROS = "ros__parameters"
-HALF_DONE = kind("RBX9047")
-BREAKS_RULE = kind("RBX9030")
-_WORDS = 3  # of a single change: component, parameter, value
-
-
-def value_of(text: str) -> rcl_interfaces.ParameterValue:
+def value_of(text: str) -> rcl.ParameterValue:
     """Read a number, a flag or a list in YAML; anything else is text."""
     root, findings = read_text(text, "VALUE")
     data = text if root is None or findings or isinstance(root, MappingNode) else to_plain(root)
-    return to_message(text if data is None else data) or rcl_interfaces.ParameterValue(
-        type=rcl_interfaces.ParameterType.PARAMETER_STRING, string_value=text
+    return to_message(text if data is None else data) or rcl.ParameterValue(
+        type=rcl.ParameterType.PARAMETER_STRING, string_value=text
     )
 
 
-def file_values(path: Path, report: Report, sources: dict[str, str]) -> dict[str, tuple[rcl_interfaces.Parameter, ...]]:
+def file_values(path: Path, report: Report, sources: dict[str, str]) -> dict[str, tuple[rcl.Parameter, ...]]:
     """Return the parameters in a file, by component, or `-` in what is piped in; mistakes go into `report`."""
     if str(path) == PIPED:
         sources[PIPED] = sys.stdin.read()
@@ -168,7 +166,7 @@ def file_values(path: Path, report: Report, sources: dict[str, str]) -> dict[str
     else:
         root, findings = read_file(path, shown_name(path), sources)
     report.extend(findings)
-    found: dict[str, tuple[rcl_interfaces.Parameter, ...]] = {}
+    found: dict[str, tuple[rcl.Parameter, ...]] = {}
     if root is None:
         return found
     if not isinstance(root, MappingNode):
@@ -185,7 +183,7 @@ def file_values(path: Path, report: Report, sources: dict[str, str]) -> dict[str
     return found
 
 
-def _parameters(node: MappingNode, above: str, report: Report) -> list[rcl_interfaces.Parameter]:
+def _parameters(node: MappingNode, above: str, report: Report) -> list[rcl.Parameter]:
     found = []
     for name, entry in node.entries.items():
         path = f"{above}{SEPARATOR}{name}" if above else name
@@ -194,20 +192,17 @@ def _parameters(node: MappingNode, above: str, report: Report) -> list[rcl_inter
         elif (value := _message(entry.value)) is None:
             report.add(NO_VALUES.at(entry.value.span, f"no parameter can have this value, as '{path}' has"))
         else:
-            found.append(rcl_interfaces.Parameter(path, value))
+            found.append(rcl.Parameter(path, value))
     return found
 
 
-def _message(node: TreeNode) -> rcl_interfaces.ParameterValue | None:
+def _message(node: TreeNode) -> rcl.ParameterValue | None:
     value = to_plain(node)
     return None if value is None else to_message(value)
 
 
 def _no_map(span: Span, what: str) -> Finding:
     return NO_VALUES.at(span, f"{what} must be a map", help="'rbxcompose param dump' shows the form")
-
-
-Wanted = Mapping[str, Sequence[rcl_interfaces.Parameter]]  # by node
 
 
 def change_values(
@@ -250,20 +245,20 @@ def _change_foreign(nodes: ParameterNodes, wanted: Wanted, ours: Sequence[str]) 
     if len(wanted) > 1:
         message = f"'{node}' cannot change together with others: it is not a component with live settings"
         raise NotDoneError(SAID_NO.at(None, message, help="set its parameters alone"))
-    atomically = rcl_interfaces.SetParametersAtomically.Request(parameters=tuple(wanted[node]))
-    (answer,) = nodes.ask([node], "set_parameters_atomically", rcl_interfaces.SetParametersAtomically, [atomically])
+    atomically = rcl.SetParametersAtomically.Request(parameters=tuple(wanted[node]))
+    (answer,) = nodes.ask([node], "set_parameters_atomically", rcl.SetParametersAtomically, [atomically])
     if not answer.result.successful:
         raise NotDoneError(SAID_NO.at(None, f"'{node}': {answer.result.reason}"))
 
 
 def _require_names(nodes: ParameterNodes, wanted: Wanted) -> None:
-    requests = [rcl_interfaces.GetParameters.Request(names=tuple(one.name for one in each)) for each in wanted.values()]
-    answers = nodes.ask(list(wanted), "get_parameters", rcl_interfaces.GetParameters, requests)
+    requests = [rcl.GetParameters.Request(names=tuple(one.name for one in each)) for each in wanted.values()]
+    answers = nodes.ask(list(wanted), "get_parameters", rcl.GetParameters, requests)
     for (node, each), answer in zip(wanted.items(), answers, strict=True):
         if len(answer.values) != len(each):
             raise NotDoneError(SAID_NO.at(None, f"'{node}' does not report its parameters"))
         for parameter, value in zip(each, answer.values, strict=True):
-            if value.type == rcl_interfaces.ParameterType.PARAMETER_NOT_SET:
+            if value.type == rcl.ParameterType.PARAMETER_NOT_SET:
                 require_name(nodes, node, parameter.name)
 
 
@@ -278,9 +273,9 @@ def param_set(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     """Set one parameter, or several at once."""
     if not (pairs := assignments(arguments.words)):
         return misused("param", "write COMPONENT PARAMETER VALUE, or COMPONENT.PARAMETER=VALUE for each")
-    wanted: dict[str, list[rcl_interfaces.Parameter]] = {}
+    wanted: dict[str, list[rcl.Parameter]] = {}
     for component, name, text in pairs:
-        wanted.setdefault(nodes.find(component), []).append(rcl_interfaces.Parameter(name, value_of(text)))
+        wanted.setdefault(nodes.find(component), []).append(rcl.Parameter(name, value_of(text)))
     change_values(nodes, wanted, "set")
     return write_values(nodes, wanted, arguments, [written_unit(text) for _, _, text in pairs])
 
@@ -305,13 +300,13 @@ def param_undo(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
         found = to_undo([parameter_change for each in known.values() for parameter_change in each], arguments.change)
     except NothingToUndoError as error:
         return refuse(NO_NAME.at(None, str(error), help="'rbxcompose param history' lists the changes"))
-    wanted: dict[str, list[rcl_interfaces.Parameter]] = {}
-    expected: dict[str, list[rcl_interfaces.Parameter]] = {}
+    wanted: dict[str, list[rcl.Parameter]] = {}
+    expected: dict[str, list[rcl.Parameter]] = {}
     undoes: dict[str, int] = {}
     for change in sorted(found, key=lambda each: each.component):  # processes report a change in any order
         node = homes[change.component]
-        wanted.setdefault(node, []).append(rcl_interfaces.Parameter(change.name, change.before))
-        expected.setdefault(node, []).append(rcl_interfaces.Parameter(change.name, change.after))
+        wanted.setdefault(node, []).append(rcl.Parameter(change.name, change.before))
+        expected.setdefault(node, []).append(rcl.Parameter(change.name, change.after))
         undoes[node] = min(change.number, undoes.get(node, change.number))
     change_values(nodes, wanted, "undo", undoes, expected)
     return write_values(nodes, wanted, arguments)
@@ -330,14 +325,14 @@ def assignments(words: Sequence[str]) -> list[tuple[str, str, str]]:
     return found
 
 
-def message_of(value: object) -> rcl_interfaces.ParameterValue:
+def message_of(value: object) -> rcl.ParameterValue:
     """Return a value as a message; one that has no message counts as not set."""
-    return to_message(value) or rcl_interfaces.ParameterValue()
+    return to_message(value) or rcl.ParameterValue()
 
 
 def write_values(
     nodes: ParameterNodes,
-    wanted: dict[str, list[rcl_interfaces.Parameter]],
+    wanted: dict[str, list[rcl.Parameter]],
     arguments: argparse.Namespace,
     units: Sequence[str | None] = (),
 ) -> int:
