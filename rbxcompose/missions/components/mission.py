@@ -61,11 +61,6 @@ class Mission(Component[MissionConfig]):
         """Declare that it is the executive."""
         return (RunsMissions(),)
 
-    @property
-    def equipment(self) -> MissionConfig:
-        """Return what missions may use."""
-        return self.config
-
     def configure(self) -> None:
         """Start with no values and no missions."""
         from rbxcompose.missions.execution.errands import Desks

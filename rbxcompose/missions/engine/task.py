@@ -41,12 +41,6 @@ from rbxcompose.missions.program.outcomes import (
 from rbxcompose.missions.program.program import NOTHING, MissionNode, Program, RobotNames, Target
 
 
-class ResumableTask(Protocol):
-    """A task, as far as resume points know it."""
-
-    number: int
-
-
 class ResumePoints:
     """The tasks that will resume where they were halted.
 
@@ -54,15 +48,15 @@ class ResumePoints:
     """
 
     def __init__(self) -> None:
-        self.kept: set[ResumableTask] = set()
+        self.kept: set[Task] = set()
         self.is_deep = False
 
-    def leave(self, task: ResumableTask) -> None:
+    def leave(self, task: Task) -> None:
         """Note that a task is being halted."""
         if self.is_deep:
             self.kept.add(task)
 
-    def take_up(self, task: ResumableTask) -> bool:
+    def take_up(self, task: Task) -> bool:
         """Return whether a task that starts has a place to resume at, and forget that place."""
         if task in self.kept:
             self.kept.remove(task)
@@ -260,7 +254,7 @@ class RunBase(ABC):
         """Stop the running leaves, and keep the place."""
 
     @abstractmethod
-    def main_tasks(self) -> Iterable[ResumableTask]:
+    def main_tasks(self) -> Iterable[Task]:
         """Return the tasks of the main node that can keep a place."""
 
 
