@@ -3,6 +3,7 @@
 import importlib
 import pkgutil
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import field, replace
 from functools import cache, cached_property
 from itertools import takewhile
@@ -229,12 +230,7 @@ def transitions(program: Program) -> Iterator[tuple[MachineStates, list[MissionN
 
 def reached(start: str, leads: Leads) -> frozenset[str]:
     """Return all states and ends that can be reached from a state, including the state itself."""
-    found, open_ones = {start}, [start]
-    while open_ones:
-        new = leads.get(open_ones.pop(), frozenset()) - found
-        found.update(new)
-        open_ones.extend(new)
-    return frozenset(found)
+    return _all_from([start], leads)
 
 
 def leading_to(goals: Iterable[str], leads: Leads) -> frozenset[str]:
@@ -243,10 +239,15 @@ def leading_to(goals: Iterable[str], leads: Leads) -> frozenset[str]:
     for name, targets in leads.items():
         for target in targets:
             back.setdefault(target, set()).add(name)
-    found = set(goals)
+    return _all_from(goals, back)
+
+
+def _all_from(begin: Iterable[str], steps: Mapping[str, AbstractSet[str]]) -> frozenset[str]:
+    """Return all that can be reached in some steps, including where they begin."""
+    found = set(begin)
     open_ones = list(found)
     while open_ones:
-        new = back.get(open_ones.pop(), set()) - found
+        new = steps.get(open_ones.pop(), frozenset()) - found
         found |= new
         open_ones.extend(new)
     return frozenset(found)

@@ -205,9 +205,8 @@ def pointless_number(mission: Examined) -> Iterator[Finding]:
     for node in mission.program.nodes:
         modifiers = (number for modifier in node.modifiers.values() for number in modifier.numbers)
         for what, expression, least, effect in (*node.step.numbers, *modifiers):
-            value = (
-                facts.number_of(expression, {}) if expression and expression.text else None
-            )  # a name may be on purpose
+            written = expression if expression and expression.text else None
+            value = facts.number_of(written, {})  # without the data: a name may be on purpose
             if expression and value is not None and 0 <= value < least:
                 yield pointless_number.at(
                     facts.place_in_text(node, expression),

@@ -16,17 +16,8 @@ from rbxcompose.missions.analysis.facts import Constants
 from rbxcompose.missions.codes import UNKNOWN_NAME, WRONG_INPUT, WRONG_TYPE
 from rbxcompose.missions.engine.world import show
 from rbxcompose.missions.language.literals import WrongValue, help_with_place, is_pose, nodes_of, typed
+from rbxcompose.missions.program import parts
 from rbxcompose.missions.program.outcomes import Outcomes
-from rbxcompose.missions.program.parts import (
-    RESULTS,
-    Asked,
-    Assignment,
-    MessageTemplate,
-    TemplateShape,
-    WrittenArgument,
-    WrittenValue,
-    inner_span,
-)
 from rbxcompose.missions.program.program import Program, Skill
 from rbxcompose.missions.program.registry import modifier_keys
 from rbxcompose.msgs import registry
@@ -52,7 +43,7 @@ def wrong_argument(mission: Examined) -> Iterator[Finding]:
             yield from _missing(view, skill)
 
 
-def _written_pose(skill: Skill, arguments: Collection[WrittenArgument]) -> Finding | None:
+def _written_pose(skill: Skill, arguments: Collection[parts.WrittenArgument]) -> Finding | None:
     """Return the one finding about coordinates in the place of the argument that takes a place."""
     main = skill.arguments.get(skill.main)
     unknown = {argument.name: argument for argument in arguments if argument.name not in skill.arguments}
@@ -91,7 +82,7 @@ def _one_by_one(view: View, skill: Skill, value: TreeNode) -> str:
     return f"to do it for each: 'for: one', 'in: [{shown}]', 'do: {{{skill.name}: $one}}', each on a line of its own"
 
 
-def _argument(view: View, skill: Skill, argument: WrittenArgument) -> Iterator[Finding]:
+def _argument(view: View, skill: Skill, argument: parts.WrittenArgument) -> Iterator[Finding]:
     name = argument.name or skill.main
     if not name:
         message = f"the skill '{skill.name}' takes no single value"
@@ -169,7 +160,7 @@ def wrong_field(mission: Examined) -> Iterator[Finding]:
                 yield from _check_body(view, message, registry.service(services[message.target.text]).Request)
 
 
-def _check_body(view: View, message: MessageTemplate, ros: type[Message]) -> Iterator[Finding]:
+def _check_body(view: View, message: parts.MessageTemplate, ros: type[Message]) -> Iterator[Finding]:
     body = message.body
     if body is None:
         return
@@ -185,7 +176,7 @@ def _check_body(view: View, message: MessageTemplate, ros: type[Message]) -> Ite
 
 def _check_fields(
     view: View,
-    body: Mapping[str, TemplateShape],
+    body: Mapping[str, parts.TemplateShape],
     ros: type[Message],
     keys: Mapping[tuple[str, ...], Span],
     path: tuple[str, ...] = (),
@@ -205,13 +196,13 @@ def _check_fields(
             yield from found or _measured(view, shape, measure_of(ros.TYPE, name) or measured)
 
 
-def _check_value(view: View, shape: TemplateShape, ros_type: str, span: Span) -> Iterator[Finding]:
+def _check_value(view: View, shape: parts.TemplateShape, ros_type: str, span: Span) -> Iterator[Finding]:
     field = parse_type(ros_type)
     if isinstance(shape, Mapping):
         yield wrong_field.at(span, f"a map does not fit the type {ros_type}")
-    elif isinstance(shape, WrittenValue) and (field.shape is FieldShape.SINGLE or field.base in BYTES):
+    elif isinstance(shape, parts.WrittenValue) and (field.shape is FieldShape.SINGLE or field.base in BYTES):
         yield from _check_written(view, shape, field.base, ros_type)
-    elif isinstance(shape, WrittenValue):
+    elif isinstance(shape, parts.WrittenValue):
         yield from _check_list(view, shape, ros_type)
     elif field.shape is FieldShape.SINGLE:
         yield wrong_field.at(_span_of(shape) or span, f"a list does not fit the type {ros_type}")
@@ -220,9 +211,9 @@ def _check_value(view: View, shape: TemplateShape, ros_type: str, span: Span) ->
             yield from _check_value(view, item, field.base, span)
 
 
-def _measured(view: View, shape: TemplateShape, wanted: Dimension | None) -> Iterator[Finding]:
+def _measured(view: View, shape: parts.TemplateShape, wanted: Dimension | None) -> Iterator[Finding]:
     """Yield a finding if a value with a unit is no value of what a field measures."""
-    if wanted is None or not isinstance(shape, WrittenValue) or shape.expression is None:
+    if wanted is None or not isinstance(shape, parts.WrittenValue) or shape.expression is None:
         return
     given, _ = check(shape.expression, view.scope)
     if any(each.dimension not in (None, NUMBER, QUOTIENT, wanted) for each in given.each):
@@ -230,7 +221,7 @@ def _measured(view: View, shape: TemplateShape, wanted: Dimension | None) -> Ite
         yield wrong_field.at(shape.scalar.span, message, help=f"write {wanted.phrase}, such as '{example(wanted)}'")
 
 
-def _check_list(view: View, shape: WrittenValue, ros_type: str) -> Iterator[Finding]:
+def _check_list(view: View, shape: parts.WrittenValue, ros_type: str) -> Iterator[Finding]:
     """Yield a finding if a single value is where a list must be; a name may refer to a list."""
     found = check(shape.expression, view.scope)[0].kind if shape.expression else TypeKind.TEXT
     if found not in (TypeKind.LIST, TypeKind.UNKNOWN):
@@ -238,7 +229,7 @@ def _check_list(view: View, shape: WrittenValue, ros_type: str) -> Iterator[Find
         yield wrong_field.at(shape.scalar.span, f"this must be a list, {ros_type}", help=help_text)
 
 
-def _check_written(view: View, shape: WrittenValue, base: str, ros_type: str) -> Iterator[Finding]:
+def _check_written(view: View, shape: parts.WrittenValue, base: str, ros_type: str) -> Iterator[Finding]:
     if base == "string":
         yield from check_written(view, shape.scalar, TEXT, wrong_field)
     elif shape.expression is None:
@@ -254,7 +245,7 @@ def _check_written(view: View, shape: WrittenValue, base: str, ros_type: str) ->
             yield wrong_field.at(shape.scalar.span, f"this must be of the type {ros_type}; it is {given.phrase}")
 
 
-def _no_message(shape: WrittenValue, base: str) -> Finding:
+def _no_message(shape: parts.WrittenValue, base: str) -> Finding:
     """Return the finding about a single value in the place of a message."""
     fields = registry.message(base).FIELDS
     first = next(iter(fields), "")
@@ -262,10 +253,10 @@ def _no_message(shape: WrittenValue, base: str) -> Finding:
     return wrong_field.at(shape.scalar.span, f"this must be a {base}, not a single value", help=help_text)
 
 
-def _span_of(shape: TemplateShape) -> Span | None:
+def _span_of(shape: parts.TemplateShape) -> Span | None:
     """Return the span of a value, or of the first one in a list."""
     match shape:
-        case WrittenValue(scalar=scalar):
+        case parts.WrittenValue(scalar=scalar):
             return scalar.span
         case (first, *_):
             return _span_of(first)
@@ -334,7 +325,7 @@ def wrong_type(mission: Examined) -> Iterator[Finding]:
         yield from findings_of(asked.expression, asked.wanted, asked.scalar, mission.scope, WRONG_TYPE)
 
 
-def _negative(asked: Asked, known: Constants) -> Iterator[Finding]:
+def _negative(asked: parts.Asked, known: Constants) -> Iterator[Finding]:
     """Yield a finding if a duration or a count is surely negative: the step would always fail."""
     value = facts.number_of(asked.expression, known) if asked.wanted in (COUNT, quantity_of(TIME)) else None
     if value is not None and value < 0:
@@ -357,7 +348,7 @@ def _goes_to_places(view: View) -> bool:
     return False
 
 
-def _assigned(view: View, assignment: Assignment) -> Iterator[Finding]:
+def _assigned(view: View, assignment: parts.Assignment) -> Iterator[Finding]:
     """Yield a finding if a value does not fit its datum.
 
     A count accepts any number: `sum: 0` under `data` does not say that it stays whole. And a text accepts a place:
@@ -411,7 +402,7 @@ def _outcomes(view: View, ending: Ending) -> Iterator[Finding]:
         return
     names, branch_ends = dict(view.scope.names), ending.of_branches(view.node)
     for branch, ends in branch_ends.items():
-        names[branch] = choice_of(*RESULTS, *(word for word in ends.named if word not in RESULTS))
+        names[branch] = choice_of(*parts.RESULTS, *(word for word in ends.named if word not in parts.RESULTS))
     scope = replace(view.scope, names=names)
     for outcome in branches.outcomes:
         if asked := outcome.asked:
@@ -421,11 +412,11 @@ def _outcomes(view: View, ending: Ending) -> Iterator[Finding]:
             yield from unknown or others  # the word compared with a misspelt branch would count as an unknown place
 
 
-def _with_results(finding: Finding, asked: Asked, ends: Mapping[str, Outcomes]) -> Finding:
+def _with_results(finding: Finding, asked: parts.Asked, ends: Mapping[str, Outcomes]) -> Finding:
     """Return a finding about a word that is no result, with the results of the branch that it is compared with."""
     for part, _ in walk(asked.expression.tree):
         branch, word = facts.compared_with_word(part) or ("", None)
-        if word and branch in ends and finding.span == inner_span(asked.scalar, word.start, word.end):
+        if word and branch in ends and finding.span == parts.inner_span(asked.scalar, word.start, word.end):
             results = ends[branch].words
             text = f"it ends with {' or '.join(results)}" if results else "it never ends"
             return replace(finding, message=f"the branch '{branch}' never ends with '{word.name}'", help=text)

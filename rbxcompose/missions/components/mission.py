@@ -61,11 +61,6 @@ class Mission(Component[MissionConfig]):
         """Declare that it is the executive."""
         return (RunsMissions(),)
 
-    @property
-    def equipment(self) -> MissionConfig:
-        """Return what missions may use."""
-        return self.config
-
     def configure(self) -> None:
         """Start with no values and no missions."""
         from rbxcompose.missions.execution.errands import Desks
@@ -399,7 +394,7 @@ class Mission(Component[MissionConfig]):
     @answers(requests.ListOutcomes)
     def list_outcomes(self, request: requests.ListOutcomes) -> requests.OutcomesByNode:
         """Return in which outcomes nodes may be forced to end."""
-        from rbxcompose.missions.execution.debugging import outcomes_of
+        from rbxcompose.missions.execution.breakpoints import outcomes_of
 
         run = self.missions.running(request.mission)
         return outcomes_of(run.engine.program, run.engine.robot)
@@ -407,7 +402,7 @@ class Mission(Component[MissionConfig]):
     @answers(requests.ListData)
     def list_data(self, request: requests.ListData) -> tuple[requests.ListedDatum, ...]:
         """Return the data of a mission that runs."""
-        from rbxcompose.missions.execution.debugging import data_of
+        from rbxcompose.missions.execution.breakpoints import data_of
 
         return tuple(data_of(self.missions.running(request.mission)))
 
@@ -436,21 +431,21 @@ class Mission(Component[MissionConfig]):
     @answers(requests.ForceNode)
     def force(self, request: requests.ForceNode) -> str:
         """Let a node that runs end."""
-        from rbxcompose.missions.execution.debugging import forced
+        from rbxcompose.missions.execution.breakpoints import forced
 
         return self.intervene(request.mission, lambda run: [forced(run, request.where, request.outcome)])
 
     @answers(requests.SetMissionData)
     def set_data(self, request: requests.SetMissionData) -> str:
         """Set data of a mission."""
-        from rbxcompose.missions.execution.debugging import changed
+        from rbxcompose.missions.execution.breakpoints import changed
 
         return self.intervene(request.mission, lambda run: changed(run, request.values))
 
     @answers(requests.JumpMission)
     def jump(self, request: requests.JumpMission) -> str:
         """Bring a machine into another state."""
-        from rbxcompose.missions.execution.debugging import jump
+        from rbxcompose.missions.execution.breakpoints import jump
 
         return self.intervene(request.mission, lambda run: [jump(run, request.state)])
 

@@ -6,8 +6,7 @@ from typing import Any
 from rbxcompose.base.expressions.types import UNKNOWN, Type
 from rbxcompose.missions.analysis.examined import NodeScope
 from rbxcompose.missions.engine.events import BranchEnded, NodeEnded, NodeStarted
-from rbxcompose.missions.engine.run import Run, since_scope
-from rbxcompose.missions.engine.task import EngineBase, Leaf, MovedChildren, Site, Task
+from rbxcompose.missions.engine.task import EngineBase, Leaf, MovedChildren, Run, Site, Task, since_scope
 from rbxcompose.missions.engine.world import ItemScope, MissionScope, Observer, SinceScope, item_types
 from rbxcompose.missions.program.families import Decorator, WithHistory
 from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING

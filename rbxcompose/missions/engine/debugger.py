@@ -20,8 +20,7 @@ from rbxcompose.missions.engine.interventions import (
     SetBreakpoints,
     TakeStep,
 )
-from rbxcompose.missions.engine.run import Run
-from rbxcompose.missions.engine.task import EngineBase, NodeProbe, Task, result_word
+from rbxcompose.missions.engine.task import EngineBase, NodeProbe, Run, Task, result_word
 from rbxcompose.missions.engine.world import show
 from rbxcompose.missions.program.outcomes import FAILURE, IDLE, RUNNING, SUCCESS
 from rbxcompose.missions.program.program import NOTHING, MissionNode, Program, Target

@@ -7,8 +7,7 @@ from rbxcompose.missions.engine.build import Builder
 from rbxcompose.missions.engine.debugger import Debugger
 from rbxcompose.missions.engine.events import MissionEnded, Reported
 from rbxcompose.missions.engine.interventions import Intervention
-from rbxcompose.missions.engine.run import Reaction
-from rbxcompose.missions.engine.task import ROUNDING, EngineBase, Task
+from rbxcompose.missions.engine.task import ROUNDING, EngineBase, Reaction, Task
 from rbxcompose.missions.engine.world import PLAIN, Settings, World
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.outcomes import FAILURE, IDLE, NAMES, RUNNING, SUCCESS, Result

@@ -17,9 +17,8 @@ from rbxcompose.base.expressions.values import NOT_ARRIVED
 from rbxcompose.missions.engine.debugger import Probed, named
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.interventions import NotPossible
-from rbxcompose.missions.engine.run import Course, Run
 from rbxcompose.missions.engine.snapshot import OF_ENGINE, OF_RUN
-from rbxcompose.missions.engine.task import Leaf, MovedChildren, Task
+from rbxcompose.missions.engine.task import Course, Leaf, MovedChildren, Run, Task
 from rbxcompose.missions.language.literals import HeldNode
 from rbxcompose.missions.program.counterparts import Pairing
 from rbxcompose.missions.program.families import Decorator, InTurnTask

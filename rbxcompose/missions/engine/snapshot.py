@@ -14,8 +14,7 @@ from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.printable import plain as plain_text
 from rbxcompose.missions.engine.build import Since
 from rbxcompose.missions.engine.engine import Engine
-from rbxcompose.missions.engine.run import Run
-from rbxcompose.missions.engine.task import Task
+from rbxcompose.missions.engine.task import Run, Task
 from rbxcompose.missions.language.literals import HeldNode
 from rbxcompose.missions.program.outcomes import Result
 

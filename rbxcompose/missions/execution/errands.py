@@ -22,10 +22,7 @@ class Shell(Protocol):
     """The component: its time, its live ports by name, its log."""
 
     bound: dict[str, Any]
-
-    @property
-    def equipment(self) -> MissionConfig:
-        """Return the robot's missions and what they may request of it."""
+    config: MissionConfig
 
     @property
     def now(self) -> float:
@@ -226,9 +223,14 @@ def _result(skill: Skill, ended: Ended[Any]) -> Result:
     """Return the result of a goal; the fields `outcome` and `message` give its outcome and reason."""
     values = values_of(ended.result)
     is_good = ended.outcome is Outcome.SUCCEEDED
-    text = values.get(OUTCOME) if skill.outcomes else ""
     reason = ended.message or text_in(values) or ("" if is_good else str(ended.outcome))
-    return Result(is_good, reason, text if isinstance(text, str) else "", values)
+    return Result(is_good, reason, _outcome_in(values, skill), values)
+
+
+def _outcome_in(values: Mapping[str, Value], skill: Skill) -> str:
+    """Return the skill's own outcome in the fields of a result or an end; empty if it has none."""
+    outcome = values.get(OUTCOME) if skill.outcomes else ""
+    return outcome if isinstance(outcome, str) else ""
 
 
 def text_in(values: Mapping[str, Value]) -> str:
@@ -481,10 +483,8 @@ class TopicErrand(Waiting):
     def ended(self, message: Any) -> None:
         """Handle its end."""
         values = values_of(message)
-        outcome = values.get(OUTCOME) if self._source.skill.outcomes else ""
-        self.end(
-            Result(values.get(SUCCESS) is True, text_in(values), outcome if isinstance(outcome, str) else "", values)
-        )
+        outcome = _outcome_in(values, self._source.skill)
+        self.end(Result(values.get(SUCCESS) is True, text_in(values), outcome, values))
 
     def changed(self) -> None:
         """Check whether any of the subscribers that it was sent to is left."""

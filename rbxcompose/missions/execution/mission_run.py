@@ -6,6 +6,7 @@ import json
 import zlib
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import asdict
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -344,15 +345,7 @@ class MissionRun:
         if isinstance(event, Intervened):
             self.by_hand += 1
         if isinstance(event, Transition):
-            self.transitions.append(
-                {
-                    "time": self._now,
-                    "machine": event.machine,
-                    "state": event.state,
-                    "outcome": event.outcome,
-                    "to": event.to,
-                }
-            )
+            self.transitions.append({"time": self._now, **asdict(event)})
         if text:
             self._on_line(level, text)
 

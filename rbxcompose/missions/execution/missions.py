@@ -20,7 +20,7 @@ from rbxcompose.missions.engine.logbook import LogRecord
 from rbxcompose.missions.engine.snapshot import from_plain
 from rbxcompose.missions.engine.world import PLAIN, Observer, Settings, show
 from rbxcompose.missions.execution import requests
-from rbxcompose.missions.execution.debugging import Breakpoints
+from rbxcompose.missions.execution.breakpoints import Breakpoints
 from rbxcompose.missions.execution.equipment import MissionConfig
 from rbxcompose.missions.execution.mission_run import LeftMission, LogStore, MakeWorld, MissionRun
 from rbxcompose.missions.execution.snapshots import differences, identity_of

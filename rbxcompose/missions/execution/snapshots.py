@@ -17,7 +17,7 @@ from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, Tree
 from rbxcompose.missions.engine.debugger import named
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.snapshot import from_plain, save, to_plain
-from rbxcompose.missions.execution.debugging import written
+from rbxcompose.missions.execution.breakpoints import written
 from rbxcompose.missions.execution.mission_run import MissionRun
 from rbxcompose.missions.execution.requests import ListedSnapshot
 from rbxcompose.missions.program.outcomes import RUNNING

@@ -18,6 +18,7 @@ from rbxcompose.base.files import read_regular
 from rbxcompose.base.requests import Refused, from_data, to_data
 from rbxcompose.missions.engine.events import MissionEnded
 from rbxcompose.missions.engine.world import RobotValues, RunScope, SinceScope
+from rbxcompose.missions.execution.errands import Shell
 from rbxcompose.missions.execution.mission_run import MissionRun
 from rbxcompose.missions.execution.missions import RunningMissions
 from rbxcompose.missions.execution.requests import ListedTrigger, RunMission
@@ -70,15 +71,11 @@ class TriggerMemory:
             self.trouble = f"what triggers did cannot be kept: {error.strerror}"
 
 
-class Executive(Protocol):
+class Executive(Shell, Protocol):
     """What triggers need of the component that runs missions."""
 
     context: Context
     missions: RunningMissions
-
-    @property
-    def now(self) -> float:
-        """Return robot time [s]."""
 
     @property
     def stamp(self) -> int:
@@ -89,15 +86,6 @@ class Executive(Protocol):
 
     def end(self, run: MissionRun) -> None:
         """End a mission that runs."""
-
-    def info(self, text: str) -> None:
-        """Log an event."""
-
-    def warn(self, text: str) -> None:
-        """Log a warning."""
-
-    def look_soon(self) -> None:
-        """Request a wake at this instant."""
 
 
 class Triggering:

@@ -109,14 +109,14 @@ class RobotWorld:
 
     def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
         """Call a service."""
-        request = message_of(registry.service(self._shell.equipment.services[service]).Request, fields)
+        request = message_of(registry.service(self._shell.config.services[service]).Request, fields)
         self._begin(
             leaf, errands.CallErrand(self._shell, self._done(leaf), service, port_name(CALLS, service), request)
         )
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
         """Publish a message; raises ValueError if a field does not fit."""
-        message = registry.message(self._shell.equipment.topics[topic].message)
+        message = registry.message(self._shell.config.topics[topic].message)
         self._shell.bound[port_name(PUBLISHES, topic)](message_of(message, fields))
 
     def halt(self, leaf: int, /) -> None:
@@ -157,7 +157,7 @@ class RobotWorld:
             errand.look()
 
     def _errand(self, done: errands.WhenDone, skill: str, arguments: Mapping[str, Value]) -> errands.Errand:
-        source = self._shell.equipment.skills[skill]
+        source = self._shell.config.skills[skill]
         if mistake := next(filter(None, (source.skill.mistake_in(*each) for each in arguments.items())), ""):
             raise ValueError(mistake)
         match source.way:

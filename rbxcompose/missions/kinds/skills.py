@@ -20,6 +20,16 @@ from rbxcompose.missions.program.registry import SKILL
 from rbxcompose.msgs import registry
 
 
+class RequestStep(sdk.LeafStep):
+    """A leaf that waits for an answer, which is its result."""
+
+    __slots__ = ()
+    waits = True
+    has_result = True
+    lasts = None
+    only_asks = False
+
+
 class SkillTask(sdk.Leaf):
     """A leaf that runs a skill of the robot."""
 
@@ -105,16 +115,11 @@ class SkillTask(sdk.Leaf):
 
 @sdk.kind(SKILL, SkillTask, is_inner=True)
 @sdk.dataclass(frozen=True, slots=True)
-class SkillStep(sdk.LeafStep):
+class SkillStep(RequestStep):
     """A skill by its name, with its arguments."""
 
     skill: str = field()
     arguments: tuple[sdk.WrittenArgument, ...] = field()
-
-    waits = True
-    has_result = True
-    lasts = None
-    only_asks = False
 
     @classmethod
     def read(cls, reader: sdk.NodeReader) -> Self:
@@ -186,7 +191,7 @@ class CallTask(sdk.Leaf):
 
 @sdk.kind("call", CallTask)
 @sdk.dataclass(frozen=True, slots=True)
-class CallStep(sdk.LeafStep):
+class CallStep(RequestStep):
     """Call a service of the robot; a response with `success: false` is a failure.
 
     Example:
@@ -198,11 +203,6 @@ class CallStep(sdk.LeafStep):
 
     message: sdk.MessageTemplate = sdk.message("request", SERVICE)
     request = sdk.contents("The fields of the request; a single value stands for the only field.")
-
-    waits = True
-    has_result = True
-    lasts = None
-    only_asks = False
 
     may_end = sdk.ends(sdk.ANY)
 
@@ -257,7 +257,7 @@ class SetParameterTask(sdk.Leaf):
 
 @sdk.kind("set_parameter", SetParameterTask)
 @sdk.dataclass(frozen=True, slots=True)
-class SetParameterStep(sdk.LeafStep):
+class SetParameterStep(RequestStep):
     """Change a setting of a component that may change while the robot runs; it fails if the component refuses.
 
     Example:
@@ -272,10 +272,7 @@ class SetParameterStep(sdk.LeafStep):
         value=sdk.value("a value", "The new value, of the type of the setting."),
     )
 
-    waits = True
     has_result = False
-    lasts = None
-    only_asks = False
 
     @property
     def setting(self) -> sdk.WrittenSetting:

@@ -50,7 +50,7 @@ class UseTask(sdk.WithHistory):
         super().halt()
         if self.history == LAST:
             self.engine.places.kept.discard(self)
-            self.engine.places.kept.update(self.inner.main_tasks())
+            self.engine.places.kept.update(self.inner.keepers)
 
     def halt_below(self) -> None:
         """Stop all that runs in the mission."""

@@ -3,18 +3,8 @@
 from collections.abc import Collection, Iterator, Mapping
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions import types
 from rbxcompose.base.expressions.tree import Expression, ExpressionNode, FieldAccess, Index, Variable
-from rbxcompose.base.expressions.types import (
-    COUNT,
-    FLAG,
-    TEXT,
-    Type,
-    TypeKind,
-    accepts,
-    list_with,
-    map_with,
-    quantity_of,
-)
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import DID_YOU_MEAN, Finding, FindingKind, Span, surely_meant
 from rbxcompose.base.printable import plain
@@ -52,25 +42,25 @@ def literal(node: TreeNode) -> Datum:
     match node:
         case MappingNode(entries=entries):
             values = {name: literal(entry.value) for name, entry in entries.items()}
-            found = map_with({name: datum.type for name, datum in values.items()})
+            found = types.map_with({name: datum.type for name, datum in values.items()})
             return Datum({name: datum.value for name, datum in values.items()}, found, node.span)
         case SequenceNode(items=items):
             read = [literal(item) for item in items]
-            return Datum([datum.value for datum in read], list_with([datum.type for datum in read]), node.span)
+            return Datum([datum.value for datum in read], types.list_with([datum.type for datum in read]), node.span)
         case ScalarNode():
             value = node.filled if node.filled is not None else _measured(node)
             return Datum(*_typed(value), node.span)
 
 
-def typed(node: TreeNode, wanted: Type) -> Datum:
+def typed(node: TreeNode, wanted: types.Type) -> Datum:
     """Return the literal in a node as a value of the type `wanted`; places stay texts.
 
     Raises:
         WrongValue: if it does not have that type.
     """
-    if wanted.kind in (TypeKind.LIST, TypeKind.MAP):
+    if wanted.kind in (types.TypeKind.LIST, types.TypeKind.MAP):
         found = literal(node)
-        if not accepts(wanted, found.type):
+        if not types.accepts(wanted, found.type):
             is_other = found.type.kind is not wanted.kind
             said = (wanted.phrase, found.type.phrase) if is_other else (wanted.detail, found.type.detail)
             raise WrongValue(f"must be {said[0]}", label=f"this is {said[1]}")
@@ -80,7 +70,7 @@ def typed(node: TreeNode, wanted: Type) -> Datum:
     return Datum(_scalar(node, wanted), wanted, node.span)
 
 
-def _scalar(scalar: ScalarNode, wanted: Type) -> Value:
+def _scalar(scalar: ScalarNode, wanted: types.Type) -> Value:
     value = plain_value(scalar) if scalar.filled is None else scalar.filled
     label = "" if isinstance(value, Quantity) else describe(value)
     if wanted.dimension:
@@ -88,17 +78,17 @@ def _scalar(scalar: ScalarNode, wanted: Type) -> Value:
             return to_si(value, wanted.dimension)
         except UnitError as error:
             raise WrongValue(error.message, label=error.detail or label, help=error.help) from None
-    if wanted.kind is TypeKind.COUNT:
+    if wanted.kind is types.TypeKind.COUNT:
         count = value.value if isinstance(value, Quantity) else value
         if isinstance(count, bool) or not isinstance(count, int | float) or count < 0 or count != int(count):
             raise WrongValue("must be a whole number, at least 0", label=label)
         return float(count)
-    if wanted.kind is TypeKind.FLAG:
+    if wanted.kind is types.TypeKind.FLAG:
         if not isinstance(value, bool):
             raise WrongValue("must be true or false", label=label)
         return value
     text = scalar.text if scalar.filled is None else str(scalar.filled)
-    if wanted.kind is TypeKind.CHOICE and text not in wanted.choices:
+    if wanted.kind is types.TypeKind.CHOICE and text not in wanted.choices:
         choices = ", ".join(wanted.choices)
         near = surely_meant(text, wanted.choices)
         help_text = f"{DID_YOU_MEAN} '{near}'?" if near else f"choices: {choices}"
@@ -116,18 +106,18 @@ def _measured(scalar: ScalarNode) -> object:
     return "" if value is None else value
 
 
-def _typed(value: object) -> tuple[Value, Type]:
+def _typed(value: object) -> tuple[Value, types.Type]:
     match value:
         case Quantity(value=number, dimension=dimension):
-            return number, quantity_of(dimension)
+            return number, types.quantity_of(dimension)
         case bool():
-            return value, FLAG
+            return value, types.FLAG
         case int():
-            return float(value), COUNT
+            return float(value), types.COUNT
         case float():
-            return value, quantity_of(NUMBER)
+            return value, types.quantity_of(NUMBER)
         case _:
-            return str(value), TEXT
+            return str(value), types.TEXT
 
 
 MAP = "map"

@@ -16,21 +16,7 @@ from rbxcompose.base.units import NUMBER, TIME
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, plain_value
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import is_reported
-from rbxcompose.missions.program.parts import (
-    DEEDS,
-    LEVELS,
-    OPTIONS,
-    Asked,
-    Assignment,
-    Deeds,
-    MessageTemplate,
-    Moments,
-    TemplateShape,
-    WrittenArgument,
-    WrittenValue,
-    expression_of,
-    inner_span,
-)
+from rbxcompose.missions.program import parts
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
 NAME_HELP = "names start with a lower-case letter; lower-case letters, digits and underscores follow"
@@ -79,9 +65,9 @@ class Nodes(Protocol):
 def read_expression(scalar: ScalarNode, nodes: Nodes, wanted: Type = FLAG) -> Expression | None:
     """Return the expression in a scalar; None, with a finding, if there is none. What is `wanted` is for the help."""
     try:
-        return expression_of(scalar)
+        return parts.expression_of(scalar)
     except ExpressionError as error:
-        span = inner_span(scalar, error.start, error.end) if scalar.text else scalar.span
+        span = parts.inner_span(scalar, error.start, error.end) if scalar.text else scalar.span
         is_text = wanted in (TEXT, UNKNOWN) and _WORDS.fullmatch(scalar.text)
         help_text = error.help or (quotes_needed(scalar.text) if is_text else "")
         nodes.add(codes.NO_EXPRESSION.at(span, error.message, help=help_text))
@@ -92,7 +78,7 @@ _FLOW_HELP = "inside '{}', commas and colons separate: put quotes around the con
 
 
 def _part_of(scalar: ScalarNode, slot: TextSlot) -> ScalarNode:
-    return ScalarNode(f"${slot.path}", inner_span(scalar, slot.start, slot.end))
+    return ScalarNode(f"${slot.path}", parts.inner_span(scalar, slot.start, slot.end))
 
 
 def unknown_keys(mapping: MappingNode, keys: Iterable[str], where: str, of: str = "") -> Iterator[Finding]:
@@ -116,7 +102,7 @@ class NodeReader:
         self.nodes = nodes
         self.children: list[int] = []
         self.item = ""
-        self.asked: list[Asked] = []
+        self.asked: list[parts.Asked] = []
         self.names: tuple[str, ...] = ()  # of the branches
 
     @property
@@ -210,11 +196,11 @@ class NodeReader:
             template = parse_template(scalar.text)
         except ExpressionError as error:
             self.nodes.add(
-                codes.NO_EXPRESSION.at(inner_span(scalar, error.start, error.end), error.message, help=error.help)
+                codes.NO_EXPRESSION.at(parts.inner_span(scalar, error.start, error.end), error.message, help=error.help)
             )
             return Template("", ())
         slots = (part for part in template.parts if isinstance(part, TextSlot))
-        self.asked.extend(Asked(slot.value, UNKNOWN, _part_of(scalar, slot)) for slot in slots)
+        self.asked.extend(parts.Asked(slot.value, UNKNOWN, _part_of(scalar, slot)) for slot in slots)
         return template
 
     def add(self, finding: Finding) -> None:
@@ -237,7 +223,7 @@ class NodeReader:
         expression = read_expression(scalar, self.nodes, wanted)
         if expression is None:
             return UNREADABLE
-        self.asked.append(Asked(expression, wanted, scalar, is_watched=is_watched))
+        self.asked.append(parts.Asked(expression, wanted, scalar, is_watched=is_watched))
         return expression
 
     def branch(self, key: str) -> ScalarNode | None:
@@ -290,7 +276,7 @@ class NodeReader:
         self.names = tuple(value.entries)
         return self.names
 
-    def cases(self, key: str) -> tuple[Asked, ...]:
+    def cases(self, key: str) -> tuple[parts.Asked, ...]:
         """Read a map from values to nodes, and return the values in the order of the children."""
         value = self.map_of(key, "values below it, each with what is done then")
         if value is None:
@@ -299,48 +285,48 @@ class NodeReader:
         for name, entry in value.entries.items():
             expression = read_expression(entry.key, self.nodes)
             if expression is not None:
-                read.append(Asked(expression, UNKNOWN, entry.key))
+                read.append(parts.Asked(expression, UNKNOWN, entry.key))
                 self.child_node(entry.value, name)
         self.asked.extend(asked for asked in read if asked.expression.names)  # a bare word need not be a place
         return tuple(read)
 
-    def asked_later(self, mapping: MappingNode, key: str) -> Asked | None:
+    def asked_later(self, mapping: MappingNode, key: str) -> parts.Asked | None:
         """Read a condition whose names only the kind knows; the kind has to check it."""
         reader = NodeReader(mapping, key, self.number, self.nodes)
         reader.condition(key)
         return reader.asked[0] if reader.asked else None
 
-    def message(self, target: str, body: str) -> MessageTemplate:
+    def message(self, target: str, body: str) -> parts.MessageTemplate:
         """Read the target and the contents of a message."""
         scalar = self.scalar(target, "the name of a topic or a service")
         value = self.mapping.get(body)
         shape = None if value is None else self._shape(value)
         keys = {} if value is None else dict(_keys_of(value))
-        return MessageTemplate(scalar or ScalarNode("", self.key_span(target)), shape, keys)
+        return parts.MessageTemplate(scalar or ScalarNode("", self.key_span(target)), shape, keys)
 
-    def moments(self, keys: Iterable[str]) -> Moments:
+    def moments(self, keys: Iterable[str]) -> parts.Moments:
         """Read hooks: what is set, logged or published at these moments."""
-        return Moments({key: self._deeds(key) for key in keys if self.has(key)})
+        return parts.Moments({key: self._deeds(key) for key in keys if self.has(key)})
 
-    def _deeds(self, key: str) -> Deeds:
+    def _deeds(self, key: str) -> parts.Deeds:
         what = "an action: 'set', 'log' or 'publish' below it, without a dash"
         value = self.map_of(key, what)
         if value is None:
-            return Deeds()
-        inner = self.inside(value, (*DEEDS, *OPTIONS), f"'{key}'")
-        for option, deed in OPTIONS.items():
+            return parts.Deeds()
+        inner = self.inside(value, (*parts.DEEDS, *parts.OPTIONS), f"'{key}'")
+        for option, deed in parts.OPTIONS.items():
             if inner.has(option) and not inner.has(deed):
                 self.add(codes.UNKNOWN_KEY.at(inner.key_span(option), f"'{option}' belongs to '{deed}'"))
-        deeds = Deeds(
+        deeds = parts.Deeds(
             inner.assignments("set") if inner.has("set") else (),
             inner.template("log") if inner.has("log") else None,
-            inner.choice("level", LEVELS),
+            inner.choice("level", parts.LEVELS),
             inner.message("publish", "message") if inner.has("publish") else None,
         )
         self.asked.extend(inner.asked)
         return deeds
 
-    def _shape(self, node: TreeNode) -> TemplateShape:
+    def _shape(self, node: TreeNode) -> parts.TemplateShape:
         match node:
             case MappingNode(entries=entries):
                 return {name: self._shape(entry.value) for name, entry in entries.items()}
@@ -348,10 +334,10 @@ class NodeReader:
                 return tuple(self._shape(item) for item in items)
             case ScalarNode():
                 try:
-                    expression = expression_of(node)
+                    expression = parts.expression_of(node)
                 except ExpressionError:
                     expression = None
-                return WrittenValue(node, self._quiet_template(node), expression)
+                return parts.WrittenValue(node, self._quiet_template(node), expression)
 
     def _quiet_template(self, scalar: ScalarNode) -> Template:
         try:
@@ -401,7 +387,7 @@ class NodeReader:
                 self.nodes.add(codes.WRONG_SHAPE.at(item.span, "an item must be a word, a number or '$name'"))
         return tuple(items)
 
-    def assignments(self, key: str) -> tuple[Assignment, ...]:
+    def assignments(self, key: str) -> tuple[parts.Assignment, ...]:
         """Read a map from names of data to expressions."""
         value = self.mapping.get(key)
         if is_reported(value):
@@ -412,20 +398,20 @@ class NodeReader:
             self.nodes.add(codes.WRONG_SHAPE.at(self.key_span(key), message, help=help_text))
             return ()
         inner = NodeReader(value, key, self.number, self.nodes)
-        read: list[Assignment] = []
+        read: list[parts.Assignment] = []
         for name, entry in value.entries.items():
             inner.expression(name, UNKNOWN, "a value")
-            read.extend(Assignment(name, entry.key.span, asked) for asked in inner.asked[len(read) :])
+            read.extend(parts.Assignment(name, entry.key.span, asked) for asked in inner.asked[len(read) :])
         self.asked.extend(replace(asked, is_assigned=True) for asked in inner.asked)
         return tuple(read)
 
-    def inputs(self, key: str) -> tuple[WrittenArgument, ...]:
+    def inputs(self, key: str) -> tuple[parts.WrittenArgument, ...]:
         """Read the values for the inputs of another mission."""
         given = self.map_of(key, "a map from inputs to values")
         if given is None:
             span = self.key_span(key)
-            return (WrittenArgument("", ScalarNode("", span), span),)  # what is given could not be read
-        return tuple(WrittenArgument(name, entry.value, entry.key.span) for name, entry in given.entries.items())
+            return (parts.WrittenArgument("", ScalarNode("", span), span),)  # what is given could not be read
+        return tuple(parts.WrittenArgument(name, entry.value, entry.key.span) for name, entry in given.entries.items())
 
     def record(self, key: str, what: str, keys: Mapping[str, str]) -> tuple[ScalarNode, ...]:
         """Read a map with these keys, each with what it needs; a scalar that is not there has no text."""
@@ -435,15 +421,17 @@ class NodeReader:
         inner = self.inside(mapping, keys, f"'{key}'")
         return tuple(inner.scalar(name, needs) or empty for name, needs in keys.items())
 
-    def arguments(self) -> tuple[WrittenArgument, ...]:
+    def arguments(self) -> tuple[parts.WrittenArgument, ...]:
         """Read the arguments of a skill: one value, or a map of several."""
         match self.mapping.get(self.key):
             case MappingNode(entries=entries):
-                return tuple(WrittenArgument(name, entry.value, entry.key.span) for name, entry in entries.items())
+                return tuple(
+                    parts.WrittenArgument(name, entry.value, entry.key.span) for name, entry in entries.items()
+                )
             case ScalarNode(text="", plain=True) | None:
                 return ()
             case value:
-                return (WrittenArgument("", value, value.span),)
+                return (parts.WrittenArgument("", value, value.span),)
 
 
 def _keys_of(node: TreeNode, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Span]]:

@@ -12,18 +12,8 @@ from rbxcompose.manifest.documents import misspelt_keys, with_keys
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, count, scalars
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.world import show
+from rbxcompose.missions.language import literals
 from rbxcompose.missions.language.grammar import BODIES, LEVELS, STATE_KEYS, is_reported, long_form
-from rbxcompose.missions.language.literals import (
-    ITEM,
-    PathPattern,
-    WrongValue,
-    literal,
-    matching,
-    pattern_of,
-    range_trouble,
-    typed,
-    with_held,
-)
 from rbxcompose.missions.language.node_reader import NAME, NAME_HELP, NodeReader, Nodes, invalid_name, unknown_keys
 from rbxcompose.missions.program import program
 from rbxcompose.missions.program.linker import TOO_MUCH
@@ -39,7 +29,7 @@ FASTEST = 1000.0  # [Hz]
 def read_data(node: TreeNode | None, report: Report) -> dict[str, Datum]:
     """Return the initial values under `data:`."""
     entries = _named(node, "data", report)
-    return {name: replace(literal(entry.value), span=entry.key.span) for name, entry in entries.items()}
+    return {name: replace(literals.literal(entry.value), span=entry.key.span) for name, entry in entries.items()}
 
 
 def read_inputs(node: TreeNode | None, report: Report) -> dict[str, Input]:
@@ -91,7 +81,7 @@ def _input(name: str, entry: Entry, report: Report) -> Input:
         message = f"'min' of '{name}' is above its 'max' of {show(wanted, read.most)}: no value fits"
         report.add(codes.WRONG_TYPE.at(least.span, message, help="exchange them"))
         return replace(read, least=None, most=None)
-    if default and (trouble := range_trouble(read, default)):
+    if default and (trouble := literals.range_trouble(read, default)):
         report.add(codes.WRONG_TYPE.at(default.span, f"the default of '{name}' {trouble}"))
     return read
 
@@ -117,8 +107,8 @@ def _value(node: TreeNode | None, wanted: Type, what: str, report: Report) -> Da
     if node is None:
         return None
     try:
-        return typed(node, wanted)
-    except WrongValue as error:
+        return literals.typed(node, wanted)
+    except literals.WrongValue as error:
         report.add(error.finding(codes.WRONG_TYPE, node.span, what))
         return None
 
@@ -216,7 +206,10 @@ def read_program(
     reader.child(body, "do" if "do" in root else "", None)
     interrupts = reader.interrupts(root.get("interrupts"))
     nodes = tuple(node for node in reader.nodes if node)
-    data = {name: replace(datum, value=with_held(datum.value, reader.found, (name,))) for name, datum in data.items()}
+    data = {
+        name: replace(datum, value=literals.with_held(datum.value, reader.found, (name,)))
+        for name, datum in data.items()
+    }
     return Program(
         _text(root, "name"),
         _text(root, "about"),
@@ -280,7 +273,7 @@ class _Reader:
         self.budget = budget
         data = root.get("data")
         self.data = {name: entry.value for name, entry in data.entries.items()} if isinstance(data, MappingNode) else {}
-        self.patterns: dict[str, PathPattern] = {}  # where in the data the items of loops are
+        self.patterns: dict[str, literals.PathPattern] = {}  # where in the data the items of loops are
         self.found: dict[tuple[str, ...], TreeNode] = {}  # the nodes in the data
         self.nodes: list[program.MissionNode | None] = []
         self.names: dict[str, Span] = {}
@@ -323,15 +316,15 @@ class _Reader:
 
     def loop(self, item: str, expression: Expression) -> None:
         """Note where in the data the item of a loop is."""
-        pattern = pattern_of(expression, self.patterns)
+        pattern = literals.pattern_of(expression, self.patterns)
         if pattern:
-            self.patterns[item] = (*pattern, ITEM)
+            self.patterns[item] = (*pattern, literals.ITEM)
 
     def held(self, expression: Expression, parent: int, span: Span) -> list[int]:
         """Read the nodes in the data that an expression may yield."""
-        pattern = pattern_of(expression, self.patterns)
+        pattern = literals.pattern_of(expression, self.patterns)
         numbers: list[int] = []
-        for key, node in matching(self.data, pattern) if pattern else ():
+        for key, node in literals.matching(self.data, pattern) if pattern else ():
             if not self.affords(node, span):
                 break
             self.found[key] = node

@@ -19,32 +19,8 @@ from rbxcompose.missions.engine.world import Watched
 from rbxcompose.missions.language.fields import children, choice, flag, history
 from rbxcompose.missions.language.grammar import DEEP, NO_HISTORY
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program import outcomes
-from rbxcompose.missions.program.outcomes import (  # looked up in every tick
-    ALWAYS_SUCCEEDS,
-    FAILURE,
-    IDLE,
-    RUNNING,
-    SKIPPED,
-    Outcomes,
-)
-from rbxcompose.missions.program.parts import (
-    NO_EFFECTS,
-    PLAIN,
-    Assignment,
-    Deeds,
-    Form,
-    ModifierScope,
-    Moments,
-    NodeEffects,
-    NodeFlow,
-    NodeLook,
-    Possibility,
-    Skipped,
-    expression_of,
-    skipped,
-    started,
-)
+from rbxcompose.missions.program import outcomes, parts
+from rbxcompose.missions.program.outcomes import FAILURE, IDLE, RUNNING, SKIPPED  # looked up in every tick
 from rbxcompose.missions.program.program import Endings, MissionNode, Modifier, RobotNames, Step
 
 _SLOT = re.compile(r"\{(\w+)(:if)?\}")
@@ -91,14 +67,14 @@ def quoted(text: str) -> str:
     return f"'{' '.join(text.split())}'"
 
 
-def deeds_in_words(deeds: Deeds) -> str:
+def deeds_in_words(deeds: parts.Deeds) -> str:
     """Return what is set, logged and published, in words."""
     message = f"publish on {deeds.message.target.text}" if deeds.message else ""
     log = logged_in_words(deeds.text, deeds.level) if deeds.text else ""
     return ", ".join(filter(None, (set_in_words(deeds.assignments), log, message)))
 
 
-def set_in_words(assignments: tuple[Assignment, ...]) -> str:
+def set_in_words(assignments: tuple[parts.Assignment, ...]) -> str:
     """Return what is set to what, in words."""
     one_by_one = [f"{spoken(one.name)} to {argument_in_words(one.asked.scalar)}" for one in assignments]
     return f"set {', '.join(one_by_one)}" if one_by_one else ""
@@ -117,7 +93,7 @@ def argument_in_words(value: TreeNode, wanted: Type = UNKNOWN) -> str:
             return quoted(value.text)
         case ScalarNode():
             try:
-                expression = expression_of(value)
+                expression = parts.expression_of(value)
             except ExpressionError:
                 return quoted(value.text)
             return condition_in_words(expression) if wanted == FLAG and expression.names else in_words(expression)
@@ -128,11 +104,11 @@ def argument_in_words(value: TreeNode, wanted: Type = UNKNOWN) -> str:
             return ", ".join(said) or "nothing"
 
 
-def ends(outcomes: Outcomes) -> Any:
+def ends(how: outcomes.Outcomes) -> Any:
     """Return the `may_end` of a kind that may end in these ways wherever it is written."""
 
-    def may_end(step: Step, node: MissionNode, endings: Endings) -> Outcomes:
-        return outcomes
+    def may_end(step: Step, node: MissionNode, endings: Endings) -> outcomes.Outcomes:
+        return how
 
     return may_end
 
@@ -144,7 +120,7 @@ class Quiet(Step):
 
     def possibilities(
         self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
-    ) -> Iterator[Possibility]:
+    ) -> Iterator[parts.Possibility]:
         """Yield nothing: what is around it covers whether it starts, and how often it repeats depends on data."""
         yield from ()
 
@@ -153,21 +129,21 @@ class Quiet(Step):
         return {}
 
     @property
-    def effects(self) -> NodeEffects:
+    def effects(self) -> parts.NodeEffects:
         """Return no effects."""
-        return NO_EFFECTS
+        return parts.NO_EFFECTS
 
 
 class LeafStep(Quiet):
     """A node without children: it does one thing once."""
 
     __slots__ = ()
-    skipped = Skipped.NEVER
+    skipped = parts.Skipped.NEVER
     comes_again = False
-    flow = NodeFlow.IN_TURN
-    look = PLAIN
+    flow = parts.NodeFlow.IN_TURN
+    look = parts.PLAIN
 
-    def endless(self, ends: Outcomes) -> None:
+    def endless(self, ends: outcomes.Outcomes) -> None:
         """Return nothing: it runs once."""
 
     @property
@@ -209,7 +185,7 @@ class Straight(GroupStep):
         """Return False: it goes through its children once."""
         return False
 
-    def endless(self, ends: Outcomes) -> None:
+    def endless(self, ends: outcomes.Outcomes) -> None:
         """Return nothing: it runs once."""
 
 
@@ -218,16 +194,16 @@ class Loop(GroupStep):
 
     __slots__ = ()
     comes_again = True
-    skipped = Skipped.PERHAPS
+    skipped = parts.Skipped.PERHAPS
 
 
 class Choosing(Straight):
     """A group that runs one of its children, or none."""
 
     __slots__ = ()
-    skipped = Skipped.PERHAPS
-    flow = NodeFlow.ONE_OF
-    look = NodeLook(form=Form.BESIDE, has_roles=True)
+    skipped = parts.Skipped.PERHAPS
+    flow = parts.NodeFlow.ONE_OF
+    look = parts.NodeLook(form=parts.Form.BESIDE, has_roles=True)
 
     @property
     @abstractmethod
@@ -236,13 +212,13 @@ class Choosing(Straight):
 
     def possibilities(
         self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
-    ) -> Iterator[Possibility]:
+    ) -> Iterator[parts.Possibility]:
         """Yield each child, and the case that nothing fits."""
         for index, word in enumerate(self.ways):
             if index < len(node.children):
-                yield Possibility(node.span, f"{node.path}: {word}", started(node.children[index]))
+                yield parts.Possibility(node.span, f"{node.path}: {word}", parts.started(node.children[index]))
             else:
-                yield Possibility(node.span, f"{node.path}: nothing fits", skipped(node.number))
+                yield parts.Possibility(node.span, f"{node.path}: nothing fits", parts.skipped(node.number))
 
 
 class WithHistory(Task):
@@ -284,7 +260,7 @@ class InTurn(Straight):
     )
 
     only_asks = True
-    skipped = Skipped.WITH_ALL_INSIDE
+    skipped = parts.Skipped.WITH_ALL_INSIDE
     decides: ClassVar[str]
 
     @property
@@ -450,9 +426,9 @@ class Plain(Modifier):
 
     __slots__ = ()
     may_skip = False
-    serves = ModifierScope.ALL
+    serves = parts.ModifierScope.ALL
 
-    def changed(self, inner: Outcomes) -> Outcomes:
+    def changed(self, inner: outcomes.Outcomes) -> outcomes.Outcomes:
         """Return the outcomes of the node inside."""
         return inner
 
@@ -461,7 +437,7 @@ class Plain(Modifier):
 class Acting(Plain):
     """A modifier whose keys are hooks."""
 
-    moments: Moments = field()
+    moments: parts.Moments = field()
 
     value = None
 
@@ -481,9 +457,9 @@ class Skipping(Modifier):
     __slots__ = ()
     may_skip = True
 
-    def changed(self, inner: Outcomes) -> Outcomes:
+    def changed(self, inner: outcomes.Outcomes) -> outcomes.Outcomes:
         """Return that it may also be skipped."""
-        return inner.both(ALWAYS_SUCCEEDS)
+        return inner.both(outcomes.ALWAYS_SUCCEEDS)
 
 
 class Decorator(Task):

@@ -20,25 +20,8 @@ from rbxcompose.manifest.tree import MappingNode, ScalarNode
 from rbxcompose.missions.engine.world import show
 from rbxcompose.missions.language.fields import Declared
 from rbxcompose.missions.language.grammar import NO_HISTORY
+from rbxcompose.missions.program import parts
 from rbxcompose.missions.program.outcomes import Outcomes
-from rbxcompose.missions.program.parts import (
-    Advice,
-    Asked,
-    BranchChoice,
-    Branches,
-    Datum,
-    Input,
-    MachineStates,
-    ModifierScope,
-    Moments,
-    Next,
-    NodeEffects,
-    NodeFlow,
-    NodeLook,
-    Possibility,
-    Skipped,
-    WrittenArgument,
-)
 from rbxcompose.msgs.fields import ArrayEntries, NumberRange
 
 
@@ -59,7 +42,7 @@ class Modifier(Declared, ABC):
 
     @property
     @abstractmethod
-    def serves(self) -> ModifierScope:
+    def serves(self) -> parts.ModifierScope:
         """Return which nodes it is meant for."""
 
     @property
@@ -82,7 +65,7 @@ class Modifier(Declared, ABC):
         return False
 
     @property
-    def endless(self) -> Advice | None:
+    def endless(self) -> parts.Advice | None:
         """Return the advice to give if the node inside takes no time."""
         return None
 
@@ -107,7 +90,7 @@ class Modifier(Declared, ABC):
         return None
 
     @property
-    def moments(self) -> Moments | None:
+    def moments(self) -> parts.Moments | None:
         """Return what its hooks do."""
         return None
 
@@ -210,7 +193,7 @@ class Step(Declared, ABC):
     @abstractmethod
     def possibilities(
         self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
-    ) -> Iterator[Possibility]:
+    ) -> Iterator[parts.Possibility]:
         """Yield what it may do, as far as tests should cover it."""
 
     @abstractmethod
@@ -218,12 +201,12 @@ class Step(Declared, ABC):
         """Return the names that only the nodes inside see, with their types."""
 
     @abstractmethod
-    def endless(self, ends: Outcomes) -> Advice | None:
+    def endless(self, ends: Outcomes) -> parts.Advice | None:
         """Return the advice to give if it runs for ever without a pause; `ends` is how it may end."""
 
     @property
     @abstractmethod
-    def skipped(self) -> Skipped:
+    def skipped(self) -> parts.Skipped:
         """Return when it does nothing."""
 
     @property
@@ -243,7 +226,7 @@ class Step(Declared, ABC):
 
     @property
     @abstractmethod
-    def effects(self) -> NodeEffects:
+    def effects(self) -> parts.NodeEffects:
         """Return the effects that it has by itself."""
 
     @property
@@ -253,12 +236,12 @@ class Step(Declared, ABC):
 
     @property
     @abstractmethod
-    def flow(self) -> NodeFlow:
+    def flow(self) -> parts.NodeFlow:
         """Return how it goes through its children."""
 
     @property
     @abstractmethod
-    def look(self) -> NodeLook:
+    def look(self) -> parts.NodeLook:
         """Return how it is drawn."""
 
     @abstractmethod
@@ -294,7 +277,7 @@ class Step(Declared, ABC):
         return None
 
     @property
-    def arguments(self) -> tuple[WrittenArgument, ...]:
+    def arguments(self) -> tuple[parts.WrittenArgument, ...]:
         """Return the arguments for its skill or mission."""
         return ()
 
@@ -329,22 +312,22 @@ class Step(Declared, ABC):
         return None
 
     @property
-    def choice(self) -> BranchChoice | None:
+    def choice(self) -> parts.BranchChoice | None:
         """Return the value and the cases by which it chooses one of its children."""
         return None
 
     @property
-    def branches(self) -> Branches | None:
+    def branches(self) -> parts.Branches | None:
         """Return what decides how it ends, if its children run in parallel."""
         return None
 
     @property
-    def states(self) -> MachineStates | None:
+    def states(self) -> parts.MachineStates | None:
         """Return its states, if its children are states."""
         return None
 
     @property
-    def leads_to(self) -> Next | None:
+    def leads_to(self) -> parts.Next | None:
         """Return where a state leads to."""
         return None
 
@@ -368,7 +351,7 @@ class MissionNode:
     children: tuple[int, ...]
     end: int
     modifiers: Mapping[str, Modifier] = field(default_factory=dict)
-    asked: tuple[Asked, ...] = ()
+    asked: tuple[parts.Asked, ...] = ()
     own: int = 0
     item: str = ""
     held: tuple[str, ...] = ()
@@ -431,7 +414,7 @@ class Interrupt:
     """
 
     name: str
-    when: Asked
+    when: parts.Asked
     root: int | None
     afterwards: str
     span: Span
@@ -451,16 +434,16 @@ class Program:
     about: str
     file: str
     nodes: tuple[MissionNode, ...]
-    inputs: Mapping[str, Input] = field(default_factory=dict)
-    data: Mapping[str, Datum] = field(default_factory=dict)
+    inputs: Mapping[str, parts.Input] = field(default_factory=dict)
+    data: Mapping[str, parts.Datum] = field(default_factory=dict)
     interrupts: tuple[Interrupt, ...] = ()
     rate: float = RATE
-    outputs: Mapping[str, Asked] = field(default_factory=dict)
+    outputs: Mapping[str, parts.Asked] = field(default_factory=dict)
     main: int = ROOT
     root: MappingNode = field(default_factory=MappingNode, repr=False)
     is_open: bool = False
 
-    def asked(self) -> Iterator[tuple[MissionNode | None, Asked]]:
+    def asked(self) -> Iterator[tuple[MissionNode | None, parts.Asked]]:
         """Yield all expressions, each with its node; None for an interrupt or an output."""
         for node in self.nodes:
             for asked in node.asked:

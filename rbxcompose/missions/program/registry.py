@@ -5,7 +5,7 @@ import inspect
 import pkgutil
 from collections.abc import Callable, Mapping
 from functools import cache
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from rbxcompose.missions import kinds as package
 from rbxcompose.missions.engine.task import Site, Task
@@ -16,7 +16,7 @@ StepType: TypeAlias = type[Step]
 S = TypeVar("S", bound=Step)
 SKILL = "skill"  # the kind of all nodes that are named after a skill of the robot
 KINDS: dict[str, StepType] = {}
-_TASKS: dict[StepType, Callable[[Site], Task]] = {}
+_TASKS: dict[StepType, Callable[[Site, Any], Task]] = {}
 
 
 def kind(name: str, task: Callable[[Site, S], Task], *, is_inner: bool = False) -> Callable[[type[S]], type[S]]:
@@ -32,14 +32,9 @@ def kind(name: str, task: Callable[[Site, S], Task], *, is_inner: bool = False) 
         if inspect.isabstract(cls):
             raise TypeError(f"the kind '{name}' does not answer {', '.join(sorted(cls.__abstractmethods__))}")
 
-        def make(site: Site) -> Task:
-            if not isinstance(site.node.step, cls):
-                raise TypeError(f"'{site.node.path}' is no '{name}'")
-            return task(site, site.node.step)
-
         cls.bind(name)
         cls.is_inner = is_inner
-        KINDS[name], _TASKS[cls] = cls, make
+        KINDS[name], _TASKS[cls] = cls, task
         _look_again()
         return cls
 
@@ -59,7 +54,7 @@ def _look_again() -> None:
 
 def task_of(site: Site) -> Task:
     """Return the task that runs a node, with nothing around it."""
-    return _TASKS[type(site.node.step)](site)
+    return _TASKS[type(site.node.step)](site, site.node.step)
 
 
 @cache
@@ -78,11 +73,9 @@ def all_kinds() -> dict[str, StepType]:
 
 # Outermost first, whatever the order in the text: a rule of the language.
 MODULES = ("starts", "results")
-
-
 M = TypeVar("M", bound=Modifier)
 MODIFIERS: dict[str, type[Modifier]] = {}
-_DECORATORS: dict[type[Modifier], Callable[[Modifier, Site, Task], Task]] = {}
+_DECORATORS: dict[type[Modifier], Callable[[Site, Any, Task], Task]] = {}
 
 
 def modifier(
@@ -98,14 +91,9 @@ def modifier(
         if inspect.isabstract(cls):
             raise TypeError(f"the modifier '{name}' does not answer {', '.join(sorted(cls.__abstractmethods__))}")
 
-        def make(options: Modifier, site: Site, inner: Task) -> Task:
-            if not isinstance(options, cls):
-                raise TypeError(f"'{site.node.path}' has no '{name}'")
-            return task(site, options, inner)
-
         cls.bind(name)
         cls.only_states = only_states
-        MODIFIERS[name], _DECORATORS[cls] = cls, make
+        MODIFIERS[name], _DECORATORS[cls] = cls, task
         return cls
 
     return register
@@ -113,7 +101,7 @@ def modifier(
 
 def decorator_of(options: Modifier, site: Site, inner: Task) -> Task:
     """Return the task that carries out a modifier of a node, around another one."""
-    return _DECORATORS[type(options)](options, site, inner)
+    return _DECORATORS[type(options)](site, options, inner)
 
 
 @cache

@@ -14,9 +14,8 @@ from rbxcompose.base.expressions.values import NOT_ARRIVED, NotArrived, Value, i
 from rbxcompose.missions.analysis.facts import constants_of, number_in
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent, Reported, SkillStarted
-from rbxcompose.missions.engine.run import STILL_HOLDS
 from rbxcompose.missions.engine.snapshot import restore, save
-from rbxcompose.missions.engine.task import Task
+from rbxcompose.missions.engine.task import STILL_HOLDS, Task
 from rbxcompose.missions.engine.world import POSE, show_briefly
 from rbxcompose.missions.program.outcomes import IDLE, RUNNING, Result
 from rbxcompose.missions.program.program import Program, RobotNames
