@@ -10,7 +10,7 @@ import pytest
 from rbxcompose.base.geometry import Pose2, Vector3
 from rbxcompose.domains.worlds.physics.engine import PhysicsWorld, UnstablePhysicsError
 from rbxcompose.domains.worlds.shapes import WorldBox, WorldShape
-from tests.worlds.physical import STEP, empty, shipped
+from tests.worlds.physical import STEP, contacts, empty, shipped
 
 LIFT, ARM = "right_arm_shoulder_lift_joint", "right_arm"
 FINGER, TORSO, GRASP = "right_gripper_left_finger_joint", "torso_joint", "right_gripper_grasp"
@@ -87,7 +87,7 @@ def test_a_gripper_feels_what_it_closes_on() -> None:
     assert full.position(FINGER) == pytest.approx(SIDE / 2, abs=2e-3)
     assert full.effort(FINGER) == pytest.approx(-60.0)
     assert full.velocity(FINGER) == pytest.approx(0.0, abs=1e-4)
-    holding = [touch for touch in full.contacts() if touch.what == "box"]
+    holding = [touch for touch in contacts(full) if touch.what == "box"]
     assert {touch.link for touch in holding} == {"right_gripper_left_finger_link", "right_gripper_right_finger_link"}
     assert sum(touch.force for touch in holding) == pytest.approx(60.0, rel=0.1)
 
