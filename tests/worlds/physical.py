@@ -130,3 +130,12 @@ def contacts(physics: PhysicsWorld) -> list[Touch]:
         point, normal = (px, py, pz), (nx, ny, nz)
         found.append(Touch(names[link], names[other], point, normal, float(force[0]), all(own)))
     return found
+
+
+def target(physics: PhysicsWorld, joint: str, position: float) -> None:
+    """Let a servo move to a position as fast as its URDF has it, within its limits."""
+    limits = physics.converted.robot.body.joints[joint].limits
+    speed = limits.velocity if limits and limits.velocity else math.inf
+    if limits and limits.lower is not None and limits.upper is not None:
+        position = min(max(position, limits.lower), limits.upper)
+    physics.target(joint, position, abs(position - physics.position(joint)) / speed)

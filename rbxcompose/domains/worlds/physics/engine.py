@@ -170,10 +170,10 @@ class PhysicsWorld:
             raise ValueError(f"no wheel '{joint}' turns at {speed} rad/s")
         self._speeds[joint] = speed
 
-    def target(self, joint: str, position: float, within: float | None = None) -> None:
+    def target(self, joint: str, position: float, within: float) -> None:
         """Let a servo move to a position [rad or m], which is cut to its limits, and hold it.
 
-        Its set point is there `within` a time [s]; by default it moves as fast as the servo does.
+        Its set point is there `within` a time [s].
 
         Raises:
             ValueError: if nothing holds this joint, or the position is not finite.
@@ -187,9 +187,7 @@ class PhysicsWorld:
         if self._model.jnt_limited[made]:
             low, high = self._model.jnt_range[made].tolist()
             position = min(max(position, low), high)
-        speed = self.converted.joints[joint].speed
-        if within is not None:
-            speed = abs(position - float(self._data.ctrl[number])) / within if within > 0.0 else math.inf
+        speed = abs(position - float(self._data.ctrl[number])) / within if within > 0.0 else math.inf
         self._targets[joint] = position, speed
 
     def limit(self, joint: str, effort: float) -> None:
