@@ -146,7 +146,7 @@ def _drives() -> Iterator[Row]:
             driven, spent = driven + abs(velocity.linear) * PERIOD, spent + PERIOD
         reached += state is FollowState.REACHED
         touched += any(first_contact(grid, (), CircleFootprint(RADIUS), *motion) for motion in pairwise(poses))
-        longest = max(longest, driven / max(way.length, 1.0))
+        longest = max(longest, driven / max(sum(one.distance(other) for one, other in pairwise(way.poses)), 1.0))
     how = f"{PAIRS} pairs of poses in the house, a base that does what it is told"
     times = Samples(tuple(cycles))
     yield Row("navigation: a cycle of the follower", "ms", how, times.median * 1e3, times.p99 * 1e3, most=1.0)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.navigation.costs import INSCRIBED, LETHAL, NO_INFORMATION, LayeredCosts
+from rbxcompose.domains.navigation.planner import PlannedPath
 from rbxcompose.domains.worlds.grid_map import GridMap
 
 SIDE = 0.05  # [m]
@@ -33,3 +36,8 @@ def is_blocked(costs: LayeredCosts, x: float, y: float) -> bool:
     """Return whether a robot must not be at a point of `map` [m]."""
     value = costs.value_at(x, y)
     return value in (INSCRIBED, LETHAL) or (value == NO_INFORMATION and not costs.settings.unknown_is_free)
+
+
+def length_of(way: PlannedPath) -> float:
+    """Return how long a way is [m]."""
+    return sum(before.distance(after) for before, after in pairwise(way.poses))

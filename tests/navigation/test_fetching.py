@@ -16,6 +16,7 @@ from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.sdk.component import MissionOver
 from rbxcompose.testing import Bench
 from tests.conftest import ROOT
+from tests.worlds.physical import contacts
 
 pytestmark = pytest.mark.timeout(300)
 pytest.importorskip("mujoco", reason="mujoco is not installed")
@@ -65,7 +66,7 @@ class Errand:
         """Take notes of what the robot touches; return whether its mission has ended."""
         if self.engine.time > self.looked_at:
             self.looked_at, known = self.engine.time, self.engine.converted.links
-            self.touched |= {(touch.link, touch.what) for touch in self.engine.contacts() if touch.what not in known}
+            self.touched |= {(touch.link, touch.what) for touch in contacts(self.engine) if touch.what not in known}
         for record in self.bench.records[self.seen :]:
             if record.source == "mission" and not record.text.endswith(")"):
                 self.step = record.text

@@ -24,7 +24,7 @@ from rbxcompose.msgs.nav2_msgs import Spin
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.sdk.ports import Qos
-from tests.navigation.houses import HOUSE, ONE_WALL, SIDE, room
+from tests.navigation.houses import HOUSE, ONE_WALL, SIDE, length_of, room
 from tests.navigation.test_follower import Drive
 from tests.navigation.test_robot import ROBOT, WORLD, Room
 from tests.parts.project import Project
@@ -64,7 +64,7 @@ def test_a_long_robot_reaches_goals_and_no_corner_of_it_touches_anything(
         return
     assert state is FollowState.REACHED
     assert drive.pose.distance(goal) <= 0.1
-    assert drive.driven <= 1.15 * drive.way.length + 0.15
+    assert drive.driven <= 1.15 * length_of(drive.way) + 0.15
 
 
 def test_a_long_robot_passes_a_gap_that_is_as_wide_as_it_straight() -> None:

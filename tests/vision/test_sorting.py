@@ -11,6 +11,7 @@ from rbxcompose.msgs.rbxcompose_msgs import SceneObjects
 from rbxcompose.sdk.component import MissionOver
 from rbxcompose.testing import Bench
 from tests.shipped import ROOT, compiled
+from tests.worlds.physical import contacts
 
 pytestmark = pytest.mark.timeout(120)
 pytest.importorskip("cv2", reason="OpenCV is not installed")
@@ -59,7 +60,7 @@ def test_in_physics_only_the_gripper_touches_things_and_they_end_where_they_belo
     assert engine is not None
 
     def is_over() -> bool:
-        touched.update((touch.link, touch.what) for touch in engine.contacts() if touch.what in STOOD)
+        touched.update((touch.link, touch.what) for touch in contacts(engine) if touch.what in STOOD)
         return any(isinstance(event, MissionOver) for event in bench.events)
 
     bench.run_until(is_over, 200.0)

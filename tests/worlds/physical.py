@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Report, Span
 from rbxcompose.base.geometry import NO_TRANSLATION, Pose2, Vector3
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.body.urdf import read_text
-from rbxcompose.domains.worlds.physics.conversion import OF_WORLD
+from rbxcompose.domains.worlds.physics.conversion import OF_ROBOT, OF_WORLD
 from rbxcompose.domains.worlds.physics.engine import PhysicsWorld
 from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, outline_body
 from rbxcompose.domains.worlds.physics.solids import rotation_matrix
@@ -90,3 +91,51 @@ def ray(
         physics._model, physics._data, begin, vectors.ravel(), SEEN, 1, -1, hit, found, None, count, most
     )
     return np.where((hit >= 0) & (found < most), found, math.inf)
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """A point where a link of the robot touches something."""
+
+    link: str
+    what: str
+    """`the ground`, `map`, a shape of the world, or another link."""
+    point: Vector3
+    """In `map` [m]."""
+    normal: Vector3
+    """From what is touched to the link, a unit vector in `map`."""
+    force: float
+    """Along the normal [N]."""
+    is_own: bool
+    """Whether what is touched is a link, too: things of the world may have the names of links."""
+
+
+def contacts(physics: PhysicsWorld) -> list[Touch]:
+    """Return where links of the robot touch anything but links that they are fixed to."""
+    found = []
+    force = np.zeros(6)
+    for index in range(physics._data.ncon):
+        contact = physics._data.contact[index]
+        first, second = (int(geom) for geom in contact.geom)
+        own = [physics._model.geom_group[geom] == OF_ROBOT for geom in (first, second)]
+        if not any(own):
+            continue
+        physics._mj.mj_contactForce(physics._model, physics._data, index, force)
+        if force[0] <= 0.0:
+            continue
+        link, other = (second, first) if own[1] else (first, second)
+        towards = 1.0 if own[1] else -1.0  # the normal of MuJoCo points from the first to the second
+        (px, py, pz), (nx, ny, nz) = contact.pos.tolist(), (contact.frame[:3] * towards).tolist()
+        names = physics.converted.touching
+        point, normal = (px, py, pz), (nx, ny, nz)
+        found.append(Touch(names[link], names[other], point, normal, float(force[0]), all(own)))
+    return found
+
+
+def target(physics: PhysicsWorld, joint: str, position: float) -> None:
+    """Let a servo move to a position as fast as its URDF has it, within its limits."""
+    limits = physics.converted.robot.body.joints[joint].limits
+    speed = limits.velocity if limits and limits.velocity else math.inf
+    if limits and limits.lower is not None and limits.upper is not None:
+        position = min(max(position, limits.lower), limits.upper)
+    physics.target(joint, position, abs(position - physics.position(joint)) / speed)

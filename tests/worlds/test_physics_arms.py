@@ -10,7 +10,7 @@ import pytest
 from rbxcompose.base.geometry import Pose2, Vector3
 from rbxcompose.domains.worlds.physics.engine import PhysicsWorld, UnstablePhysicsError
 from rbxcompose.domains.worlds.shapes import WorldBox, WorldShape
-from tests.worlds.physical import STEP, empty, shipped
+from tests.worlds.physical import STEP, contacts, empty, shipped, target
 
 LIFT, ARM = "right_arm_shoulder_lift_joint", "right_arm"
 FINGER, TORSO, GRASP = "right_gripper_left_finger_joint", "torso_joint", "right_gripper_grasp"
@@ -53,7 +53,7 @@ def test_a_servo_that_had_let_go_holds_its_joint_where_it_is() -> None:
     physics.limit(LIFT, 0.0)
     physics.step(1.0)
     fallen = physics.position(LIFT)
-    physics.target(LIFT, STRETCHED[LIFT])
+    target(physics, LIFT, STRETCHED[LIFT])
     physics.limit(LIFT, 1.5)
     physics.step(1.0)
     assert physics.position(LIFT) == pytest.approx(fallen, abs=math.radians(3))
@@ -67,7 +67,7 @@ def test_a_servo_moves_as_fast_as_it_can_and_no_further_than_its_limits() -> Non
     assert limits is not None
     assert limits.velocity is not None
     assert limits.upper is not None
-    physics.target("head_pan_joint", 9.0)
+    target(physics, "head_pan_joint", 9.0)
     fastest = 0.0
     while physics.time < limits.upper / limits.velocity + 0.5:
         physics.step(STEP)
@@ -80,14 +80,14 @@ def test_a_gripper_feels_what_it_closes_on() -> None:
     robot = shipped("porter", positions=OPEN)
     free, full = PhysicsWorld(robot, empty(robot)), with_box()
     for physics in (free, full):
-        physics.target(FINGER, 0.0)
+        target(physics, FINGER, 0.0)
         physics.step(1.2)
     assert free.position(FINGER) == pytest.approx(0.0, abs=2e-3)
     assert abs(free.effort(FINGER)) < 5.0
     assert full.position(FINGER) == pytest.approx(SIDE / 2, abs=2e-3)
     assert full.effort(FINGER) == pytest.approx(-60.0)
     assert full.velocity(FINGER) == pytest.approx(0.0, abs=1e-4)
-    holding = [touch for touch in full.contacts() if touch.what == "box"]
+    holding = [touch for touch in contacts(full) if touch.what == "box"]
     assert {touch.link for touch in holding} == {"right_gripper_left_finger_link", "right_gripper_right_finger_link"}
     assert sum(touch.force for touch in holding) == pytest.approx(60.0, rel=0.1)
 
@@ -95,9 +95,9 @@ def test_a_gripper_feels_what_it_closes_on() -> None:
 def test_a_box_is_gripped_lifted_carried_and_let_go() -> None:
     physics = with_box()
     began = physics.shape_pose("box").translation
-    physics.target(FINGER, 0.0)
+    target(physics, FINGER, 0.0)
     physics.step(1.2)
-    physics.target(TORSO, 0.3)
+    target(physics, TORSO, 0.3)
     physics.step(3.0)
     lifted = physics.shape_pose("box").translation
     assert lifted[2] - began[2] == pytest.approx(0.2, abs=0.01)
@@ -107,16 +107,16 @@ def test_a_box_is_gripped_lifted_carried_and_let_go() -> None:
         physics.step(STEP)
     assert above_hand(physics) == pytest.approx(held, abs=2e-3)
     assert physics.base_pose.x > 0.2
-    physics.target(FINGER, 0.05)
+    target(physics, FINGER, 0.05)
     physics.step(1.2)
     assert physics.shape_pose("box").translation[2] < 0.2
 
 
 def test_a_box_that_is_too_heavy_is_not_lifted() -> None:
     physics = with_box(mass=20.0)
-    physics.target(FINGER, 0.0)
+    target(physics, FINGER, 0.0)
     physics.step(1.2)
-    physics.target(TORSO, 0.3)
+    target(physics, TORSO, 0.3)
     physics.step(3.0)
     assert physics.position(TORSO) > 0.29
     assert physics.shape_pose("box").translation[2] < physics.pose_of(GRASP).translation[2] - 0.15

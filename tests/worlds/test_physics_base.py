@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.worlds.grid_map import GridMap
 from rbxcompose.domains.worlds.physics.conversion import WALL
-from rbxcompose.domains.worlds.physics.engine import PhysicsWorld, Touch
+from rbxcompose.domains.worlds.physics.engine import PhysicsWorld
 from rbxcompose.domains.worlds.shapes import ShapePath, WorldBox, WorldCylinder, WorldShape
 from rbxcompose.domains.worlds.world import SimulatedWorld
 from tests.soak import rare
-from tests.worlds.physical import STEP, empty, ray, shipped, shipped_world
+from tests.worlds.physical import STEP, Touch, contacts, empty, ray, shipped, shipped_world
 from tests.worlds.scenes import ANGLES, grids, shapes
 
 TURTLEBOT = shipped("turtlebot")
@@ -80,13 +80,13 @@ def test_it_stays_where_it_is_if_nothing_moves_it() -> None:
 def test_a_wall_stops_it_while_its_wheels_slip() -> None:
     physics = PhysicsWorld(TURTLEBOT, shipped_world("one_wall", Pose2(-1.0, 0.0, 0.0)))
     speed_up(physics, 0.3, 0.0)
-    assert all(touch.what == "the ground" for touch in physics.contacts())
+    assert all(touch.what == "the ground" for touch in contacts(physics))
     run(physics, 4.0)
     before, turned = physics.base_pose, physics.wheel_angles
     pressing: list[list[Touch]] = []
     for _ in range(round(1.0 / STEP)):
         physics.step(STEP)
-        pressing.append([touch for touch in physics.contacts() if touch.what == "map"])
+        pressing.append([touch for touch in contacts(physics) if touch.what == "map"])
     assert physics.base_pose.distance(before) < 0.02
     assert min(physics.wheel_angles) > min(turned) + 1.0
     felt = [touch for touches in pressing for touch in touches]
@@ -116,7 +116,7 @@ def test_somebody_who_walks_pushes_it() -> None:
     touched = set()
     for _ in range(150):
         physics.step(STEP)
-        touched |= {touch.what for touch in physics.contacts()}
+        touched |= {touch.what for touch in contacts(physics)}
         assert physics.shape_pose("person").translation[:2] == pytest.approx(path.place_at(physics.time))
     assert "person" in touched
     assert physics.base_pose.x > 0.4
@@ -142,7 +142,7 @@ def test_the_same_commands_lead_to_the_same_states_bit_for_bit() -> None:
         for count in range(150):
             physics.drive(0.4, math.sin(count))
             physics.step(STEP)
-            trace.append((physics.base_pose, physics.wheel_angles, physics.imu("base_link"), physics.contacts()))
+            trace.append((physics.base_pose, physics.wheel_angles, physics.imu("base_link"), contacts(physics)))
         states.append(trace)
     assert states[0] == states[1]
 

@@ -19,7 +19,7 @@ from rbxcompose.domains.worlds.physics.rigid import RigidPart
 from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, outline_body
 from rbxcompose.domains.worlds.physics.solids import box_inertia, quaternion_of, rotation_matrix
 from tests.soak import rare
-from tests.worlds.physical import STEP, description, empty, from_urdf, shipped, shipped_robots
+from tests.worlds.physical import STEP, contacts, description, empty, from_urdf, shipped, shipped_robots, target
 
 ANGLES = st.floats(-math.pi, math.pi)
 SOLID = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
@@ -217,8 +217,8 @@ def test_a_link_that_nothing_holds_falls_until_its_mesh_touches_the_ground(tmp_p
     physics.limit("rail", 0.0)
     physics.step(2.0)
     assert physics.position("rail") == pytest.approx(-0.4, abs=3e-3)
-    assert {(touch.link, touch.what) for touch in physics.contacts()} == {("tip", "the ground")}
-    assert sum(touch.force for touch in physics.contacts()) == pytest.approx(9.81, rel=0.05)
+    assert {(touch.link, touch.what) for touch in contacts(physics)} == {("tip", "the ground")}
+    assert sum(touch.force for touch in contacts(physics)) == pytest.approx(9.81, rel=0.05)
 
 
 def test_a_joint_that_mimics_another_follows_it() -> None:
@@ -233,14 +233,14 @@ def test_a_joint_that_mimics_another_follows_it() -> None:
         drives=False,
     )
     physics = PhysicsWorld(robot, empty(robot))
-    physics.target("leader", 1.0)
+    target(physics, "leader", 1.0)
     for _ in range(200):
         physics.step(STEP)
         wanted = -0.5 * physics.position("leader") + 0.2
         assert physics.position("follower") == pytest.approx(wanted, abs=0.02)
     assert physics.position("leader") == pytest.approx(1.0, abs=0.01)
     with pytest.raises(ValueError, match="nothing drives a joint 'follower'"):
-        physics.target("follower", 0.0)
+        physics.target("follower", 0.0, 0.0)
 
 
 def test_wrong_names_are_refused() -> None:

@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from rbxcompose.base.geometry import Pose2, Transform3, quaternion_from_yaw
 from rbxcompose.domains.worlds.grid_map import GridMap
 from rbxcompose.domains.worlds.optics import TO_OPTICAL, Intrinsics
+from rbxcompose.domains.worlds.physics.looks import DepthPicture
 from rbxcompose.domains.worlds.shapes import ShapePath, WorldBox, WorldCylinder, WorldHole, WorldLight, WorldShape
-from rbxcompose.domains.worlds.view import CameraView, Lens, WorldView
+from rbxcompose.domains.worlds.view import Lens, WorldView
 from rbxcompose.domains.worlds.world import SimulatedWorld
 from rbxcompose.msgs.sensor_msgs import CameraInfo, Image, PointCloud2
 from rbxcompose.msgs.stamps import to_nanoseconds
@@ -35,7 +36,7 @@ def optical(x: float, y: float, heading: float, z: float = HEIGHT, camera: Trans
     return Transform3((x, y, z), quaternion_from_yaw(heading)).compose(camera)
 
 
-def shot(world: SimulatedWorld, x: float = 0, y: float = 0, heading: float = 0, time: float = 0) -> CameraView:
+def shot(world: SimulatedWorld, x: float = 0, y: float = 0, heading: float = 0, time: float = 0) -> DepthPicture:
     return WorldView(world).seen(optical(x, y, heading), CAMERA, time, 50.0)
 
 
@@ -72,19 +73,17 @@ def test_things_have_their_colours_wherever_they_are_seen_from() -> None:
     world = SimulatedWorld("", shapes=(box, can), colours=("red", "blue"))
     for angle in np.linspace(0, math.tau, 9):
         view = shot(world, 2 - 2 * math.cos(angle), -2 * math.sin(angle), float(angle))
-        assert view.things[MIDDLE, 80] == 0
         red, green, blue = view.colours[MIDDLE, 80].astype(int)
         assert red > 2 * max(green, blue)
     red, green, blue = shot(world, 0, 5).colours[MIDDLE, 80].astype(int)
     assert blue > red
-    assert shot(world, 0, 5).things[MIDDLE, 80] == 1
 
 
 def test_a_thing_that_moves_is_where_it_is_at_the_time() -> None:
     path = ShapePath(((0, 2, 0), (10, 2, 5)))
     world = SimulatedWorld("", shapes=(WorldShape("cart", WorldBox((0.4, 0.4, 0.6)), Pose2(2, 0), path=path),))
-    assert shot(world).things[MIDDLE, 80] == 0
-    assert shot(world, time=10).things[MIDDLE, 80] == -1
+    assert shot(world).depths[MIDDLE, 80] == pytest.approx(1.8)
+    assert np.isinf(shot(world, time=10).depths[MIDDLE, 80])
 
 
 def test_a_hole_is_dark() -> None:
@@ -189,7 +188,7 @@ def test_nothing_is_drawn_that_nobody_wants(monkeypatch: pytest.MonkeyPatch) -> 
     drawn: list[float] = []
     whole = WorldView.seen
 
-    def seen(view: WorldView, *wanted: Any) -> CameraView:
+    def seen(view: WorldView, *wanted: Any) -> DepthPicture:
         drawn.append(wanted[2])
         return whole(view, *wanted)
 

@@ -50,11 +50,6 @@ class PlannedPath:
 
     poses: tuple[Pose2, ...]
 
-    @property
-    def length(self) -> float:
-        """Return how long it is [m]."""
-        return sum(before.distance(after) for before, after in pairwise(self.poses))
-
     def is_blocked(self, pose: Pose2, costs: LayeredCosts) -> bool:
         """Return whether something is on the rest of it, which a robot comes to with the heading of the pose before."""
         near = min(range(len(self.poses)), key=lambda index: self.poses[index].distance(pose))

@@ -15,7 +15,7 @@ from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.worlds.grid_map import GridMap, wall_rectangles
 from rbxcompose.domains.worlds.optics import Intrinsics
 from rbxcompose.domains.worlds.physics.conversion import WALL
-from rbxcompose.domains.worlds.physics.looks import WALLS, colour_of
+from rbxcompose.domains.worlds.physics.looks import WALLS, DepthPicture, colour_of
 from rbxcompose.domains.worlds.physics.solids import rotation_matrix
 from rbxcompose.domains.worlds.shapes import (
     WorldBox,
@@ -62,8 +62,6 @@ class WorldFaces:
     """In `map` (n, 4, 3) [m]; who sees a face sees them turn left."""
     colours: Colours
     """Red, green and blue of each (n, 3)."""
-    things: NDArray[np.int32]
-    """Which shape of the world each belongs to (n,), in their order; -1 for walls and the ground."""
     pictures: Mapping[int, GreyPicture] = field(default_factory=dict)
     """What is on a face besides its colour, by its number: from the first corner down to the second one."""
 
@@ -74,7 +72,6 @@ class WorldFaces:
         return cls(
             np.concatenate([part.corners for part in parts]),
             np.concatenate([part.colours for part in parts]),
-            np.concatenate([part.things for part in parts]),
             {
                 before + number: picture
                 for part, before in zip(parts, begins, strict=True)
@@ -83,24 +80,12 @@ class WorldFaces:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class CameraView:
-    """What a camera sees, row by row from the upper left."""
-
-    colours: Colours
-    """Red, green and blue (h, w, 3)."""
-    depths: Depths
-    """Along the optical axis (h, w) [m]; inf where nothing is."""
-    things: NDArray[np.int32]
-    """Which shape of the world each pixel shows (h, w); -1 where it is none."""
-
-
 class WorldView:
     """A world for cameras: what stands still becomes faces once."""
 
     def __init__(self, world: SimulatedWorld) -> None:
         self._world = world
-        self._numbers = {shape.name: number for number, shape in enumerate(world.shapes)}
+        self._colours = dict(zip((shape.name for shape in world.shapes), world.colours, strict=False))
         self._pictures: dict[tuple[int, str], GreyPicture] = {}  # of tags
         still = [shape for shape in world.shapes if shape.path is None]
         parts = [_ground(world), _walls(world.grid), *(self._faces_of(shape) for shape in still)]
@@ -108,7 +93,7 @@ class WorldView:
 
     def seen(
         self, pose: Transform3, camera: Intrinsics, time: float, most: float, robots: Sequence[WorldShape] = ()
-    ) -> CameraView:
+    ) -> DepthPicture:
         """Return what a camera at `pose`, of its optical frame in `map`, sees at a time [s] up to `most` [m] away.
 
         Distortion is left out. Other `robots` are where they are given.
@@ -118,27 +103,22 @@ class WorldView:
         return draw(WorldFaces.joined([self._still, *moving]), pose, camera, most, self._world.lights)
 
     def _faces_of(self, shape: WorldShape) -> WorldFaces:
-        number = self._numbers[shape.name]
-        colours = self._world.colours
-        red, green, blue, _ = colour_of(colours[number] if colours else "")
-        return WorldFaces.joined(
-            [_painted(_corners_of(shape), (red, green, blue), number), *(self._tag(tag, shape) for tag in shape.tags)]
-        )
+        colour = colour_of(self._colours.get(shape.name, ""))[:3]
+        tags = (self._tag(tag, shape) for tag in shape.tags)
+        return WorldFaces.joined([_painted(_corners_of(shape), colour), *tags])
 
     def _tag(self, tag: WorldTag, shape: WorldShape) -> WorldFaces:
         """Return a tag on a shape, just above its side."""
         if (key := (tag.number, tag.family)) not in self._pictures:
             self._pictures[key] = tag_picture(*key, module=TEXELS)
         corners = _turned(tag_square(tag)[None], shape.pose.x, shape.pose.y, shape.pose.heading, shape.z)
-        face = _painted(corners, (1.0, 1.0, 1.0), self._numbers[shape.name])
+        face = _painted(corners, (1.0, 1.0, 1.0))
         return replace(face, pictures={0: self._pictures[key]})
 
 
-def _painted(corners: Numbers, colour: Sequence[float], thing: int = -1) -> WorldFaces:
+def _painted(corners: Numbers, colour: Sequence[float]) -> WorldFaces:
     """Return faces of one colour, from 0 to 1."""
-    count = len(corners)
-    colours = np.tile(np.round(np.array(colour) * 255).astype(np.uint8), (count, 1))
-    return WorldFaces(corners, colours, np.full(count, thing, np.int32))
+    return WorldFaces(corners, np.tile(np.round(np.array(colour) * 255).astype(np.uint8), (len(corners), 1)))
 
 
 def _ground(world: SimulatedWorld) -> WorldFaces:
@@ -191,7 +171,7 @@ def _turned(corners: Numbers, x: float, y: float, heading: float, z: float = 0.0
 
 def draw(
     faces: WorldFaces, pose: Transform3, camera: Intrinsics, most: float, lights: Sequence[WorldLight] = ()
-) -> CameraView:
+) -> DepthPicture:
     """Return what a camera at `pose`, of its optical frame in `map`, sees of faces up to `most` [m] away.
 
     Of a flat face, 1 / depth is linear in the pixels of a picture; each pixel shows the face where that is greatest.
@@ -232,7 +212,7 @@ def draw(
     colours = _coloured(faces, bright, shown)
     for index, picture in faces.pictures.items():
         _paint(colours, shown == index, picture, points[index], camera, bright[index])
-    return CameraView(colours, depths, np.append(faces.things, -1)[shown])
+    return DepthPicture(colours, depths)
 
 
 def _may_be_seen(points: Numbers, offsets: Numbers, camera: Intrinsics) -> NDArray[np.intp]:

@@ -10,7 +10,6 @@ from typing import Annotated
 from pydantic import Field
 
 from rbxcompose.base.config import Angle, Config, Frequency, Length, Time
-from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.domains.worlds.sections.world import world
 from rbxcompose.manifest.fields import FileName
@@ -47,26 +46,17 @@ class CameraModel(Config):
     """Standard deviation of its depths at 1 m."""
 
 
-@dataclass(frozen=True, slots=True)
-class CameraOfRobot:
-    """A camera as it is written, and the file of its calibration."""
-
-    model: CameraModel
-    file: Path | None
-
-
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
-    for name, camera in contents.of(cameras).items():
-        model, file = camera.model, camera.file
+    for name, model in contents.of(cameras).items():
         config: dict[str, object] = {"frame": model.frame, "rate": model.rate}
         if contents.is_simulated and contents.of(world) is not None:
             config |= {"size": model.size, "topic": name, "depth": model.depth, "noise": model.noise}
             config["view"] = f"{model.view!r} rad"
             places = dict[str, KeyPath]()
-            if file is not None:
+            if model.calibration is not None:
                 from rbxcompose.domains.vision.calibration import read_calibration  # imports numpy
 
-                known = read_calibration(file)
+                known = read_calibration(Path(model.calibration))
                 config["pinhole"] = [known.fx, known.fy, known.cx, known.cy]
                 config["distortion"] = list(known.distortion)
                 places = dict.fromkeys(("pinhole", "distortion"), ("cameras", name, "calibration"))
@@ -74,21 +64,20 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             continue
         width, height = model.size
         config |= {"width": width, "height": height, "device": model.device, "exposure": model.exposure}
-        config |= {"topic": f"{name}/image_raw", "info": f"{name}/camera_info", "calibration": str(file or "")}
+        config |= {"topic": f"{name}/image_raw", "info": f"{name}/camera_info", "calibration": model.calibration or ""}
         yield WantedComponent(name, "usb_camera", config, ("cameras", name))
 
 
 @section("cameras", CameraModel, order=64, names=CAMERA, runs=True, wires=True, entry="camera", components=_components)
-def cameras(reading: Reading[CameraModel]) -> dict[str, CameraOfRobot]:
+def cameras(reading: Reading[CameraModel]) -> dict[str, CameraModel]:
     """Cameras by name, simulated in a `world` or real; pictures are at `NAME/image_raw`.
 
     Example:
         cameras:
           front: {frame: base_footprint, size: [640, 480], view: 70 deg}
     """
-    found = dict[str, CameraOfRobot]()
+    found = dict[str, CameraModel]()
     for name, model in reading.entries().items():
-        file: Path | None = None
         if model.calibration is not None:
             where = reading.value("cameras", name, "calibration")
             node = reading.node
@@ -100,8 +89,8 @@ def cameras(reading: Reading[CameraModel]) -> dict[str, CameraOfRobot]:
             if why := _unlike(named, model.size):
                 reading.report.add(NO_CALIBRATION.at(where, f"'{model.calibration}' is no calibration of it: {why}"))
                 continue
-            file = named
-        found[name] = CameraOfRobot(model, file)
+            model = model.model_copy(update={"calibration": str(named)})
+        found[name] = model
     return found
 
 

@@ -28,7 +28,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         return
     from rbxcompose.domains.worlds.optics import optical_frame  # imports numpy
 
-    camera = contents.of(cameras)[found.camera].model
+    camera = contents.of(cameras)[found.camera]
     config = {
         **{name: getattr(found, name) for name in KnownTags.model_fields},
         "image": f"{found.camera}/image_raw",

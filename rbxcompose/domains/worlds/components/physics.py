@@ -292,7 +292,7 @@ class PhysicsSim(sdk.Component[PhysicsConfig]):
 
     def tell_contacts(self, engine: PhysicsWorld) -> None:
         """Publish what the robot begins to touch, but for the ground and itself."""
-        touched = frozenset(touch.what for touch in engine.contacts() if not touch.is_own) - {GROUND}
+        touched = engine.touched() - {GROUND}
         for what in sorted(touched - self.touched):
             self.contacts += 1
             self.contact(String(data=what))

@@ -61,8 +61,6 @@ class JointPlace:
     """In `qvel`."""
     actuator: int | None
     """In `ctrl`; None for one that nothing drives."""
-    speed: float
-    """How fast its set point moves [rad/s, m/s]; inf for at once."""
     effort: float
     """Greatest torque [Nm] or force [N] of what drives it, before any `limit`; 0 if nothing does."""
 
@@ -418,9 +416,8 @@ class _Conversion:
         for name in dict.fromkeys((*moving, *self.driving)):
             made, full = model.joint(f"joint {name}"), f"joint {name}"
             actuator = int(model.actuator(full).id) if full in driven else None
-            speed = math.inf if name in self.driving else self._speed(self.robot.body.joints[name])
             effort = 0.0 if actuator is None else float(model.actuator_forcerange[actuator, 1])
-            joints[name] = JointPlace(int(made.qposadr[0]), int(made.dofadr[0]), actuator, speed, effort)
+            joints[name] = JointPlace(int(made.qposadr[0]), int(made.dofadr[0]), actuator, effort)
             if name in self.driving:
                 signs[name] = math.copysign(1.0, self.placed.axis_of(moving[name])[1]) if name in moving else 1.0
         moved = [shape.name for shape in self.world.shapes if shape.path is not None or shape.name in self.loose]
@@ -435,9 +432,6 @@ class _Conversion:
             {name: int(model.body(_thing(name)).id) for name in moved},
             tuple(dict.fromkeys(self.repairs)),
         )
-
-    def _speed(self, joint: BodyJoint) -> float:
-        return joint.limits.velocity or math.inf if joint.limits else math.inf
 
 
 def _thing(name: str) -> str:

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import Pose2, Transform3, Vector3, Velocity2
+from rbxcompose.base.geometry import Pose2, Transform3, Velocity2
 from rbxcompose.domains.worlds.inertial import ImuReading
 from rbxcompose.domains.worlds.physics.conversion import OF_ROBOT, TIMESTEP, PhysicsModel, convert, xyzw
 from rbxcompose.domains.worlds.physics.looks import DepthPicture, Eyes, PhysicsCamera
@@ -25,23 +24,6 @@ BEHIND = 0.1  # [m/s] that they turn faster for that, at most
 
 class UnstablePhysicsError(Exception):
     """Raised when a state has become infinite or absurd, or when there are more contacts than memory for them."""
-
-
-@dataclass(frozen=True, slots=True)
-class Touch:
-    """A point where a link of the robot touches something."""
-
-    link: str
-    what: str
-    """`the ground`, `map`, a shape of the world, or another link."""
-    point: Vector3
-    """In `map` [m]."""
-    normal: Vector3
-    """From what is touched to the link, a unit vector in `map`."""
-    force: float
-    """Along the normal [N]."""
-    is_own: bool
-    """Whether what is touched is a link, too: things of the world may have the names of links."""
 
 
 def _no_file(message: str) -> None:
@@ -188,10 +170,10 @@ class PhysicsWorld:
             raise ValueError(f"no wheel '{joint}' turns at {speed} rad/s")
         self._speeds[joint] = speed
 
-    def target(self, joint: str, position: float, within: float | None = None) -> None:
+    def target(self, joint: str, position: float, within: float) -> None:
         """Let a servo move to a position [rad or m], which is cut to its limits, and hold it.
 
-        Its set point is there `within` a time [s]; by default it moves as fast as the servo does.
+        Its set point is there `within` a time [s].
 
         Raises:
             ValueError: if nothing holds this joint, or the position is not finite.
@@ -205,9 +187,7 @@ class PhysicsWorld:
         if self._model.jnt_limited[made]:
             low, high = self._model.jnt_range[made].tolist()
             position = min(max(position, low), high)
-        speed = self.converted.joints[joint].speed
-        if within is not None:
-            speed = abs(position - float(self._data.ctrl[number])) / within if within > 0.0 else math.inf
+        speed = abs(position - float(self._data.ctrl[number])) / within if within > 0.0 else math.inf
         self._targets[joint] = position, speed
 
     def limit(self, joint: str, effort: float) -> None:
@@ -286,26 +266,19 @@ class PhysicsWorld:
         x, y, z = self._data.xpos[body].tolist()
         return Transform3((x, y, z), xyzw(iter(self._data.xquat[body].tolist())))
 
-    def contacts(self) -> list[Touch]:
-        """Return where links of the robot touch anything but links that they are fixed to."""
-        found = []
+    def touched(self) -> frozenset[str]:
+        """Return what the robot touches besides itself: `the ground`, `map`, or shapes of the world."""
+        found = set()
         force = np.zeros(6)
         for index in range(self._data.ncon):
-            contact = self._data.contact[index]
-            first, second = (int(geom) for geom in contact.geom)
-            own = [self._model.geom_group[geom] == OF_ROBOT for geom in (first, second)]
-            if not any(own):
+            geoms = [int(geom) for geom in self._data.contact[index].geom]
+            others = [geom for geom in geoms if self._model.geom_group[geom] != OF_ROBOT]
+            if len(others) != 1:
                 continue
             self._mj.mj_contactForce(self._model, self._data, index, force)
-            if force[0] <= 0.0:
-                continue
-            link, other = (second, first) if own[1] else (first, second)
-            towards = 1.0 if own[1] else -1.0  # the normal of MuJoCo points from the first to the second
-            (px, py, pz), (nx, ny, nz) = contact.pos.tolist(), (contact.frame[:3] * towards).tolist()
-            names = self.converted.touching
-            point, normal = (px, py, pz), (nx, ny, nz)
-            found.append(Touch(names[link], names[other], point, normal, float(force[0]), all(own)))
-        return found
+            if force[0] > 0.0:
+                found.add(self.converted.touching[others[0]])
+        return frozenset(found)
 
     def imu(self, link: str) -> ImuReading:
         """Return what an inertial sensor at the origin of a link measures."""

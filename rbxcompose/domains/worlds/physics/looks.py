@@ -59,7 +59,7 @@ class DepthPicture(NamedTuple):
     colours: NDArray[np.uint8]
     """(height, width, 3): red, green, blue; the upper row first."""
     depths: NDArray[np.float32]
-    """(height, width): distance along the optical axis [m]; inf where there is nothing within 50 m."""
+    """(height, width): distance along the optical axis [m]; inf where nothing is in sight."""
 
 
 def add_looks(
