@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TypedDict
+from typing import TYPE_CHECKING, TypedDict
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Severity, Span, kind
@@ -17,8 +17,10 @@ from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import PREFIX, ROBOT_FILE, find, project_of, shown_name
 from rbxcompose.manifest.section import OVERLAY, ROBOT, SYSTEM, TEST
-from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.sdk.capabilities import NeedsExtra
+
+if TYPE_CHECKING:
+    from rbxcompose.runtime.folder import ChosenLayers
 
 UNUSED = kind("RBX9007", Severity.WARNING)
 _USE = "name it in a robot ('missions:', 'include:')"
@@ -226,8 +228,10 @@ def layers_of(arguments: argparse.Namespace) -> Layers:
     }
 
 
-def chosen_layers(arguments: argparse.Namespace) -> ChosenLayers:
+def chosen_layers(arguments: argparse.Namespace) -> "ChosenLayers":
     """Return the same layers for the robot to remember; from any folder they mean the same files."""
+    from rbxcompose.runtime.folder import ChosenLayers  # which only a robot that runs needs
+
     overlays = tuple(
         overlay if overlay.startswith(PREFIX) else os.path.abspath(overlay) for overlay in arguments.overlays
     )
