@@ -21,11 +21,11 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.manifest.files import PREFIX, ROBOT_FILE, find, project_of, shown_name
 from rbxcompose.manifest.section import OVERLAY, ROBOT, SYSTEM, TEST
-from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.sdk.capabilities import NeedsExtra
 
 if TYPE_CHECKING:
     from rbxcompose.compiler.systems.model import System
+    from rbxcompose.runtime.folder import ChosenLayers
 
 UNUSED = kind("RBX9007", Severity.WARNING)
 _USE = "name it in a robot ('missions:', 'include:')"
@@ -229,6 +229,8 @@ def layers_of(arguments: argparse.Namespace) -> Layers:
 
 def chosen_layers(arguments: argparse.Namespace) -> ChosenLayers:
     """Return the same layers for the robot to remember; from any folder they mean the same files."""
+    from rbxcompose.runtime.folder import ChosenLayers  # which only a robot that runs needs
+
     overlays = tuple(
         overlay if overlay.startswith(PREFIX) else os.path.abspath(overlay) for overlay in arguments.overlays
     )

@@ -173,10 +173,9 @@ def _loss(time: float, number: int) -> Record:
 
 
 class Follower:
-    """Reads the records of a log as they arrive, older files first. `skipped` counts torn and foreign lines."""
+    """Reads the records of a log as they arrive, older files first; torn and foreign lines are left out."""
 
     def __init__(self, path: Path) -> None:
-        self.skipped = 0
         self._path = path
         self._files: list[_Part] = []  # oldest first; the last one is being written
 
@@ -187,19 +186,14 @@ class Follower:
         for file in self._files[
             :-2
         ]:  # a file that was just renamed may still get the line of a process that was about to write
-            self._close(file)
+            file.close()
         self._files = self._files[-2:]
-        self.skipped += sum(file.take_skipped() for file in self._files)
         return records
 
     def close(self) -> None:
-        """Close the files; a last line that was never ended counts as torn."""
+        """Close the files; a last line that was never ended is left out, too."""
         while self._files:
-            self._close(self._files.pop())
-
-    def _close(self, file: _Part) -> None:
-        file.close()
-        self.skipped += file.take_skipped()
+            self._files.pop().close()
 
     def _new_files(self) -> list[_Part]:
         """Open the files that have begun since, oldest first.
@@ -231,7 +225,6 @@ class _Part:
         self._file: BufferedReader = path.open("rb")
         self._identity = os.fstat(self._file.fileno())
         self._rest = b""
-        self._skipped = 0
 
     def is_same(self, other: _Part) -> bool:
         return os.path.samestat(self._identity, other._identity)
@@ -240,18 +233,9 @@ class _Part:
         *lines, self._rest = (self._rest + self._file.read()).split(b"\n")
         records: list[Record] = []
         for line in lines:
-            try:
+            with suppress(ValueError):
                 records.append(Record.from_json(line.decode()))
-            except ValueError:
-                self._skipped += 1
         return records
-
-    def take_skipped(self) -> int:
-        """Return the number of lines skipped since the last call."""
-        skipped, self._skipped = self._skipped, 0
-        return skipped
 
     def close(self) -> None:
         self._file.close()
-        self._skipped += bool(self._rest)
-        self._rest = b""

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from rbxcompose.base.findings import Span
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.compiler.composition.dump import dump_robot
-from rbxcompose.domains.body.description import PieceOfBody, assembled, prefixed, to_xml
+from rbxcompose.domains.body.description import BodyPart, Piece, assembled, prefixed, to_xml
+from rbxcompose.domains.body.files import BodyFile
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.urdf import read_body
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
@@ -85,11 +86,11 @@ def body_of(checked: Checked) -> Body:
     return described(robot.manifest).body
 
 
-def piece(name: str, text: str, attachment: PieceAttachment | None = None) -> PieceOfBody:
+def piece(name: str, text: str, attachment: PieceAttachment | None = None) -> Piece:
     root = read_urdf(text, f"{name}.urdf")
     assert isinstance(root, XmlElement)
     here = Span("robot.yaml", 1, 1, 1, 2)
-    return PieceOfBody(name, root, attachment, here, here)
+    return BodyPart(name, BodyFile(Path(f"{name}.urdf"), here), attachment, here, here), root
 
 
 def read(root: object) -> Body:
@@ -137,7 +138,7 @@ def test_each_mistake_is_told_at_its_place(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_every_use_of_a_name_gets_the_prefix() -> None:
-    text = to_xml(prefixed(piece("", NECK).root, "my_"))
+    text = to_xml(prefixed(piece("", NECK)[1], "my_"))
     for named in (
         'transmission name="drive"',
         'joint name="my_pan"',
@@ -155,7 +156,7 @@ def test_a_link_is_where_its_piece_has_it_in_the_frame_that_carries_the_piece(
 ) -> None:
     x, y, z, roll, pitch, yaw = at
     pose = FramePose.model_construct(x=x, y=y, z=z, roll=roll, pitch=pitch, yaw=yaw)  # in SI units
-    own = read(piece("", NECK).root).poses({"pan": pan})
+    own = read(piece("", NECK)[1]).poses({"pan": pan})
     pieces = [piece("base", NECK), piece("neck", NECK, PieceAttachment(to="base_top", at=pose))]
     whole = read(assembled("cart", pieces)).poses({"base_pan": pan, "neck_pan": pan})
     for name, alone in own.items():

@@ -48,17 +48,15 @@ def test_a_torn_last_line_waits_and_is_skipped_at_the_end(tmp_path: Path) -> Non
     with path.open("ab") as file:
         file.write(line[10:] + b"\n" + line[:5])
     assert follower.read() == [record(1)]
-    assert follower.skipped == 0
+    assert follower.read() == []
     follower.close()
-    assert follower.skipped == 1
 
 
-def test_foreign_lines_are_skipped_and_counted(tmp_path: Path) -> None:
+def test_foreign_lines_are_skipped(tmp_path: Path) -> None:
     path = tmp_path / NAME
     path.write_bytes(b"hello\n\xff\xfe\n[1]\n" + record(1).to_json().encode() + b"\n")
     follower = Follower(path)
     assert follower.read() == [record(1)]
-    assert follower.skipped == 3
     follower.close()
 
 
@@ -91,9 +89,8 @@ def test_several_processes_never_tear_each_others_lines(tmp_path: Path) -> None:
     children = [subprocess.Popen([sys.executable, "-c", script, str(path)]) for _ in range(2)]
     assert [child.wait(10) for child in children] == [0, 0]
     follower = Follower(path)
-    assert len(follower.read()) == 600
+    assert len(follower.read()) == len(path.read_bytes().splitlines()) == 600
     follower.close()
-    assert follower.skipped == 0
 
 
 def test_a_full_disk_costs_lines_and_is_told_when_there_is_room(tmp_path: Path) -> None:
@@ -146,7 +143,7 @@ def test_a_follower_goes_on_across_any_number_of_files_and_misses_nothing(tmp_pa
     found += follower.read()
     log.close()
     follower.close()
-    assert (found, follower.skipped) == ([record(number) for number in range(30)], 0)
+    assert found == [record(number) for number in range(30)]
 
 
 def test_several_writers_go_on_to_the_same_file_whoever_sets_the_full_one_aside(tmp_path: Path) -> None:

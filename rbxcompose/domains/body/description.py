@@ -33,13 +33,14 @@ MISFIT = kind("RBX2249")
 
 
 @dataclass(frozen=True, slots=True)
-class PieceOfBody:
-    """One URDF of several; `span` is the place that brings it, an empty `name` is that of the robot's own body."""
+class BodyPart:
+    """A file of the body, one URDF of several, and where it is attached; the robot's own has no name."""
 
     name: str
-    root: XmlElement
+    file: BodyFile
     attachment: PieceAttachment | None
     span: Span
+    """The place that brings it."""
     to: Span
     """Place of the name of the link that carries it."""
 
@@ -49,15 +50,20 @@ class PieceOfBody:
         return f"{self.name}_" if self.name else ""
 
 
-def assembled(name: str, pieces: Sequence[PieceOfBody]) -> XmlElement | list[Finding]:
+Piece = tuple[BodyPart, XmlElement]
+"""A part with the root of its URDF."""
+
+
+def assembled(name: str, pieces: Sequence[Piece]) -> XmlElement | list[Finding]:
     """Return one URDF named `name` of several, or why that is impossible."""
-    loose = [body for body in pieces if body.attachment is None]
-    base = next((body for body in loose if not body.name), loose[0] if loose else None)
-    roots = {body.name: prefixed(body.root, body.prefix) for body in pieces}
+    parts = [part for part, _ in pieces]
+    loose = [part for part in parts if part.attachment is None]
+    base = next((part for part in loose if not part.name), loose[0] if loose else None)
+    roots = {part.name: prefixed(root, part.prefix) for part, root in pieces}
     links = [link for root in roots.values() for link in _named(root, "link")]
-    findings = [_loose(body, base) for body in loose if body is not base]
+    findings = [_loose(part, base) for part in loose if part is not base]
     children = [child for root in roots.values() for child in root.children]
-    for piece in pieces:
+    for piece in parts:
         if piece.attachment is None:
             continue
         first = _first_link(roots[piece.name])
@@ -68,16 +74,16 @@ def assembled(name: str, pieces: Sequence[PieceOfBody]) -> XmlElement | list[Fin
             findings.append(NOT_ATTACHED.at(piece.span, f"the piece '{piece.name}' has no link that could be attached"))
         else:
             children.append(_mount(piece, piece.attachment, first))
-    return findings or XmlElement("robot", {"name": name}, pieces[0].span, children)
+    return findings or XmlElement("robot", {"name": name}, parts[0].span, children)
 
 
-def _loose(piece: PieceOfBody, base: PieceOfBody | None) -> Finding:
+def _loose(piece: BodyPart, base: BodyPart | None) -> Finding:
     also = f", and neither is '{base.name}'" if base and base.name else ""
     message = f"the piece '{piece.name}' is attached to nothing{also}"
     return NOT_ATTACHED.at(piece.span, message, help="write 'attach: {to: LINK}' beside its 'part:'")
 
 
-def _mount(piece: PieceOfBody, attachment: PieceAttachment, child: str) -> XmlElement:
+def _mount(piece: BodyPart, attachment: PieceAttachment, child: str) -> XmlElement:
     at, span = attachment.at, piece.to
     pose = {"xyz": f"{at.x!r} {at.y!r} {at.z!r}", "rpy": f"{at.roll!r} {at.pitch!r} {at.yaw!r}"}
     ends = [XmlElement("parent", {"link": attachment.to}, span), XmlElement("child", {"link": child}, span)]
@@ -234,17 +240,6 @@ class Description:
         return replace(self, text=text, body=rooted(self.body, joint), virtual=joint)
 
 
-@dataclass(frozen=True, slots=True)
-class BodyPart:
-    """A file of the body, and where it is attached; the robot's own has no name."""
-
-    name: str
-    file: BodyFile
-    attachment: PieceAttachment | None
-    span: Span
-    to: Span
-
-
 def describe(
     name: str, home: Path, parts: Sequence[BodyPart], sources: MutableMapping[str, str], *, covers_visuals: bool = False
 ) -> tuple[Description | None, list[Finding]]:
@@ -273,12 +268,12 @@ def _described(
     }
     if len(parts) == 1 and not parts[0].name:
         return _checked(files[0].root, files[0].text, (meshes[0], respelt), notes, covers_visuals=covers_visuals)
-    pieces: list[PieceOfBody] = []
+    pieces: list[Piece] = []
     there: dict[str, Path] = {}
     for part, file, found in zip(parts, files, meshes, strict=True):
         names = {one: one if one.startswith(PACKAGE) else os.path.relpath(found[one], home) for one in found}
         there |= {names[one]: found[one] for one in found}
-        pieces.append(PieceOfBody(part.name, with_meshes(file.root, names), part.attachment, part.span, part.to))
+        pieces.append((part, with_meshes(file.root, names)))
     joined = assembled(name, pieces)
     if isinstance(joined, list):
         return None, [*notes, *joined]

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Protocol
 import zenoh
 
 from rbxcompose.base.clock import Clock, ExternalClock, MonotonicClock, SteppedClock, Turn
-from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus import shared_memory
 from rbxcompose.bus.bus import Bus
@@ -745,15 +744,6 @@ class _Sent:
 _STARVED = 1.0  # [s] of waiting for a processor, after which a router that does not answer may be late as well
 
 
-@dataclass(frozen=True, slots=True)
-class Connection:
-    """The bus of a process, and the watch over its session."""
-
-    bus: Bus
-    lifeline: Lifeline
-    transport: Transport
-
-
 def open_bus(
     plan: Plan,
     name: str,
@@ -764,8 +754,11 @@ def open_bus(
     turns: Turns,
     log: Callable[[str, str], None],
     tape: Tape | None = None,
-) -> Connection:
-    """Open the Zenoh session of process `name`, which finds the robot's others at `router`, and the bus over it."""
+) -> tuple[Bus, Lifeline, Transport]:
+    """Open the Zenoh session of process `name`, which finds the robot's others at `router`, and the bus over it.
+
+    Returns the bus, the watch over its session, and the transport between them.
+    """
 
     is_lone = plan.bus.links == "router"
 
@@ -796,7 +789,7 @@ def open_bus(
         post=inbox.put,
         log=lambda text: log("robot", text),
     )
-    return Connection(bus, lifeline, transport)
+    return bus, lifeline, transport
 
 
 def _open_lone(router: str) -> zenoh.Session:

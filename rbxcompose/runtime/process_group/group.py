@@ -433,12 +433,11 @@ class ProcessGroup:
         tape = self._taping.tape if self._taping else None
         loop = self._scheduler, self._clock, self._inbox, self._turns
         try:
-            connection = open_bus(self._plan, self._name, router, *loop, self._complain, tape)
+            self._bus, self._lifeline, transport = open_bus(self._plan, self._name, router, *loop, self._complain, tape)
         except ConnectionRefusedError as error:
             self._channel.send(messages.Failed("", str(error.strerror)))
             return
-        self._bus, self._lifeline = connection.bus, connection.lifeline
-        open_stop_line(connection.transport, self._plan.robot, self._name, self._stop_by_bus, self._inbox.put)
+        open_stop_line(transport, self._plan.robot, self._name, self._stop_by_bus, self._inbox.put)
         self._host = Host(
             self._plan,
             instances,

@@ -53,7 +53,6 @@ class Worker:
         The calls `configure` and `activate` may take `configures_within` [s], all others take at most `LONGEST`.
         """
         self._configures_within = configures_within
-        self.skipped = 0  # calls dropped in favour of newer ones
         self._owner, self._clock, self._failed = owner, clock, failed
         self.post = post
         self._waiting: list[_Waiting] = []
@@ -77,7 +76,6 @@ class Worker:
         same = [one for one in self._waiting if one.label == label]
         if depth is not None and len(same) >= depth:
             self._waiting.remove(same[0])
-            self.skipped += 1
         self._waiting.append(_Waiting(label, call))
         self._hand_over()
 

@@ -4,7 +4,6 @@ import contextlib
 import os
 import select
 import signal
-from collections.abc import Iterator
 from dataclasses import field
 from types import FrameType
 from typing import NoReturn, TextIO, get_args
@@ -169,9 +168,11 @@ def _supervise(
             unix_endpoint(folder.sockets, "")  # before anything runs, for its path may be too long
         lock = folder.lock()  # ours until this process ends
         if lock is None:
-            _report(reports, AlreadyUp(_supervisor_of(folder)))
+            state = _known_state(folder)
+            _report(reports, AlreadyUp(state.supervisor.pid if state else None))
             return FINDINGS
-        warnings = [*_not_brought_down(folder), *end_leftovers(folder)]
+        died = "the previous run was not shut down, its supervisor died: cleaning up"
+        warnings = [*([died] if _known_state(folder) else ()), *end_leftovers(folder)]
         folder.sweep()
         log = start_new(folder.path)
         file, supervisor = os.path.realpath(plan.file), Process.of(os.getpid())
@@ -189,19 +190,11 @@ def _supervise(
     return ended.exit_code
 
 
-def _not_brought_down(folder: RobotFolder) -> Iterator[str]:
-    """Yield a warning if the previous run has left its state, which a supervisor removes when it ends."""
-    with contextlib.suppress(BrokenStateError):  # which is reported where the leftovers are ended
-        if folder.read_state() is not None:
-            yield "the previous run was not shut down, its supervisor died: cleaning up"
-
-
-def _supervisor_of(folder: RobotFolder) -> int | None:
-    try:
-        state = folder.read_state()
-    except BrokenStateError:
-        return None
-    return state.supervisor.pid if state else None
+def _known_state(folder: RobotFolder) -> RobotState | None:
+    """Return the state of the robot, which its supervisor removes when it ends."""
+    with contextlib.suppress(BrokenStateError):  # which is reported where leftovers are ended
+        return folder.read_state()
+    return None
 
 
 def _run(launch: Launch, folder: RobotFolder, lock: int, reports: TextIO) -> RunEnded:
