@@ -104,12 +104,7 @@ def with_references(node: TreeNode, hint: Any, change: Callable[[str, TreeNode],
 
 def _changed_key(key: ScalarNode, hint: Any, change: Callable[[str, TreeNode], TreeNode]) -> ScalarNode:
     """Return the key of a map with `change` applied, if keys of this map are names of a kind."""
-    kinds = {
-        kind
-        for alternative in alternatives(hint)
-        if get_origin(alternative) is dict
-        for kind in kinds_of(get_args(alternative)[0])
-    }
+    kinds = {kind for one in alternatives(hint) if get_origin(one) is dict for kind in kinds_of(get_args(one)[0])}
     for kind in kinds:
         changed = change(kind, key)
         key = changed if isinstance(changed, ScalarNode) else key

@@ -432,11 +432,7 @@ def _reason(error: ErrorDetails, above: str) -> str:
 def differences(old: Config, new: Config) -> tuple[rcl_interfaces.Parameter, ...]:
     """Return the parameters that differ in `new`, with their new values."""
     before = settings(old)
-    others = (
-        setting
-        for setting in settings(new).values()
-        if setting.name not in before or before[setting.name].value != setting.value
-    )
+    others = (one for one in settings(new).values() if one.name not in before or before[one.name].value != one.value)
     return tuple(
         rcl_interfaces.Parameter(name=other.name, value=to_message(other.value) or rcl_interfaces.ParameterValue())
         for other in others

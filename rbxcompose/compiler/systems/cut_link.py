@@ -105,11 +105,7 @@ def stops_of_goals(robot: PlacedRobot) -> Iterator[StopOfGoal]:
     """Yield the bases that move for goals from another host or robot."""
     crossing = {end.component for one in robot.crossings for end in one.givers if isinstance(end.port, ServesAction)}
     called = {absolute(name, robot.plan.bus.namespace) for name in robot.model.share if robot.model.callers}
-    shared = {
-        topic_end.end.component
-        for topic_end in robot.ends
-        if isinstance(topic_end.end.port, ServesAction) and topic_end.topic in called
-    }
+    shared = {one.end.component for one in robot.ends if isinstance(one.end.port, ServesAction) and one.topic in called}
     if not crossing and not shared:
         return
     flow = MessageFlow(robot.robot)

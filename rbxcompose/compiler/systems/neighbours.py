@@ -44,9 +44,7 @@ def with_fleet(system: System, robot: PlacedRobot, host: str, plan: Plan) -> Pla
                 fleet[other.name] = f"{address}:{page.port.value}"
     if len(system.robots) == 1:
         return plan
-    return with_changes(
-        plan, {instance.name: {page.fleet.field: fleet} for instance, page in _declared_in(plan, ServesPage)}
-    )
+    return with_changes(plan, {one.name: {page.fleet.field: fleet} for one, page in _declared_in(plan, ServesPage)})
 
 
 def _declared_in(plan: Plan, kind: type[K]) -> Iterator[tuple[Instance, K]]:
