@@ -481,7 +481,7 @@ def mission_names(files: ProjectFiles, path: Path) -> dict[str, list[Symbol]]:
 
     root = files.tree(path)
     for section in ("inputs", "data"):
-        for name in entries_of(root.get(section)).keys():
+        for name in entries_of(root.get(section)):
             add(VARIABLE, name)
     walk(root, ())
     return {name: list(symbols) for name, symbols in found.items()}
