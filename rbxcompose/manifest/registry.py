@@ -122,7 +122,9 @@ def _load_domain(domain: str) -> None:
 def _is_ours(name: str) -> bool:
     """Return whether a section of this name is one of rbxcompose."""
     _load_domain("")
-    return name in PLUGINS.shipped or (name in _SECTIONS and _SECTIONS[name].read.__module__.startswith("rbxcompose."))
+    if name in _SECTIONS:
+        return _SECTIONS[name].read.__module__.startswith("rbxcompose.")
+    return bool(domain_of(PLUGINS.shipped.get(name, "")))
 
 
 def naming(kind: str) -> Iterator[Section[Any, Any]]:

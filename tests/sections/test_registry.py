@@ -61,11 +61,17 @@ def test_a_section_of_another_package_is_one_of_the_manifest(install: Install, t
     assert not checked(tmp_path, "horn: {loudness: 3}\n").compilation.report.has_errors
 
 
+def test_a_file_of_ours_takes_no_name_from_others(install: Install, tmp_path: Path) -> None:
+    install("composition", SECTION.replace('"horn", ', '"composition", '))
+    assert not checked(tmp_path, "composition: {loudness: 3}\n").compilation.report.has_errors
+
+
 @pytest.mark.parametrize(
     ("name", "text", "told"),
     [
         ("horn", "import no_such_module", "the section 'horn' of package 'horns' cannot be used: ModuleNotFoundError"),
         ("bus", SECTION, "the section 'bus' of package 'horns' is left out: rbxcompose has one of this name"),
+        ("args", SECTION, "the section 'args' of package 'horns' is left out: rbxcompose has one of this name"),
         ("horn", SECTION.replace('"horn", ', '"bus", '), "ValueError: two sections are named 'bus'"),
         ("horn", SECTION.replace('"""How loud it hoots."""', ""), "the section 'horn' has no docstring"),
     ],
