@@ -83,15 +83,15 @@ def targets(paths: Iterable[str]) -> Targets:
             systems = systems_of(path)
             out.systems += systems
             out.robots += robots if robots or tests or systems else [written]
-        elif kind_of(path) == ROBOT or (kind_of(path) == "" and is_manifest(path)):
+        elif (written_kind := kind_of(path)) == ROBOT or (written_kind == "" and is_manifest(path)):
             out.robots.append(written)
-        elif kind_of(path) == OVERLAY and (beside := path.parent / ROBOT_FILE).is_file():
+        elif written_kind == OVERLAY and (beside := path.parent / ROBOT_FILE).is_file():
             out.overlays.append((str(beside), written))
-        elif kind_of(path) == TEST:
+        elif written_kind == TEST:
             out.tests.append(written)
-        elif kind_of(path) == SYSTEM:
+        elif written_kind == SYSTEM:
             out.systems.append(written)
-        elif kind_of(path) == "" and (robot := _robot_around(path)):
+        elif written_kind == "" and (robot := _robot_around(path)):
             out.robots.append(robot)
         else:
             out.files.append(shown_name(path.resolve()))
