@@ -38,7 +38,7 @@ MAY_OPEN = {
     "runtime/control.py",
     "runtime/folder.py",
     "runtime/log.py",
-    "runtime/process_group/capture.py",
+    "runtime/process_group/group.py",
     "runtime/processes.py",
     "runtime/recording/files.py",
     "runtime/supervision/launch.py",

@@ -119,7 +119,7 @@ def _is_nameless(end: PortEnd) -> bool:
     if not isinstance(port, Out) or port.qos not in _STATES or end.instance == MISSION or port.interface is None:
         return False
     types = [parse_type(field) for field in port.interface.FIELDS.values()]
-    return bool(types) and not any(one.is_message or one.base in ("string", "wstring") for one in types)
+    return bool(types) and not any(field.is_message or field.base in ("string", "wstring") for field in types)
 
 
 @check("RBX3008", closed=(WIRING,))
@@ -167,9 +167,9 @@ def _of_instances(robot: Robot, part: IncludedPart, earlier: IncludedPart) -> Fi
 
 def _own_names(robot: Robot, end: PortEnd, other: str) -> str:
     """Return what to write below `connect` for all that both instances write or serve."""
-    theirs = {one.topic for one in robot.components[other].ends if _has_state(one)}
-    both = (one for one in robot.components[end.instance].ends if one.topic in theirs and _has_state(one))
-    return ", ".join(f"{one.name}: {end.instance}/{one.name}" for one in both)
+    theirs = {port.topic for port in robot.components[other].ends if _has_state(port)}
+    both = (port for port in robot.components[end.instance].ends if port.topic in theirs and _has_state(port))
+    return ", ".join(f"{port.name}: {end.instance}/{port.name}" for port in both)
 
 
 def _has_state(end: PortEnd) -> bool:

@@ -139,9 +139,9 @@ def _given_values(
 def without_strayed(root: MappingNode, keys: Container[str], report: Report) -> MappingNode:
     """Return a tree without keys that are the names of entries of its sections, after a finding for each."""
     left, in_use = dict(root.entries), registry.sections_in_use(ROBOT)
-    empty = [one for one in in_use if one.names and (node := root.get(one.name)) and is_empty(node)]
+    empty = [each for each in in_use if each.names and (node := root.get(each.name)) and is_empty(node)]
     for name, entry in root.entries.items():
-        home = next((one for one in in_use if name not in keys and name in one.names_in(root)), None)
+        home = next((each for each in in_use if name not in keys and name in each.names_in(root)), None)
         if name not in keys and home is None and len(empty) == 1 and isinstance(entry.value, MappingNode):
             home = empty[0]
         if home and isinstance(entry.value, MappingNode):

@@ -188,7 +188,7 @@ class Robot:
     @cached_property
     def written(self) -> frozenset[str]:
         """Return the names of all components that sections of the manifest request, including those with mistakes."""
-        return frozenset(name for one in naming_in_use(COMPONENT) for name in one.names_in(self.manifest.root))
+        return frozenset(name for section in naming_in_use(COMPONENT) for name in section.names_in(self.manifest.root))
 
     @cached_property
     def brought(self) -> frozenset[str]:

@@ -91,7 +91,7 @@ def _topics(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
 
 def _orders(components: Mapping[str, RobotComponent], end: PortEnd, port: ServesTopic[Any]) -> Orders:
     """Return the components that carry out orders, and the topics of the ports for their ends and halts."""
-    servers = [one for one in _ends(components) if isinstance(one.port, ServesTopic) and one.topic == end.topic]
+    servers = [each for each in _ends(components) if isinstance(each.port, ServesTopic) and each.topic == end.topic]
     own = components[end.instance].ends
     return Orders(
         str(port.qos),
