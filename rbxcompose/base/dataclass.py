@@ -8,12 +8,12 @@ library.
 
 import dataclasses
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from functools import cache
 from operator import attrgetter
 from reprlib import recursive_repr
-from types import CodeType, FunctionType, MemberDescriptorType
+from types import MemberDescriptorType
 from typing import TYPE_CHECKING, Any, ClassVar, get_origin
 
 if TYPE_CHECKING:
@@ -149,61 +149,46 @@ class _Init:
 def _init(cls: Any, fields: _Fields, has_setters: bool, frozen: bool) -> Callable[..., None]:
     """Return `__init__`. What is frozen is set by the descriptors of its slots, faster than by `object.__setattr__`."""
     scope: dict[str, Any] = {"_missing": _MISSING, "_set": object.__setattr__}
-    taken = sorted((field for field in fields if field.init), key=lambda field: bool(field.kw_only))
-    number_of = {field.name: number for number, field in enumerate(taken)}
     lines = []
-    for place, field in enumerate(fields):
+    for field in fields:
         if has_setters:
-            scope[f"_set_{place}"] = getattr(cls, field.name).__set__
-        value = _value(field, place, number_of.get(field.name), scope)
+            scope[f"_set_{field.name}"] = getattr(cls, field.name).__set__
+        value = _value(field, scope)
         if value and has_setters:
-            lines.append(f" _set_{place}(self, {value})")
+            lines.append(f" _set_{field.name}(self, {value})")
         elif value:
             lines.append(f" _set(self, {field.name!r}, {value})" if frozen else f" self.{field.name} = {value}")
     if hasattr(cls, "__post_init__"):
         lines.append(" self.__post_init__()")
-    usual = [field for field in taken if not field.kw_only]
-    names = [f"_{number}" for number in range(len(taken))]
-    parameters = [*names[: len(usual)], *["*"][: len(taken) - len(usual)], *names[len(usual) :]]
-    code = _compiled(f"def __init__({', '.join(['self', *parameters])}):\n" + "\n".join(lines or [" pass"]))
-    defaults = _defaults(usual)
-    if [*defaults] != [field.name for field in usual[len(usual) - len(defaults) :]]:
-        raise TypeError(f"a field of {cls.__qualname__} without a default follows one that has a default")
-    code = code.replace(co_varnames=("self", *number_of), co_qualname=f"{cls.__qualname__}.__init__")
-    made: Any = FunctionType(code, scope, "__init__", tuple(defaults.values()))
-    made.__kwdefaults__ = _defaults(taken[len(usual) :]) or None
-    made.__annotations__ = {**{field.name: field.type for field in taken}, "return": None}
+    taken = [one for one in fields if one.init]
+    text = f"def __init__(self{''.join(_parameters(taken))}):\n" + "\n".join(lines or [" pass"])
+    exec(text, scope)  # noqa: S102 - of names of fields, as the standard library does
+    made: Any = scope["__init__"]
+    made.__qualname__ = f"{cls.__qualname__}.__init__"
+    made.__annotations__ = {**{one.name: one.type for one in taken}, "return": None}
     return made  # type: ignore[no-any-return]
 
 
-@cache
-def _compiled(text: str) -> CodeType:
-    """Return the code of a function; many classes share that of `__init__`, in which fields have numbers for names."""
-    [code] = (each for each in compile(text, "<string>", "exec").co_consts if isinstance(each, CodeType))
-    return code
-
-
-def _value(field: dataclasses.Field[Any], place: int, number: int | None, scope: dict[str, Any]) -> str:
-    """Return the expression for the value of a new object's field, empty for none; `scope` receives what it needs.
-
-    The field is at a `place` among all, and a parameter with a `number` unless it is None.
-    """
+def _value(field: dataclasses.Field[Any], scope: dict[str, Any]) -> str:
+    """Return the expression for the value of a new object's field, empty for none; `scope` receives what it needs."""
+    name = field.name
     if field.default_factory is not _MISSING:
-        scope[f"_make_{place}"] = field.default_factory
-        return f"_make_{place}()" if number is None else f"_make_{place}() if _{number} is _missing else _{number}"
-    if number is None and field.default is not _MISSING:
-        scope[f"_default_{place}"] = field.default
-        return f"_default_{place}"
-    return "" if number is None else f"_{number}"
+        scope[f"_make_{name}"] = field.default_factory
+        return f"_make_{name}() if {name} is _missing else {name}" if field.init else f"_make_{name}()"
+    if field.default is not _MISSING:
+        scope[f"_default_{name}"] = field.default
+        return name if field.init else f"_default_{name}"
+    return name if field.init else ""
 
 
-def _defaults(fields: _Fields) -> dict[str, object]:
-    """Return the defaults of parameters; what is made for each object is missing until then."""
-    return {
-        field.name: field.default
-        for field in fields
-        if field.default is not _MISSING or field.default_factory is not _MISSING
-    }
+def _parameters(fields: _Fields) -> Iterator[str]:
+    ordered = sorted(fields, key=lambda one: bool(one.kw_only))
+    for number, field in enumerate(ordered):
+        if field.kw_only and not (number and ordered[number - 1].kw_only):
+            yield ", *"
+        default = "_missing" if field.default_factory is not _MISSING else f"_default_{field.name}"
+        has_default = field.default_factory is not _MISSING or field.default is not _MISSING
+        yield f", {field.name}={default}" if has_default else f", {field.name}"
 
 
 def _repr(names: Sequence[str]) -> Callable[[Any], str]:

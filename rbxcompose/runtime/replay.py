@@ -22,14 +22,13 @@ from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.action_msgs import CancelGoal
 from rbxcompose.msgs.cdr import CdrError, decode, encode
-from rbxcompose.msgs.events import TOPIC, event_of
 from rbxcompose.msgs.plain import to_plain
 from rbxcompose.msgs.service_msgs import ServiceEventInfo
 from rbxcompose.msgs.std_msgs import Float64, String
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.runtime.log import Record
 from rbxcompose.runtime.process_group.host import Host
-from rbxcompose.runtime.recording.tape import INSTANTS, ORDERS, Tape
+from rbxcompose.runtime.recording.tape import EVENT_TOPIC, INSTANTS, ORDERS, Tape, event_of
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Qos, Serves, ServesAction
 from rbxcompose.sdk.registry import component_type
@@ -79,7 +78,7 @@ class ReplayedServices:
         wire = WIRE_PROFILES[plan.bus.wire]
         self._served = {name for one in plan.instances for name, _ in _ends(one, Serves, ServesAction)}
         self._known = {
-            f"{name}/{TOPIC}": (data_key(plan.bus.domain, name, service.TYPE, wire.hash_of(service)), service)
+            f"{name}/{EVENT_TOPIC}": (data_key(plan.bus.domain, name, service.TYPE, wire.hash_of(service)), service)
             for name, service in _ends(instance, Serves, ServesAction, Calls, CallsAction)
         }
 
@@ -255,7 +254,7 @@ class RunComparison:
             return _whole(first, f"a message on {recorded.topic.name}", f"a message on {now.topic.name}")
         if recorded.log_time != now.log_time:
             return _whole(min(recorded, now, key=lambda one: one.log_time), *map(_at, (recorded, now)))
-        if recorded.topic.name.endswith(f"/{TOPIC}"):
+        if recorded.topic.name.endswith(f"/{EVENT_TOPIC}"):
             self._aliases.learn(recorded, now)
         if recorded.payload == (payload := self._aliases.outwards(now.payload)):
             return None
@@ -370,7 +369,7 @@ class ReplayFeed:
             return False
         if topic.name == ORDERS:
             return True
-        if topic.name.endswith(f"/{TOPIC}"):
+        if topic.name.endswith(f"/{EVENT_TOPIC}"):
             return self._services.find(topic.name) is not None
         return self._key(record) in self._stage.subscribers
 

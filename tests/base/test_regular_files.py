@@ -27,7 +27,7 @@ MAY_OPEN = {
     "domains/arms/motion/numba_cache.py",
     "domains/console/access.py",
     "domains/console/components/gateway.py",
-    "domains/console/log_tail.py",
+    "domains/console/feeds.py",
     "missions/view/tested.py",
     "domains/devices/serial_ports.py",
     "domains/programs/child.py",

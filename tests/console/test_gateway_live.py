@@ -34,7 +34,7 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from rbxcompose.commands.guest import Guest
 from rbxcompose.domains.console.components.gateway import MOST_CONNECTIONS
-from rbxcompose.domains.console.topic_rates import SHORTEST
+from rbxcompose.domains.console.feeds import SHORTEST
 from rbxcompose.domains.console.video import MOST_STREAMS
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.sdk.ports import Qos

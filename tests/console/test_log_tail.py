@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.console.log_tail import MOST, tail
+from rbxcompose.domains.console.feeds import MOST, tail
 from rbxcompose.runtime.log import Record
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.domains.console.topic_rates import SHORTEST, TopicRates
+from rbxcompose.domains.console.feeds import SHORTEST, TopicRates
 
 
 class Bus:

@@ -13,7 +13,7 @@ from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.sdk.bound import Ended, Outcome
-from rbxcompose.testing.system_bench import SystemBench
+from rbxcompose.testing.bench import SystemBench
 from tests.navigation.houses import room
 
 DOOR = 0.9  # [m] wide: too narrow for two

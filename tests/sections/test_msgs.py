@@ -20,8 +20,7 @@ from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.runtime.supervision.plan_change import changes
-from rbxcompose.testing.bench import Bench
-from rbxcompose.testing.system_bench import SystemBench
+from rbxcompose.testing.bench import Bench, SystemBench
 from rbxcompose.tools.lsp.project import Project as Editor
 from tests.conftest import ROOT
 from tests.loops import for_all

@@ -20,7 +20,7 @@ from rbxcompose.msgs.rbxcompose_msgs import Switches
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.testing import Bench
-from rbxcompose.testing.system_bench import SystemBench
+from rbxcompose.testing.bench import SystemBench
 
 ROBOT = """rbx: 1
 kind: Robot

@@ -6,23 +6,27 @@ the orders that the host received and the instants whose time [s] cannot be comp
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import field, make_dataclass, replace
+from functools import cache
+from typing import Any
 
 from rbxcompose.base.clock import NANOSECONDS, Clock
 from rbxcompose.bus.local import WitnessedCall
 from rbxcompose.bus.names import ADMIN, decode_attachment
 from rbxcompose.bus.tokens import EndpointToken, gid, parse_token
 from rbxcompose.bus.transport import Closable, RemotePublisher, Transport
+from rbxcompose.msgs import registry
 from rbxcompose.msgs.cdr import encode
-from rbxcompose.msgs.events import TOPIC, event_of
+from rbxcompose.msgs.definitions import FieldDefinition, Structure, parse_type, type_hash
 from rbxcompose.msgs.service_msgs import ServiceEventInfo
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Float64, String
-from rbxcompose.msgs.types import Message
+from rbxcompose.msgs.types import Fields, Message, Service
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, definition_of, topic_of
 from rbxcompose.sdk.ports import Qos
 
 PLAN = "plan.json"  # name of the attachment with the plan of the robot
+EVENT_TOPIC = "_service_event"  # suffix of the topic of a service's events
 ORDERS = "/rbxcompose/orders"
 INSTANTS = "/rbxcompose/instants"
 
@@ -49,7 +53,7 @@ class Tape:
         info = ServiceEventInfo(event_type=kind, stamp=stamp, client_gid=call.client, sequence_number=call.sequence)
         held = () if call.message is None else (call.message,)
         message = event(info=info, response=held) if call.is_reply else event(info=info, request=held)
-        self._say(f"{call.name}/{TOPIC}", message, node=call.node, sequence=call.sequence)
+        self._say(f"{call.name}/{EVENT_TOPIC}", message, node=call.node, sequence=call.sequence)
 
     def order(self, verb: str, *words: object) -> None:
         """Record an order to the host."""
@@ -117,3 +121,41 @@ class _TapedPublisher:
 
     def close(self) -> None:
         self._inner.close()
+
+
+def event_of(service: type[Service[Any, Any]]) -> type[Any]:
+    """Return the type with the fields `info`, `request` and `response`; one of the last two holds one message."""
+    named: Any = service  # for mypy, classes of a generic are not hashable
+    return _event_of(named)
+
+
+@cache
+def _event_of(service: Any) -> type[Any]:
+    name = f"{service.TYPE}_Event"
+    fields = {
+        "info": ServiceEventInfo.TYPE,
+        "request": f"{service.Request.TYPE}[<=1]",
+        "response": f"{service.Response.TYPE}[<=1]",
+    }
+    structures: dict[str, Structure] = {}
+    _describe(name, fields, structures)
+    return make_dataclass(
+        name.split("/")[-1],
+        [
+            ("info", ServiceEventInfo, field(default_factory=ServiceEventInfo)),
+            ("request", tuple[Any, ...], ()),
+            ("response", tuple[Any, ...], ()),
+        ],
+        bases=(Message,),
+        namespace={"TYPE": name, "HASH": type_hash(name, structures), "FIELDS": fields},
+        frozen=True,
+        slots=True,
+    )
+
+
+def _describe(name: str, fields: Fields, found: dict[str, Structure]) -> None:
+    """Add a message and all messages inside it to `found`."""
+    found[name] = Structure(name, tuple(FieldDefinition(each, parse_type(text)) for each, text in fields.items()))
+    for each in found[name].fields:
+        if each.type.is_message and each.type.base not in found:
+            _describe(each.type.base, registry.message(each.type.base).FIELDS, found)

@@ -29,8 +29,7 @@ from rbxcompose.domains.console.access import Role
 from rbxcompose.manifest.files import library_root
 from rbxcompose.manifest.tree import FILE_BYTES
 from rbxcompose.runtime.log import LogFile
-from rbxcompose.tools.mcp.project_paths import ProjectPaths
-from rbxcompose.tools.mcp.tools import TOOLS, Lane, Lanes, ToolContext, VerbTool
+from rbxcompose.tools.mcp.tools import TOOLS, Lane, Lanes, ProjectPaths, ToolContext, VerbTool
 
 CallContext = ServerRequestContext[Any]
 LANGUAGE = "rbxcompose://language"

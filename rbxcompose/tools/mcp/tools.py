@@ -4,25 +4,31 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+import os
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import asynccontextmanager, suppress
 from enum import Enum
+from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from pydantic import Field
 
 from rbxcompose.base.config import Config
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Severity
+from rbxcompose.base.findings import Finding, Severity
+from rbxcompose.base.printable import plain
 from rbxcompose.base.requests import Refused
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.lookup import answer_of, find_robot
+from rbxcompose.commands.targets import Targets, robot_path, robots_below, targets
 from rbxcompose.domains.console.access import Role
+from rbxcompose.manifest.files import PREFIX, find
+from rbxcompose.manifest.tree import ALL_BYTES
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.requests import NoteInLog
-from rbxcompose.tools.mcp.project_paths import ProjectPaths, words_of_finding
 from rbxcompose.tools.mcp.verb_process import VerbOutput, run_verb
+from rbxcompose.tools.mission_tests.model import tests_of
 
 MOST_WAITING = 16  # in each lane
 _WORD = r"^[A-Za-z0-9_$][^\s/\\]*$"  # never an option, and never a path
@@ -392,3 +398,81 @@ TOOLS: Mapping[str, VerbTool] = {
         VerbTool("release", "Allow motion again after a stop.", UpArguments, Lane.OPERATE, _release),
     )
 }  # fmt: skip
+
+
+def words_of_finding(finding: Finding) -> str:
+    """Return why something is refused, and what helps."""
+    return f"{finding.message}; {finding.help}" if finding.help else finding.message
+
+
+class ProjectPaths:
+    """The paths of the project in the current folder; each method raises `Refused` for what leads out of it."""
+
+    def __init__(self) -> None:
+        self.root = Path.cwd().resolve()
+
+    def file(self, written: str) -> str:
+        """Return the path of a file or folder of the project, relative to it."""
+        try:
+            real = (self.root / written).resolve()
+            is_there = real.exists()
+        except (OSError, ValueError, RuntimeError) as error:  # such as a name too long, a zero byte, a circle of links
+            raise Refused(f"'{plain(written)}' is not a path") from error
+        self._require_inside(real, written)
+        if not is_there:
+            raise Refused(f"'{plain(written)}' does not exist")
+        return f"./{real.relative_to(self.root)}"  # never an option
+
+    def checked(self, written: Iterable[str]) -> list[str]:
+        """Return paths that `check` takes: all that they mean must be in the project, or in the library."""
+        paths = [path if path.startswith(PREFIX) else self.file(path) for path in written]
+        for path in _named(targets(paths)):
+            self._require_inside(Path(path).resolve(), path)
+        return paths
+
+    def tests(self, written: Iterable[str]) -> list[str]:
+        """Return paths of tests, or of folders of tests."""
+        paths = [self.file(path) for path in written]
+        for path in tests_of(map(Path, paths)):
+            self._require_inside(path.resolve(), str(path))
+        return paths
+
+    def robot(self, written: str) -> str:
+        """Return the path of a robot; without one, that of the only robot here."""
+        try:
+            path = written or robot_path(None, may_run=False)
+        except NotDoneError as error:
+            raise Refused(words_of_finding(error.finding)) from error
+        path = path if path.startswith(PREFIX) else self.file(path)
+        found = find(path)
+        if isinstance(found, Finding):
+            raise Refused(words_of_finding(found))
+        if not path.startswith(PREFIX):
+            self._require_inside(found, written)
+        return path
+
+    def robots(self) -> list[str]:
+        """Return the paths of the robots of the project."""
+        return [path for path in robots_below(Path()) if Path(path).resolve().is_relative_to(self.root)]
+
+    def texts(self, unsaved: Mapping[str, str]) -> dict[str, str]:
+        """Return texts in place of those of files, by their paths."""
+        if sum(map(len, unsaved.values())) > ALL_BYTES:
+            raise Refused(f"these texts have more than {ALL_BYTES:,} characters")
+        texts = {self.file(path): text for path, text in unsaved.items()}
+        for path in texts:
+            if not Path(path).is_file():
+                raise Refused(f"'{plain(path)}' is not a file")
+        return texts
+
+    def _require_inside(self, real: Path, written: str) -> None:
+        if not real.is_relative_to(self.root):
+            named = Path(os.path.normpath(self.root / written))
+            how = "leads through a link out of" if named.is_relative_to(self.root) else "is outside"
+            raise Refused(f"'{plain(written)}' {how} the project '{plain(str(self.root))}'")
+
+
+def _named(found: Targets) -> Iterator[str]:
+    """Yield the files of a project that targets mean."""
+    for paths in (found.robots, *found.overlays, found.users, found.files, found.tests, found.systems):
+        yield from (path for path in paths if not path.startswith(PREFIX))

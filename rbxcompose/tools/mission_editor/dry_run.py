@@ -31,8 +31,7 @@ from rbxcompose.sdk.registry import declared
 from rbxcompose.tools.mission_editor.outline import MissionOutline
 from rbxcompose.tools.mission_editor.yaml_places import Path as TextPath
 from rbxcompose.tools.mission_tests.coverage import SeenWays
-from rbxcompose.tools.mission_tests.finding_files import tests_of
-from rbxcompose.tools.mission_tests.model import RUNS, Expectations, Trial
+from rbxcompose.tools.mission_tests.model import RUNS, Expectations, Trial, tests_of
 from rbxcompose.tools.mission_tests.record import Done, TrialRecord
 from rbxcompose.tools.mission_tests.runner import RobotRun
 

@@ -45,12 +45,11 @@ from rbxcompose.commands.lookup import place_of
 from rbxcompose.domains.console import protocol
 from rbxcompose.domains.console.access import LOCAL_NAMES, Door, Role, network_names, own_secret, role_of, secret_path
 from rbxcompose.domains.console.editor_process import EditorProcess
+from rbxcompose.domains.console.feeds import KEPT, TopicRates, findings, tail
 from rbxcompose.domains.console.foxglove_server import FoxgloveServer, RobotAccess
 from rbxcompose.domains.console.lease import DriveLimits
-from rbxcompose.domains.console.log_tail import findings, tail
 from rbxcompose.domains.console.models import MESHES, CandidateModels, ServedFile, ServedModel
 from rbxcompose.domains.console.rosapi import BusView
-from rbxcompose.domains.console.topic_rates import KEPT, TopicRates
 from rbxcompose.domains.console.video import BOUNDARY, IMAGES, Picture, Streams, list_page, part, viewer_page, wanted
 from rbxcompose.missions.view.tested import read_tested
 from rbxcompose.msgs.images import WrongPictureError

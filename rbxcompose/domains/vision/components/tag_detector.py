@@ -10,7 +10,7 @@ from rbxcompose import sdk
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.vision.known_tags import KnownTags
+from rbxcompose.domains.vision.sections.tags import KnownTags
 from rbxcompose.domains.vision.tags import Numbers, SeenTag, TagFinder, board_pose
 from rbxcompose.domains.worlds.optics import Intrinsics
 from rbxcompose.manifest.fields import TopicName
