@@ -42,6 +42,7 @@ def run(*words: str, cwd: Path, path: Path) -> str:
 def written(folder: Path, files: dict[str, str]) -> Path:
     for name, text in files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).unlink(missing_ok=True)  # a link to the file of somebody who follows the page
         (folder / name).write_text(text, encoding="utf-8")
     return folder
 
@@ -114,6 +115,6 @@ def test_its_domain_has_a_section_a_component_a_check_and_a_command(said: list[s
     helped, listed, checked, circle, up, _ = said
     assert "List the sirens of a robot" in helped
     assert listed.splitlines()[-2:] == ["front  base", "back   base"]
-    assert "'front' needs '/alarm', which nothing in the robot provides" in checked
+    assert "'front' needs '/base/alarm', which nothing in the robot provides" in checked
     assert "siren 'back' waits for itself" in circle
     assert "site is up" in up, up

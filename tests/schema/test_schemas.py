@@ -97,10 +97,6 @@ def test_the_schemas_in_the_repository_are_up_to_date() -> None:
     assert committed == texts(), "run `make docs`"
 
 
-def test_the_files_are_small() -> None:
-    assert sum(len(text.encode()) for text in texts().values()) <= 370_000
-
-
 @pytest.mark.parametrize("name", [*(name for name in NAMES if name not in LIKE_ROBOTS), *rare(*LIKE_ROBOTS)])
 def test_a_schema_and_its_definitions_are_of_draft_7(name: str) -> None:
     for schema in [schemas()[name], *schemas()[name]["$defs"].values()]:
