@@ -15,7 +15,7 @@ from rbxcompose.compiler.doubts import doubts_of
 from rbxcompose.compiler.sections.values import unknown_place, values
 from rbxcompose.manifest.fill import OpenNames
 from rbxcompose.manifest.registry import naming_in_use, section_named, sections_in_use
-from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, all_nodes, at, key_span, value_span
+from rbxcompose.manifest.tree import KeyPath, ScalarNode, all_nodes, at, entries_of, key_span, value_span
 from rbxcompose.missions.analysis.facts import settings_of
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of
@@ -263,10 +263,8 @@ class Robot:
 
     def _takes_connect(self, path: KeyPath) -> bool:
         """Return whether the entry that requests a component may have the key `connect`."""
-        section, node = (
-            (section_named(path[0]), at(self.manifest.root, path[:1])) if len(path) == ENTRY else (None, None)
-        )
-        entry = node.entries.get(str(path[1])) if isinstance(node, MappingNode) else None
+        section = section_named(path[0]) if len(path) == ENTRY else None
+        entry = entries_of(at(self.manifest.root, path[:1])).get(str(path[-1])) if section else None
         return section is not None and entry is not None and "connect" in section.keys_of(entry)
 
     def parted(self, what: str, *ways: Collection[tuple[PortEnd, str]]) -> str:
