@@ -7,6 +7,7 @@ from functools import cache
 import pytest
 
 from docs import generate
+from docs.generating import families
 from docs.generating.families import next_code
 from rbxcompose.base.expressions.types import TYPES
 from rbxcompose.base.findings import KINDS, OUR_CODES, kind
@@ -64,6 +65,16 @@ def test_a_code_is_declared_once_by_a_module_that_may_be_imported_again() -> Non
 def test_the_table_of_families_counts_every_kind_and_the_next_code_is_free() -> None:
     assert {code for _, code in declared()} == {code for code in all_kinds() if code.startswith(OUR_CODES)}
     assert {next_code(family) for family in FAMILIES}.isdisjoint(all_kinds())
+
+
+def test_a_family_whose_last_code_is_taken_is_full(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(
+        families, "declared", lambda: iter([("here", "RBX2203"), ("here", "RBX2299"), ("here", "RBX2398")])
+    )
+    families.main()
+    assert {"RBX22 is full:  servos", "RBX2399  arms", "RBX3001  wiring"} <= set(capsys.readouterr().out.splitlines())
 
 
 def test_no_kind_is_left_out_by_looking_for_declarations() -> None:
