@@ -116,6 +116,14 @@ def test_only_an_entry_that_takes_connect_is_told_to_write_it(project: Project) 
     assert helps(project, "RBX3015", "") == []
 
 
+def test_only_a_topic_that_an_instance_may_rename_is_told_to_be_renamed(project: Project) -> None:
+    part = "components:\n  sensor: {type: program, command: [./sensor], publishes: {dusk: std_msgs/Bool}}\n"
+    pair = "include:\n  left: ../../parts/lit.yaml\n  right: ../../parts/lit.yaml\n"
+    project.check(pair, {"lit": part + "lamps: {front: sensor}\n"})
+    assert helps(project, "RBX3023", "'/dusk'") == ["give one of them another topic: 'connect: {dusk: right/dusk}'"]
+    assert helps(project, "RBX3023", "'/shines'") == [""]
+
+
 def test_a_component_and_a_lamp_of_one_name_are_a_finding(project: Project) -> None:
     project.check(BASE + "lamps:\n  base: base\n")
     assert told(project) == [("RBX1007", "a component and a lamp are both named 'base'", 5)]

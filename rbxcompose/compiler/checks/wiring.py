@@ -175,11 +175,13 @@ def _of_instances(robot: Robot, part: IncludedPart, earlier: IncludedPart) -> Fi
     renamed = {
         name: f"{name}_{part.name}" if topic in served else f"{part.name}/{name}" for topic, name in shared.items()
     }
-    names = ", ".join(f"{name}: {new}" for name, new in renamed.items())
+    brought = part.components & robot.components.keys()
+    ours = {end.topic for name in brought for end in robot.components[name].ends if robot.is_renamed(end)}
+    names = ", ".join(f"{name}: {renamed[name]}" for topic, name in shared.items() if topic in ours)
     return two_servers.at(
         part.span,
         f"the instances '{part.name}' and '{earlier.name}' both serve {' and '.join(map(repr, served))}",
-        help=f"give one of them names of its own: 'connect: {{{names}}}'",
+        help=f"give one of them names of its own: 'connect: {{{names}}}'" if ours.issuperset(served) else "",
         related=[Related(earlier.span, f"the instance '{earlier.name}'")],
     )
 
@@ -330,12 +332,13 @@ def instance_topics(robot: Robot) -> Iterator[Finding]:
     first: dict[tuple[str, str], str] = {}  # file and topic -> instance
     for part in robot.manifest.parts.values():
         shared_topics = {
-            end.topic: end.port.topic
+            end.topic: end
             for name in part.components & robot.components.keys()
             for end in robot.components[name].ends
             if isinstance(end.port, Out) and not is_command(end)
         }
-        for topic, short in sorted(shared_topics.items()):
+        for topic, end in sorted(shared_topics.items()):
+            short = end.port.topic
             other = robot.manifest.parts[first.setdefault((part.file, topic), part.name)]
             if other is part or short.startswith("/"):
                 continue
@@ -344,7 +347,9 @@ def instance_topics(robot: Robot) -> Iterator[Finding]:
                 yield instance_topics.at(
                     part.span,
                     f"the instances '{part.name}' and '{other.name}' of one part both publish on '{topic}'",
-                    help=f"give one of them another topic: 'connect: {{{short}: {part.name}/{short}}}'",
+                    help=f"give one of them another topic: 'connect: {{{short}: {part.name}/{short}}}'"
+                    if robot.is_renamed(end)
+                    else "",
                     related=[Related(other.span, f"the instance '{other.name}'")],
                 )
 

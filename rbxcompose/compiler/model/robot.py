@@ -15,7 +15,8 @@ from rbxcompose.compiler.doubts import doubts_of
 from rbxcompose.compiler.sections.values import unknown_place, values
 from rbxcompose.manifest.fill import OpenNames
 from rbxcompose.manifest.registry import naming_in_use, section_named, sections_in_use
-from rbxcompose.manifest.tree import KeyPath, ScalarNode, all_nodes, at, entries_of, key_span, value_span
+from rbxcompose.manifest.section import Section
+from rbxcompose.manifest.tree import Entry, KeyPath, ScalarNode, all_nodes, at, entries_of, key_span, value_span
 from rbxcompose.missions.analysis.facts import settings_of
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of
@@ -263,9 +264,20 @@ class Robot:
 
     def _takes_connect(self, path: KeyPath) -> bool:
         """Return whether the entry that requests a component may have the key `connect`."""
+        return any("connect" in section.keys_of(entry) for section, entry in self._requesting(path))
+
+    def is_renamed(self, end: PortEnd) -> bool:
+        """Return whether `connect:` of an instance may name the topic of a port of a component in its part."""
+        component = self.components[end.instance]
+        topics = (one.topics(component.name, entry.value) for one, entry in self._requesting(component.path))
+        return self._takes_connect(component.path) or end.name in component.places or any(map(any, topics))
+
+    def _requesting(self, path: KeyPath) -> Iterator[tuple[Section[Any, Any], Entry]]:
+        """Yield the entry that requests a component, with its section; none if a section as a whole does so."""
         section = section_named(path[0]) if len(path) == ENTRY else None
         entry = entries_of(at(self.manifest.root, path[:1])).get(str(path[-1])) if section else None
-        return section is not None and entry is not None and "connect" in section.keys_of(entry)
+        if section and entry:
+            yield section, entry
 
     def parted(self, what: str, *ways: Collection[tuple[PortEnd, str]]) -> str:
         """Return what tells two components apart: to give the ports of one `what`, the first way that can be written.
