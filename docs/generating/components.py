@@ -73,11 +73,25 @@ def facts(cls: type[Component[Any]]) -> str:
 def ports_of(name: str) -> dict[str, Port[Any]]:
     """Return the ports of a type, those that depend on the configuration as its example has them."""
     cls = component_type(name)
-    [written] = examples_of(component_type(name))
     options = {"type", *ComponentOptions.model_fields}
-    settings = {key: value for key, value in dict(written).items() if key not in options}  # type: ignore[call-overload]
+    settings = {key: value for key, value in entry_shown(name).items() if key not in options}
     config = cls.config_type().model_validate(settings, context={PLACE: {"dock": Place("dock", 0, 0, 0)}})
     return cls.ports(config)
+
+
+def entry_shown(name: str) -> dict[str, object]:
+    """Return the entry that the docstring of a type shows: for its ports also of one that a section makes.
+
+    Raises:
+        ValueError: if it does not show just one
+    """
+    match examples_of(component_type(name)):
+        case [dict(entry)]:
+            return entry
+    raise ValueError(
+        f"the docstring of the type '{name}' needs one 'Example:' with one entry, 'NAME: {{type: {name}, ...}}'; "
+        "so does that of a type that a section makes"
+    )
 
 
 def port_row(port: Port[Any]) -> tuple[str, ...]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from docs.generating.markdown import table
 from rbxcompose.commands.finding_pages import FAMILIES, declared
 
+LAST = 99  # of a family: a code has four digits
+
 
 def families() -> str:
     """Return a table of the families."""
@@ -16,15 +18,15 @@ def families() -> str:
 
 
 def next_code(family: str) -> str:
-    """Return the code behind the last one of a family: what was used once is never used for anything else."""
-    used = [int(code[5:]) for _, code in declared() if code[3:5] == family]
-    return f"RBX{family}{max(used, default=0) + 1:02}"
+    """Return the code behind the last one of a family, empty if there is none: no code is ever used again."""
+    last = max((int(code[5:]) for _, code in declared() if code[3:5] == family), default=0)
+    return f"RBX{family}{last + 1:02}" if last < LAST else ""
 
 
 def main() -> None:
     """Print the next free code of each family."""
     for family, words in FAMILIES.items():
-        print(f"{next_code(family)}  {words}")  # noqa: T201
+        print(f"{next_code(family) or f'RBX{family} is full:'}  {words}")  # noqa: T201
 
 
 if __name__ == "__main__":

@@ -73,8 +73,18 @@ def all_kinds() -> dict[str, FindingKind]:
 
 
 def page_of(kind: FindingKind) -> tuple[str, str]:
-    """Return title and body of a kind's page, from its file or, for a kind of another package, from its docstring."""
-    text = kind.doc or _HEAD.sub(r"\1\n", (page_folder() / f"{kind.code}.md").read_text(encoding="utf-8"))
+    """Return title and body of a kind's page, from its file or, for a kind of another package, from its docstring.
+
+    Raises:
+        NotDoneError: if nobody has written the file yet
+    """
+    file = page_folder() / f"{kind.code}.md"
+    if not kind.doc and not file.is_file():
+        from rbxcompose.commands.console import NotDoneError  # with the reader, which pages do without
+        from rbxcompose.manifest.reader import UNREADABLE
+
+        raise NotDoneError(UNREADABLE.at(None, f"{kind.code} has no page: there is no file '{file}'", help="write it"))
+    text = kind.doc or _HEAD.sub(r"\1\n", file.read_text(encoding="utf-8"))
     title, _, body = text.strip().partition("\n")
     return title, body.strip()
 

@@ -57,6 +57,10 @@ def test_a_component_is_not_told_to_listen_to_itself(tmp_path: Path) -> None:
     assert only(robot, tmp_path).help == "add the component that provides it"
     other = "  other: {type: toy_relay, connect: {taken: given, given: level}}\n"
     assert only(robot + other, tmp_path).help == "connect it: 'connect: {taken: level}'"
+    third = "  third: {type: toy_relay, connect: {taken: given, given: upper/level}}\n"
+    inside = robot.replace("components:", "bus: {namespace: inside}\ncomponents:")
+    both = "'connect: {taken: level}', 'connect: {taken: upper/level}'"
+    assert only(inside + other + third, tmp_path).help == f"connect it: one of {both}"
 
 
 OVERLAY = "rbx: 1\nkind: Overlay\nname: over\n"

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from rbxcompose.base.findings import KINDS
+from rbxcompose.commands import finding_pages
 from rbxcompose.commands import main as command
 from rbxcompose.commands.finding_pages import all_kinds
 
@@ -34,6 +36,15 @@ def test_an_unknown_code_is_wrong_usage_with_a_hint_of_its_family(capsys: pytest
     told = capsys.readouterr()
     assert told.out == ""
     assert "there is no code 'RBX1099'; did you mean 'RBX10" in told.err
+
+
+def test_the_page_that_nobody_has_written_yet_is_named(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(finding_pages, "page_folder", lambda: tmp_path)
+    assert command.main(["explain", "RBX1001"]) == 1
+    missing = tmp_path / "RBX1001.md"
+    assert f"RBX1001 has no page: there is no file '{missing}'\n  = help: write it\n" in capsys.readouterr().err
 
 
 def test_programs_get_json(capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,6 +14,7 @@ from unittest.mock import Mock
 
 import pytest
 
+from docs.generating.components import entry_shown
 from rbxcompose.base.config import field_docs
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.compiler.compile import compile_robot
@@ -40,6 +41,7 @@ all_types = pytest.mark.parametrize("name", TYPES)
 
 def example_of(name: str) -> str:
     """Return the example in a type's docstring, indented as below `components:`."""
+    assert entry_shown(name)
     text = inspect.cleandoc(component_type(name).__doc__ or "").partition("Example:\n")[2]
     return inspect.cleandoc(text)
 

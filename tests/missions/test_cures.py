@@ -54,6 +54,18 @@ CURES = [
     ("do: {go_to: {plce: dock}}", ["its arguments: pose, behavior_tree"]),
     ("do: {selector: [recharge]}", ["did you mean 'fallback'?"]),
     ("do: {parallel: [recharge, {wait: 1 s}], success_threshold: 1}", ["did you mean 'succeed_when'?"]),
+    (
+        "do: {set_battery_level: {data: 1}}",
+        ["it is a service: write 'call: set_battery_level', and below it 'request: "],
+    ),
+    (
+        "do: {cmd_vel/teleop: {linear: {x: 1}}}",
+        ["it is a topic: write 'publish: cmd_vel/teleop', and below it 'messag"],
+    ),
+    (
+        "do: /set_battery_level",
+        ["it is a service: write 'call: /set_battery_level', and below it 'request: ...' if it"],
+    ),
     ("do: [recharge, {timeout: 5 s}]", ["'timeout' is a setting of a step: write 'timeout: 5 s' without a dash"]),
     ("do: {repeat: -1, do: recharge}", ["write 'forever'"]),
     ("do: {for: a, in: range(3), do: recharge}", ["to do something a number of times, write 'repeat: 3'"]),

@@ -91,6 +91,39 @@ def test_each_entry_runs_as_a_component_under_its_name(project: Project) -> None
     assert robot.component_span("rear").line == 8
 
 
+def helps(project: Project, code: str, about: str) -> list[str]:
+    """Return the helps of the findings of a kind whose message has some words."""
+    return [finding.help for finding in project.findings if finding.code == code and about in finding.message]
+
+
+def test_only_an_entry_that_takes_connect_is_told_to_write_it(project: Project) -> None:
+    sensor, lamp = (
+        "  sensor: {type: program, command: [./sensor], publishes: {dusk: std_msgs/Bool}",
+        "lamps: {front: base}",
+    )
+    project.check(BASE + f"{sensor}}}\n{lamp}\n")
+    assert helps(project, "RBX3010", "'/dark'") == ["give 'sensor' the topic that is needed: 'connect: {dusk: dark}'"]
+    project.check(BASE + f"{sensor}, connect: {{dusk: dark}}}}\n{lamp}\n")
+    assert helps(project, "RBX3010", "'/dark'") == []
+    project.check(BASE + "lamps: {front: base, rear: base}\n")
+    assert helps(project, "RBX3010", "'/dark'") == ["add the component that provides it"] * 2
+    assert helps(project, "RBX3015", "'/shines'") == [""]
+    mine = "  mine: {type: program, command: [./mine], publishes: {shines: std_msgs/Bool}, connect: {CONNECT}}\n"
+    project.check(BASE + mine.replace("CONNECT", "") + lamp)
+    told = helps(project, "RBX3015", "'/shines'")
+    assert told == ["give 'mine' another topic: 'connect: {shines: mine/shines}'"]
+    project.check(BASE + mine.replace("CONNECT", "shines: mine/shines") + lamp)
+    assert helps(project, "RBX3015", "") == []
+
+
+def test_only_a_topic_that_an_instance_may_rename_is_told_to_be_renamed(project: Project) -> None:
+    part = "components:\n  sensor: {type: program, command: [./sensor], publishes: {dusk: std_msgs/Bool}}\n"
+    pair = "include:\n  left: ../../parts/lit.yaml\n  right: ../../parts/lit.yaml\n"
+    project.check(pair, {"lit": part + "lamps: {front: sensor}\n"})
+    assert helps(project, "RBX3023", "'/dusk'") == ["give one of them another topic: 'connect: {dusk: right/dusk}'"]
+    assert helps(project, "RBX3023", "'/shines'") == [""]
+
+
 def test_a_component_and_a_lamp_of_one_name_are_a_finding(project: Project) -> None:
     project.check(BASE + "lamps:\n  base: base\n")
     assert told(project) == [("RBX1007", "a component and a lamp are both named 'base'", 5)]

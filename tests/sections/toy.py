@@ -8,7 +8,8 @@ from typing import Annotated
 from rbxcompose.base.config import COMPONENT, Config, Name, PlaceName, Refers
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, Short, WantedComponent, Wiring
-from rbxcompose.sdk import Component, component
+from rbxcompose.msgs.std_msgs import Bool
+from rbxcompose.sdk import Component, In, Out, component
 
 LAMP = "lamp"
 LampName = Annotated[Name, Refers(LAMP)]
@@ -34,7 +35,10 @@ class ToyLampConfig(Config):
 
 @component("toy_lantern")
 class ToyLamp(Component[ToyLampConfig]):
-    """Shines."""
+    """Shines while it is dark."""
+
+    dark = In(Bool, "dark")
+    shines = Out(Bool, "shines")
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:

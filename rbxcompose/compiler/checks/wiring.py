@@ -1,8 +1,9 @@
 """Rules about wires: ports, topics, types, servers, and the order in which components start."""
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 
-from rbxcompose.base.findings import NAMES, WIRING, Finding, Related, Severity, suggest
+from rbxcompose.base.findings import MOST_NAMES, NAMES, WIRING, Finding, Related, Severity, suggest
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.composition.robot_manifest import IncludedPart
 from rbxcompose.compiler.model.build import MISSION
@@ -69,15 +70,30 @@ def _is_command(end: PortEnd) -> bool:
 def _finding(robot: Robot, component: RobotComponent, ends: list[PortEnd]) -> Finding:
     names = " and ".join(f"'{end.topic}'" for end in ends)
     near = [(end, other) for end in ends for other in robot.ends if _fits(end, other)]
-    fix = robot.connection((end, other.topic.strip("/")) for end, other in near)
     topics = [text for end in ends for text in (end.topic, end.topic.strip("/"), end.topic.rpartition("/")[-1])]
     return needed_port.at(
         robot.value_span_of(component.name, *topics) or robot.end_span(ends[0]),
         f"'{component.name}' needs {names}, which nothing in the robot provides",
-        help=f"connect it: {fix}" if fix else f"add the component that provides it{_such_as(ends)}",
+        help=_connected(robot, near) or f"add the component that provides it{_such_as(ends)}",
         related=[Related(robot.end_span(other), f"'{other.topic}' is of this type") for _, other in near],
         about=(component.name, *(end.topic for end in ends)),
     )
+
+
+def _connected(robot: Robot, near: Sequence[tuple[PortEnd, PortEnd]]) -> str:
+    """Return how ports get topics of others, else how one that nobody uses gets theirs; nothing if neither can be."""
+    choices: dict[str, dict[str, PortEnd]] = {}  # by port: the ends that need the topics
+    for end, other in near:
+        choices.setdefault(end.name, {})[other.topic] = end
+    ways = [[(end, topic) for topic, end in choice.items()] for choice in choices.values()]
+    if any(len(way) > 1 for way in ways):  # a map has a key only once
+        fixes = [[robot.connection([one]) for one in way[:MOST_NAMES]] for way in ways]
+        fix = "; ".join(("one of " if len(each) > 1 else "") + ", ".join(each) for each in fixes if all(each))
+    else:
+        fix = robot.connection(one for way in ways for one in way)
+    users = Counter(end.topic for end in robot.ends)
+    idle = ([(other, end.topic)] for end, other in near if users[other.topic] == 1)
+    return f"connect it: {fix}" if fix else robot.parted("the topic that is needed", *idle)
 
 
 def _such_as(ends: list[PortEnd]) -> str:
@@ -104,11 +120,12 @@ def two_publishers(robot: Robot) -> Iterator[Finding]:
         for other in nameless:
             if other.instance == first:
                 continue
-            own = f"{other.name}: {other.instance}/{other.name}"
             yield two_publishers.at(
                 robot.component_span(other.instance),
                 f"'{other.instance}' and '{first}' both publish '{topic}', and its messages do not name their source",
-                help=f"give one of them another topic: 'connect: {{{own}}}'",
+                help=robot.parted(
+                    "another topic", *([(end, f"{end.instance}/{end.name}")] for end in (other, nameless[0]))
+                ),
                 related=[Related(robot.component_span(first), "and this one")],
             )
 
@@ -141,7 +158,9 @@ def two_servers(robot: Robot) -> Iterator[Finding]:
                 robot.component_span(end.instance),
                 f"'{end.instance}' and '{other}' both serve '{end.topic}'",
                 label="this one",
-                help=f"give one of them names of its own: 'connect: {{{_own_names(robot, end, other)}}}'",
+                help=robot.parted(
+                    "names of its own", _own_names(robot, end.instance, other), _own_names(robot, other, end.instance)
+                ),
                 related=[Related(robot.component_span(other), "and this one")],
             )
     for part, earlier in instances.values():
@@ -156,20 +175,22 @@ def _of_instances(robot: Robot, part: IncludedPart, earlier: IncludedPart) -> Fi
     renamed = {
         name: f"{name}_{part.name}" if topic in served else f"{part.name}/{name}" for topic, name in shared.items()
     }
-    names = ", ".join(f"{name}: {new}" for name, new in renamed.items())
+    brought = part.components & robot.components.keys()
+    ours = {end.topic for name in brought for end in robot.components[name].ends if robot.is_renamed(end)}
+    names = ", ".join(f"{name}: {renamed[name]}" for topic, name in shared.items() if topic in ours)
     return two_servers.at(
         part.span,
         f"the instances '{part.name}' and '{earlier.name}' both serve {' and '.join(map(repr, served))}",
-        help=f"give one of them names of its own: 'connect: {{{names}}}'",
+        help=f"give one of them names of its own: 'connect: {{{names}}}'" if ours.issuperset(served) else "",
         related=[Related(earlier.span, f"the instance '{earlier.name}'")],
     )
 
 
-def _own_names(robot: Robot, end: PortEnd, other: str) -> str:
-    """Return what to write below `connect` for all that both instances write or serve."""
+def _own_names(robot: Robot, instance: str, other: str) -> list[tuple[PortEnd, str]]:
+    """Return names of its own for all that an instance writes or serves where another one does, too."""
     theirs = {port.topic for port in robot.components[other].ends if _has_state(port)}
-    both = (port for port in robot.components[end.instance].ends if port.topic in theirs and _has_state(port))
-    return ", ".join(f"{port.name}: {end.instance}/{port.name}" for port in both)
+    both = (port for port in robot.components[instance].ends if port.topic in theirs and _has_state(port))
+    return [(port, f"{instance}/{port.name}") for port in both]
 
 
 def _has_state(end: PortEnd) -> bool:
@@ -188,7 +209,7 @@ def two_skills(robot: Robot) -> Iterator[Finding]:
             yield two_skills.at(
                 robot.end_span(end),
                 f"'{end.topic}' and '{other.topic}' are both the skill '{skill}'",
-                help=f"give one of them another last word: 'connect: {{{end.name}: {skill}_{end.instance}}}'",
+                help=robot.parted("another last word", *([(one, f"{skill}_{one.instance}")] for one in (end, other))),
                 related=[Related(robot.end_span(other), f"that of '{other.instance}'")],
             )
 
@@ -311,12 +332,13 @@ def instance_topics(robot: Robot) -> Iterator[Finding]:
     first: dict[tuple[str, str], str] = {}  # file and topic -> instance
     for part in robot.manifest.parts.values():
         shared_topics = {
-            end.topic: end.port.topic
+            end.topic: end
             for name in part.components & robot.components.keys()
             for end in robot.components[name].ends
             if isinstance(end.port, Out) and not is_command(end)
         }
-        for topic, short in sorted(shared_topics.items()):
+        for topic, end in sorted(shared_topics.items()):
+            short = end.port.topic
             other = robot.manifest.parts[first.setdefault((part.file, topic), part.name)]
             if other is part or short.startswith("/"):
                 continue
@@ -325,7 +347,9 @@ def instance_topics(robot: Robot) -> Iterator[Finding]:
                 yield instance_topics.at(
                     part.span,
                     f"the instances '{part.name}' and '{other.name}' of one part both publish on '{topic}'",
-                    help=f"give one of them another topic: 'connect: {{{short}: {part.name}/{short}}}'",
+                    help=f"give one of them another topic: 'connect: {{{short}: {part.name}/{short}}}'"
+                    if robot.is_renamed(end)
+                    else "",
                     related=[Related(other.span, f"the instance '{other.name}'")],
                 )
 

@@ -1,6 +1,6 @@
 """The typed model of a whole robot: its components with their wires, its skills, values and missions."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import field
 from functools import cached_property
 from typing import Any, TypeVar
@@ -14,8 +14,9 @@ from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.doubts import doubts_of
 from rbxcompose.compiler.sections.values import unknown_place, values
 from rbxcompose.manifest.fill import OpenNames
-from rbxcompose.manifest.registry import naming_in_use, sections_in_use
-from rbxcompose.manifest.tree import KeyPath, ScalarNode, all_nodes, at, key_span, value_span
+from rbxcompose.manifest.registry import naming_in_use, section_named, sections_in_use
+from rbxcompose.manifest.section import Section
+from rbxcompose.manifest.tree import Entry, KeyPath, ScalarNode, all_nodes, at, entries_of, key_span, value_span
 from rbxcompose.missions.analysis.facts import settings_of
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of
@@ -251,14 +252,40 @@ class Robot:
 
     def connection(self, wanted: Iterable[tuple[PortEnd, str]]) -> str:
         """Return what to write so that ports of one component have other topics; nothing if that cannot be."""
+        inside = resolve("x", self.manifest.bus.namespace or "").removesuffix("x")
         given, renamed = [], []
         for end, topic in wanted:
             place = self.components[end.instance].places.get(end.name)
-            if place is None:
-                renamed.append(f"{end.name}: {topic}")
-            elif len(place) > ENTRY:
-                given.append(f"'{'.'.join(map(str, place[ENTRY:]))}: {topic}'")
+            if place is None and self._takes_connect(self.components[end.instance].path):
+                renamed.append(f"{end.name}: {topic.removeprefix(inside)}")
+            elif place is not None and len(place) > ENTRY:
+                given.append(f"'{'.'.join(map(str, place[ENTRY:]))}: {topic.removeprefix(inside)}'")
         return ", ".join([*given, *([f"'connect: {{{', '.join(renamed)}}}'"] if renamed else [])])
+
+    def _takes_connect(self, path: KeyPath) -> bool:
+        """Return whether the entry that requests a component may have the key `connect`."""
+        return any("connect" in section.keys_of(entry) for section, entry in self._requesting(path))
+
+    def is_renamed(self, end: PortEnd) -> bool:
+        """Return whether `connect:` of an instance may name the topic of a port of a component in its part."""
+        component = self.components[end.instance]
+        topics = (one.topics(component.name, entry.value) for one, entry in self._requesting(component.path))
+        return self._takes_connect(component.path) or end.name in component.places or any(map(any, topics))
+
+    def _requesting(self, path: KeyPath) -> Iterator[tuple[Section[Any, Any], Entry]]:
+        """Yield the entry that requests a component, with its section; none if a section as a whole does so."""
+        section = section_named(path[0]) if len(path) == ENTRY else None
+        entry = entries_of(at(self.manifest.root, path[:1])).get(str(path[-1])) if section else None
+        if section and entry:
+            yield section, entry
+
+    def parted(self, what: str, *ways: Collection[tuple[PortEnd, str]]) -> str:
+        """Return what tells two components apart: to give the ports of one `what`, the first way that can be written.
+
+        Nothing if there is none.
+        """
+        found = ((way, fix) for way in ways if (fix := self.connection(way)))
+        return next((f"give '{end.instance}' {what}: {fix}" for [(end, _), *_], fix in found), "")
 
     def component_span(self, name: str) -> Span:
         """Return the place of the name of a component."""

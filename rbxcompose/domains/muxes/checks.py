@@ -561,11 +561,11 @@ def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
 
 
 def _cure(robot: Robot, *ends: PortEnd) -> str:
-    """Return what helps: another type for the one whose type is a setting, else another topic."""
+    """Return what helps: another type for the one whose type is a setting, else another topic, if one may have that."""
     for end, wanted in zip(ends, (ends[1], ends[0]), strict=True):
         if is_written(robot, robot.components[end.instance], TYPE):
             return f"write '{TYPE}: {wanted.type_name.replace('/msg/', '/')}' in '{end.instance}', or another topic"
-    return "give one of them another topic with 'connect:'"
+    return robot.parted("another topic", *([(end, "ANOTHER_NAME")] for end in reversed(ends)))
 
 
 def _name_used_twice(robot: Robot, mux: str, name: str) -> Finding:

@@ -142,6 +142,13 @@ def _called(node: MissionNode) -> str:
     return next(words, "")
 
 
+def _channel(name: str, robot: RobotNames) -> str:
+    """Return how a mission uses a service or a topic of the robot; empty for another name."""
+    if name in robot.services:
+        return f"it is a service: write 'call: {name}', and below it 'request: ...' if it takes one"
+    return f"it is a topic: write 'publish: {name}', and below it 'message: ...'" if name in robot.topics else ""
+
+
 @mission_check("RBX4102", is_fixable=True)
 def unknown_skill(mission: Examined) -> Iterator[findings.Finding]:
     """A mission uses a skill that the robot does not have."""
@@ -154,6 +161,9 @@ def unknown_skill(mission: Examined) -> Iterator[findings.Finding]:
             ours = FOREIGN.get(node.skill.casefold(), "")
             if mission.robot.is_complete or ours or findings.surely_meant(node.skill, known):
                 message = f"mission '{mission.program.name}' uses a skill that the robot does not have: '{node.skill}'"
+                if channel := _channel(node.skill, mission.robot):
+                    yield unknown_skill.at(node.span, message, help=channel, about=[node.skill])
+                    continue
                 if not _WORD.fullmatch(node.skill):
                     message = f"'{node.skill}' is no step"
                     yield unknown_skill.at(

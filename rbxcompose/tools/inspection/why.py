@@ -262,7 +262,8 @@ def _reason(robot: Robot, component: RobotComponent, end: PortEnd) -> str:
         return f"a mux and its inputs are named so ({robot.component_span(component.name)})"
     if namespace and not end.port.topic.startswith("/"):
         return f"that is its own name in the namespace '{namespace}' ({robot.value('bus', 'namespace')})"
-    return f"that is its own name; 'connect: {{{end.name}: ...}}' gives it another one"
+    connection = robot.connection([(end, "...")])
+    return "that is its own name" + (f"; {connection} gives it another one" if connection else "")
 
 
 def _others(robot: Robot, end: PortEnd) -> tuple[str, str]:
