@@ -34,10 +34,11 @@ def served() -> tuple[Samples, Samples]:
 
 
 def rows() -> list[Row]:
-    """Return the time until help is there, until the smallest robot is checked, and until an editor is answered."""
-    shown, checked, bare = in_turns(
+    """Return the time until help is there, until robots are checked, and until an editor is answered."""
+    shown, checked, armed, bare = in_turns(
         program([*COMMAND, "--help"]),
         program([*COMMAND, "check", "robots/turtlebot"]),
+        program([*COMMAND, "check", "robots/pi_robot"]),
         program(BARE),
         rounds=15,
         clock=time.perf_counter,
@@ -63,6 +64,16 @@ def rows() -> list[Row]:
             peer=bare.median * 1e3,
             against="python -c pass",
             most_ratio=10,
+        ),
+        Row(
+            name="`check robots/pi_robot`",
+            unit="ms",
+            how="from start to exit; a robot with an arm, and its profiles",
+            ours=armed.median * 1e3,
+            p99=armed.p99 * 1e3,
+            peer=bare.median * 1e3,
+            against="python -c pass",
+            most_ratio=25,
         ),
         Row(
             name="`lsp`: start",
