@@ -44,7 +44,7 @@ ROOMS: dict[str, Cost] = {
     "domains/devices": Cost(code=1890, files=15, small=0, imports=183),
     "domains/diagnostics": Cost(code=2348, files=23, small=4, imports=210),
     "domains/muxes": Cost(code=2093, files=13, small=1, imports=131),
-    "domains/navigation": Cost(code=3966, files=28, small=2, imports=381),
+    "domains/navigation": Cost(code=3971, files=28, small=2, imports=382),
     "domains/policies": Cost(code=820, files=6, small=0, imports=71),
     "domains/power": Cost(code=439, files=5, small=0, imports=31),
     "domains/programs": Cost(code=3799, files=26, small=0, imports=371),
@@ -62,7 +62,7 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 112021,
+    "lines of code": 112026,
     "files": 757,
     "files of 1 to 30 lines of code": 40,
     "lines of imports": 10316,
