@@ -16,11 +16,12 @@ from benchmarks.bench_robot import up
 from benchmarks.bus_ends import Ours
 from benchmarks.measuring import Row, Samples, timed
 from benchmarks.peers import free_port
+from rbxcompose.base.arrays import Bytes
 from rbxcompose.base.geometry import Pose2, Transform3, quaternion_from_yaw
 from rbxcompose.domains.vision.tags import TagFinder
 from rbxcompose.domains.worlds.optics import TO_OPTICAL, Intrinsics
 from rbxcompose.domains.worlds.shapes import WorldBox, WorldShape
-from rbxcompose.domains.worlds.tag_pictures import GreyPicture, tag_on
+from rbxcompose.domains.worlds.tag_pictures import tag_on
 from rbxcompose.domains.worlds.view import WorldView
 from rbxcompose.domains.worlds.world import SimulatedWorld
 from rbxcompose.msgs.stamps import to_nanoseconds
@@ -67,7 +68,7 @@ def _world(count: int) -> SimulatedWorld:
     return SimulatedWorld(shapes=tuple(shapes))
 
 
-def _grey(view: WorldView, at: Transform3) -> GreyPicture:
+def _grey(view: WorldView, at: Transform3) -> Bytes:
     colours = view.seen(at.compose(TO_OPTICAL), CAMERA, 0.0, 50.0).colours
     return np.asarray(cv2.cvtColor(colours, cv2.COLOR_RGB2GRAY), np.uint8)
 

@@ -85,7 +85,8 @@ def _import_pydantic() -> None:
     sys.modules.setdefault(loader.__name__, loader)
     with _replaced("dataclasses", dataclass=dataclass):
         with _replaced("typing", TypedDict=_Plain), _replaced("typing_extensions", TypedDict=_Plain):
-            import_module("pydantic_core")
+            import_module("pydantic_core.core_schema")
+        import_module("pydantic.fields")
         import_module("pydantic.main")
 
 

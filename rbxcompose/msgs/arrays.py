@@ -7,26 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
+from rbxcompose.base.arrays import AnyArray, np
 from rbxcompose.msgs.definitions import OCTETS, PRIMITIVES, FieldShape, FieldType, attribute, parse_type
 from rbxcompose.msgs.types import Message
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _NO_NUMBERS = ("bool", "string", *OCTETS)
 
 
 @cache
-def zeros(dtype: str, length: int) -> NDArray[Any]:
+def zeros(dtype: str, length: int) -> AnyArray:
     """Return a read-only array of zeros; the same one each time."""
-    import numpy as np
-
     return _read_only(np.zeros(length), dtype)
 
 
-def filled(dtype: str, values: tuple[Any, ...]) -> NDArray[Any]:
+def filled(dtype: str, values: tuple[Any, ...]) -> AnyArray:
     """Return a read-only array of these values."""
     return _read_only(values, dtype)
 
@@ -68,15 +64,11 @@ class ArrayMessage(Message):
         return all(self._is_same(other, attribute(name)) for name in self.FIELDS)
 
     def _is_same(self, other: object, name: str) -> bool:
-        import numpy as np
-
         mine, theirs = getattr(self, name), getattr(other, name)
         return bool(np.array_equal(mine, theirs) if name in self.ARRAYS else mine == theirs)
 
 
-def _read_only(values: Any, dtype: str) -> NDArray[Any]:
-    import numpy as np
-
+def _read_only(values: Any, dtype: str) -> AnyArray:
     if isinstance(values, np.ndarray) and not values.flags.writeable and values.ndim == 1 and values.dtype == dtype:
         return values  # not even its creator can change it
     array = np.array(values, dtype).reshape(-1)

@@ -12,6 +12,7 @@ from functools import partial
 from operator import attrgetter
 from typing import Any, Protocol, TypeVar
 
+from rbxcompose.base.arrays import np
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.arrays import ArrayMessage, holds_numbers
 from rbxcompose.msgs.definitions import OCTETS, FieldShape, FieldType, attribute, parse_type
@@ -248,8 +249,6 @@ class _Array(_Many):
             out += bytes((len(HEADER) - len(out)) % self._size) + value.tobytes()
 
     def read(self, data: _Payload, at: int, values: list[Any]) -> int:
-        import numpy as np
-
         count, at = self._read_count(data, at)
         if count:
             at += (len(HEADER) - at) % self._size

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.msgs.sensor_msgs import PointCloud2, PointField
 
-Points = NDArray[np.float64]
 MOST_POINTS = 10_000_000
 _NUMBERS = {
     PointField.INT8: "i1",
@@ -26,7 +23,7 @@ class CloudError(ValueError):
     """Raised for a message that is no cloud, with the reason."""
 
 
-def points_of(message: PointCloud2) -> Points:
+def points_of(message: PointCloud2) -> Array:
     """Return the points of a cloud [m], of shape (n, 3), in the frame of its header; those that are not finite are left
     out, which is how sensors mark that they see nothing.
 
@@ -37,7 +34,7 @@ def points_of(message: PointCloud2) -> Points:
     return np.asarray(points[np.isfinite(points).all(axis=1)])
 
 
-def rows_of(message: PointCloud2) -> Points:
+def rows_of(message: PointCloud2) -> Array:
     """Return the points of a cloud row by row [m], of shape (height, width, 3), in the frame of its header.
 
     Raises:

@@ -6,6 +6,7 @@ from operator import attrgetter
 from typing import Any
 
 from rbxcompose.base import units
+from rbxcompose.base.arrays import np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.arrays import holds_numbers
@@ -189,6 +190,4 @@ def _all_finite(values: tuple[float, ...]) -> bool:
 
 
 def _is_finite_array(values: Any) -> bool:
-    import numpy as np
-
     return bool(np.isfinite(values).all())

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.base.findings import KINDS, Finding
-from rbxcompose.commands.finding_pages import body_of
+from rbxcompose.base.findings import Finding
+from rbxcompose.commands.finding_pages import body_of, kind_of
 from rbxcompose.compiler.composition.dump import dump_robot
 from rbxcompose.compiler.plan.diff import difference
 from rbxcompose.compiler.plan.dump import dump, load
@@ -99,8 +99,9 @@ def test_each_mistake_in_the_section_is_told_at_its_place(
 
 @pytest.mark.parametrize("number", range(1, 8))
 def test_the_page_of_a_kind_shows_the_mistake_and_its_cure(number: int, tmp_path: Path) -> None:
-    code = f"RBX200{number}"
-    shown = dict(EXAMPLES.findall(body_of(KINDS[code])))
+    kind = kind_of(code := f"RBX200{number}")
+    assert kind is not None
+    shown = dict(EXAMPLES.findall(body_of(kind)))
     robot = ROBOT.replace("urdf: cart.urdf", "xacro: cart.urdf") if code == "RBX2007" else ROBOT
     assert check(tmp_path, robot, cart_urdf=whole(shown["Bad"])).codes == [code]
     assert check(tmp_path, robot, cart_urdf=whole(shown["Good"])).codes == []

@@ -22,7 +22,7 @@ from rbxcompose.domains.worlds.physics.engine import PhysicsWorld
 from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, outline_body
 from rbxcompose.domains.worlds.physics.solids import rotation_matrix
 from rbxcompose.domains.worlds.shapes import WorldShape, outline_of
-from rbxcompose.domains.worlds.world import NO_WALLS, SimulatedWorld
+from rbxcompose.domains.worlds.world import SimulatedWorld, no_walls
 from rbxcompose.domains.worlds.world_file import read_world
 from rbxcompose.manifest.documents import Documents
 from tests.shipped import compiled
@@ -58,7 +58,7 @@ def from_urdf(links_and_joints: str, **options: object) -> PhysicsRobot:
 
 
 def empty(robot: PhysicsRobot, *shapes: WorldShape, start: Pose2 = ORIGIN) -> SimulatedWorld:
-    return SimulatedWorld("empty", NO_WALLS, shapes, start, *outline_of(robot.body))
+    return SimulatedWorld("empty", no_walls(), shapes, start, *outline_of(robot.body))
 
 
 @cache

@@ -21,7 +21,7 @@ from rbxcompose.domains.worlds.shapes import (
     WorldMesh,
     WorldShape,
 )
-from rbxcompose.domains.worlds.world import NO_WALLS, SimulatedWorld, world_message, world_of
+from rbxcompose.domains.worlds.world import SimulatedWorld, no_walls, world_message, world_of
 from rbxcompose.domains.worlds.world_file import world_mesh
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.testing import check_text
@@ -111,7 +111,7 @@ def test_a_mesh_arrives_as_it_was_sent(folder: Path) -> None:
     again = world_of(world_message(SimulatedWorld("", shapes=(table,)), Header()))
     assert again.shapes[0].outlines == table.outlines
     assert again.shapes[0].solid.height == pytest.approx(0.725)
-    assert again.grid is NO_WALLS
+    assert again.grid is no_walls()
 
 
 def test_the_engine_lets_a_mesh_stand_and_fall_by_its_mass(folder: Path) -> None:

@@ -18,7 +18,7 @@ from rbxcompose.base.findings import Report, Span
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.worlds.grid_map import OCCUPIED, UNKNOWN, GridMap
 from rbxcompose.domains.worlds.picture import PictureView, marks_of, placed, png_of, svg_of, view_of
-from rbxcompose.domains.worlds.world import NO_WALLS
+from rbxcompose.domains.worlds.world import no_walls
 from rbxcompose.domains.worlds.world_file import WorldFile, WorldObjectModel, read_world
 from rbxcompose.manifest.documents import Documents
 from tests.conftest import ROOT
@@ -83,7 +83,7 @@ def test_the_walls_of_a_vector_picture_are_the_cells() -> None:
 
 def test_what_moves_is_drawn_where_it_begins_with_its_path() -> None:
     path = [[0, 1.0, 2.0], [5, 3.0, 2.0]]
-    shown = with_grid(NO_WALLS, guard={"shape": "person", "path": path, "colour": "red"})
+    shown = with_grid(no_walls(), guard={"shape": "person", "path": path, "colour": "red"})
     line, area, *_ = marks_of(shown)
     assert line.points.tolist() == [[1.0, 2.0], [3.0, 2.0]]  # type: ignore[union-attr]
     assert np.allclose(area.points.mean(0), (1.0, 2.0))  # type: ignore[union-attr]
@@ -91,7 +91,7 @@ def test_what_moves_is_drawn_where_it_begins_with_its_path() -> None:
 
 def test_a_word_that_is_no_colour_is_drawn_nevertheless_and_never_becomes_markup() -> None:
     for colour in ("sparkling", '"/><script>'):
-        shown = with_grid(NO_WALLS, thing={"box": [1, 1, 1], "colour": colour})
+        shown = with_grid(no_walls(), thing={"box": [1, 1, 1], "colour": colour})
         assert png_of(shown)
         assert "script" not in svg_of(shown)
 

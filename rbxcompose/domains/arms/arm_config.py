@@ -7,16 +7,16 @@ from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
-import numpy as np
 from pydantic import Field
 
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.config import Config
 from rbxcompose.base.geometry import Vector3
 from rbxcompose.base.units import ANGLE, LENGTH, Dimension
 from rbxcompose.domains.arms.motion import collisions
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.figures import SecondChecker
-from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, Array, JointSpace, interpolated
+from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, JointSpace, interpolated
 from rbxcompose.domains.arms.motion.hand_task import PlanningHelper
 from rbxcompose.domains.arms.motion.inverse_kinematics import ANGLE_TOLERANCE, RESTARTS, TOLERANCE, SolverSettings
 from rbxcompose.domains.arms.motion.numba_cache import is_installed, keep_libraries

@@ -16,9 +16,7 @@ from collections.abc import Callable, Sequence
 from itertools import combinations
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Finding, kind
@@ -34,7 +32,6 @@ from rbxcompose.domains.worlds.physics.solids import quaternion_of, rotation_mat
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm
 from rbxcompose.sdk.bound import Ended, Outcome
 
-Numbers = NDArray[np.float64]
 LEAST = 3  # pairs
 TURNED = math.radians(8)  # by which a hand turns about each of two axes, root mean square over all pairs of poses
 PER_TURN = 0.2  # an error of 1 rad counts as one of so many metres
@@ -96,9 +93,9 @@ def measured(pairs: Sequence[HandSight]) -> HandEye:
         camera = _rotation(-left[:, 0])
     rows = np.concatenate([np.hstack((np.eye(3), -hand)) for hand in hands])
     both, *_ = np.linalg.lstsq(rows, (hand_at - tag_at @ camera.T).ravel(), rcond=None)
-    found: list[tuple[Numbers, Numbers]] = [(camera, np.asarray(both[:3], float)), (tag, np.asarray(both[3:], float))]
+    found: list[tuple[Array, Array]] = [(camera, np.asarray(both[:3], float)), (tag, np.asarray(both[3:], float))]
 
-    def misses(change: Numbers) -> Numbers:
+    def misses(change: Array) -> Array:
         (turn_x, at_x), (turn_y, at_y) = (_moved(*one, change[6 * n : 6 * n + 6]) for n, one in enumerate(found))
         away = hand_at + hands @ at_y - (at_x + tag_at @ turn_x.T)
         turned = np.swapaxes(turn_x @ tags, 1, 2) @ hands @ turn_y
@@ -143,7 +140,7 @@ class StandingHand:
         return True
 
 
-def _prove_turned(hands: Numbers) -> None:
+def _prove_turned(hands: Array) -> None:
     """Raise an error unless hands with rotations (n, 3, 3) have turned enough, and about two axes."""
     turns = np.array([_vector(other @ one.T) for one, other in combinations(hands, 2)])
     _, second, most = np.sqrt(np.maximum(0.0, np.linalg.eigvalsh(turns.T @ turns / len(turns)))).tolist()
@@ -158,7 +155,7 @@ def _prove_turned(hands: Numbers) -> None:
         )
 
 
-def _rotation(vector: Numbers) -> Numbers:
+def _rotation(vector: Array) -> Array:
     """Return the rotation (3, 3) nearest to a matrix, given column by column and by some factor (9,)."""
     matrix = vector.reshape(3, 3).T
     matrix = matrix * np.sign(np.linalg.det(matrix))
@@ -166,7 +163,7 @@ def _rotation(vector: Numbers) -> Numbers:
     return np.asarray(left @ right)
 
 
-def _moved(turn: Numbers, at: Numbers, change: Numbers) -> tuple[Numbers, Numbers]:
+def _moved(turn: Array, at: Array, change: Array) -> tuple[Array, Array]:
     """Return a rotation (3, 3) and a position, changed by a translation and by a rotation about fixed axes (6,)."""
     x, y, z = change[3:]
     angle = float(np.linalg.norm(change[3:]))
@@ -175,7 +172,7 @@ def _moved(turn: Numbers, at: Numbers, change: Numbers) -> tuple[Numbers, Number
     return (np.eye(3) + sine * cross + versine * cross @ cross) @ turn, at + change[:3]
 
 
-def _vector(turn: Numbers) -> Numbers:
+def _vector(turn: Array) -> Array:
     """Return a rotation (3, 3) as its axis times its angle (3,)."""
     x, y, z, w = quaternion_of(turn)
     sine = math.sqrt(x * x + y * y + z * z)
@@ -197,7 +194,7 @@ def _mean(poses: Sequence[Transform3]) -> Transform3:
     return Transform3(_three(np.array([pose.translation for pose in poses]).mean(0)), (x, y, z, w))
 
 
-def _three(vector: Numbers) -> tuple[float, float, float]:
+def _three(vector: Array) -> tuple[float, float, float]:
     x, y, z = vector.tolist()
     return x, y, z
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, TypeVar
 
-import numpy as np
 from pydantic import Field
 
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.config import Angle, Config, Length, Ratio, Speed
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Report, clauses, kind, suggest
@@ -20,7 +20,6 @@ from rbxcompose.commands.targets import compiled, missing_extras, robot_path
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
 from rbxcompose.domains.arms.motion.arm_task import unknown_joint
-from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms
 from rbxcompose.domains.arms.sections.scene import scene
 from rbxcompose.domains.body.description import Description

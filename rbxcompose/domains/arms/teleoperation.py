@@ -14,14 +14,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, conjugate, multiply, rotate
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
-from rbxcompose.domains.arms.motion.groups import Array, interpolated
+from rbxcompose.domains.arms.motion.groups import interpolated
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget
 from rbxcompose.domains.arms.motion.parametrisation import MARGIN, Trajectory, speeds_of
 from rbxcompose.domains.arms.motion.planner import MotionPlanner
@@ -46,7 +45,6 @@ LOOK = 0.5  # [s] ahead that is examined; what is nearer slows down
 SHARES = (1.0, 0.5, 0.2)  # of a velocity, which are tried one after the other
 SINGULAR = 0.01  # least singular value over the greatest, below which the arm is not led
 DAMPING = 0.01  # of the inverse of the Jacobian
-WEIGHTS = np.array((1.0, 1.0, 1.0, TURN, TURN, TURN))  # [1, m/rad] of what the tip does
 SLOWEST = 1e-6  # share of the greatest speeds, below which a joint is at rest
 LOST = 0.25  # [rad or m] of the joints from where they were sent, more than servos are behind
 ROOM = 0.01  # [rad or m] that is left to limits of joints
@@ -109,6 +107,7 @@ class TipServo:
         fast, self._hard = speeds_of(self._space, 1.0, 1.0)
         self._fast = fast * MARGIN
         self._hard = self._hard * MARGIN
+        self._weights = np.array((1.0, 1.0, 1.0, TURN, TURN, TURN))  # [1, m/rad] of what the tip does
         self._lower, self._upper = self._space.lower + ROOM, self._space.upper - ROOM
         self._motion: ServoMotion | None = None
         self._is_stopping = False  # the last motion only leads to rest
@@ -177,12 +176,12 @@ class TipServo:
         rows = slice(0, 6 if len(position) >= 6 or twist[3:].any() else 3)
         left, sizes, right = np.linalg.svd(self._jacobian(position)[rows], full_matrices=False)
         damped = sizes / (sizes**2 + (DAMPING * max(float(sizes[0]), DAMPING)) ** 2)
-        found = np.asarray(right.T @ (damped * (left.T @ (twist * WEIGHTS)[rows])))
+        found = np.asarray(right.T @ (damped * (left.T @ (twist * self._weights)[rows])))
         fastest = float(np.max(np.abs(found) / self._fast))
         return found / max(1.0, fastest) if fastest > SLOWEST else np.zeros(len(position))
 
     def _jacobian(self, position: Array) -> Array:
-        return np.asarray(self._kinematics.tip(position, with_jacobian=True)[2] * WEIGHTS[:, None])
+        return np.asarray(self._kinematics.tip(position, with_jacobian=True)[2] * self._weights[:, None])
 
     def _ratio(self, position: Array) -> float:
         """Return the least singular value over the greatest: 0 at a singularity."""

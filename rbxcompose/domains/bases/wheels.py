@@ -6,9 +6,7 @@ import math
 from collections import deque
 from dataclasses import astuple, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import AT_REST, Pose2, Transform3, Velocity2
 from rbxcompose.domains.bases.driving import ABSURD
@@ -264,9 +262,6 @@ def _scaled(velocity: Velocity2, factor: float) -> Velocity2:
     return Velocity2(velocity.linear * factor, velocity.angular * factor)
 
 
-Covariance = NDArray[np.float64]
-
-
 @dataclass(frozen=True, slots=True)
 class OdometryPolicy:
     """How far odometry is trusted."""
@@ -292,8 +287,8 @@ class WheelOdometry:
         self.geometry, self.policy = geometry, policy
         self.pose = pose or Pose2()
         self.velocity = AT_REST
-        self.covariance: Covariance = np.zeros((3, 3))  # of x [m], y [m], heading [rad]
-        self.velocity_covariance: Covariance = np.zeros((2, 2))  # of linear [m/s], angular [rad/s]
+        self.covariance: Array = np.zeros((3, 3))  # of x [m], y [m], heading [rad]
+        self.velocity_covariance: Array = np.zeros((2, 2))  # of linear [m/s], angular [rad/s]
         self._last: tuple[float, float, float] | None = None  # left, right, time
         self._ways = (0.0, 0.0)  # of the wheels so far [m]
         self._past: deque[tuple[float, float, float]] = deque()  # time and ways, over the window
@@ -390,7 +385,7 @@ def _place(known: WheelOdometry) -> geometry.Transform:
     return transform_message(Transform3.from_pose2(known.pose))
 
 
-def planar(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+def planar(covariance: Array) -> Array:
     """Return the 36 numbers of a covariance of x, y and the turn about z; the others are unknown."""
     whole = np.diag([UNKNOWN] * 6)
     whole[np.ix_(PLANAR, PLANAR)] = covariance

@@ -10,8 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
 
-import numpy as np
-
+from rbxcompose.base.arrays import np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.printable import columns, fitted, plain
 from rbxcompose.base.units import ANGLE, LENGTH, NUMBER, Dimension, UnitError, example, format_number, parse_quantity

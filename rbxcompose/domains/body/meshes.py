@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, Ints, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import Finding, kind
@@ -51,7 +49,6 @@ def need(what: str, *names: str, extra: str = "picture") -> None:
 
 
 Trimesh = Any  # of an extra, which may be missing
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +56,7 @@ class Solid:
     """Triangles: `vertices` [m], three of them for each of `faces`, and `colours`: red, green, blue from 0 to 1."""
 
     vertices: Array
-    faces: NDArray[np.int64]
+    faces: Ints
     colours: Array
 
 

@@ -9,9 +9,7 @@ from itertools import cycle
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.geometry import Transform3, rotate
 from rbxcompose.domains.body.meshes import GREY, Solid, Trimesh, joined, need, read_mesh
 from rbxcompose.domains.body.model import Body, Geometry
@@ -105,9 +103,6 @@ def _plain(shape: Trimesh, colour: tuple[float, ...] = GREY) -> Solid:
 def _mesh(geometry: Geometry, path: Path) -> Solid:
     solid = read_mesh(path, geometry.file)
     return Solid(solid.vertices * geometry.size, solid.faces, solid.colours)
-
-
-Array = NDArray[np.float64]
 
 
 def draw(body: Body, positions: Mapping[str, float], meshes: Mapping[str, Path]) -> bytes:

@@ -10,14 +10,11 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.body.description import Description
 
 Pinocchio = Any  # of an extra, without types
-Array = NDArray[np.float64]
 
 
 class PinocchioModel:

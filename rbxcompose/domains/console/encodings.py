@@ -9,8 +9,7 @@ from collections.abc import Iterator, Mapping
 from io import BytesIO
 from typing import Any
 
-import numpy as np
-
+from rbxcompose.base.arrays import np
 from rbxcompose.domains.console.json_messages import to_json
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.definitions import OCTETS, FieldShape, attribute, parse_type

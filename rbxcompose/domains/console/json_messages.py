@@ -10,8 +10,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any, TypeVar
 
-import numpy as np
-
+from rbxcompose.base.arrays import np
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.builtin_interfaces import Time
 from rbxcompose.msgs.definitions import FLOATS, INTEGERS, OCTETS, FieldShape, FieldType, attribute, parse_type

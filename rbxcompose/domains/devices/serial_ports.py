@@ -27,7 +27,7 @@ _NAMED = re.compile(
     re.DOTALL,
 )
 _SPACES = re.compile(r"\s+")
-_REPLACED = re.compile(r"[^0-9A-Za-z#+.:=@_\x80-\U0010ffff-]")
+_REPLACED = re.compile(r"(?![0-9A-Za-z#+.:=@_-])[\x00-\x7f]")
 _RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
 SLOW = 0.001  # [s] of an adapter's latency timer above which it delays every reply
 NO_PORT = kind("RBX2201")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from rbxcompose.base.arrays import np
 from rbxcompose.base.config import Place
 from rbxcompose.base.findings import NAMES, WIRING, Finding, Severity, Span
 from rbxcompose.base.geometry import Pose2, wrap_angle
@@ -12,7 +13,9 @@ from rbxcompose.base.units import FREQUENCY, LENGTH, TIME, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
 from rbxcompose.domains.body.sections.body import body
+from rbxcompose.domains.navigation.costs import CostZone
 from rbxcompose.domains.navigation.sections.navigation import GO_TO, NavigationOfRobot, navigation
+from rbxcompose.domains.worlds.contact import MAP, outside_polygon, overlap
 from rbxcompose.domains.worlds.sections.world import WorldOfRobot, world
 from rbxcompose.domains.worlds.shapes import Point2, PolygonFootprint, hull_of, outline_of, sections_of
 from rbxcompose.manifest.tree import at
@@ -42,7 +45,6 @@ def place_cut_off(robot: Robot) -> Iterator[Finding]:
     places = {name: place for name, place in robot.manifest.places.items() if not _why_not(found, around, place)}
     if not places:
         return
-    from rbxcompose.domains.navigation.costs import CostZone  # imports numpy
     from rbxcompose.domains.navigation.reach import ReachableAreas
 
     model = found.model
@@ -136,8 +138,6 @@ def zone_beside_map(robot: Robot) -> Iterator[Finding]:
     """A zone covers nothing of the map."""
     if (found := _navigation(robot)) is None or not found.zones:
         return
-    from rbxcompose.domains.navigation.costs import CostZone  # imports numpy
-
     rows, columns = found.grid.cells.shape
     low, high = (_point((x, y)) for x, y in found.grid.to_points([(0, 0), (columns, rows)]).tolist())
     for zone in found.zones:
@@ -216,10 +216,6 @@ def _beyond(footprint: PolygonFootprint, corners: tuple[Point2, ...]) -> float:
     """Return how far some points of the frame of a robot are outside of its footprint [m]; 0 if none is."""
     if not corners:
         return 0.0
-    import numpy as np
-
-    from rbxcompose.domains.worlds.contact import outside_polygon
-
     return float(outside_polygon(footprint, np.array(corners)).max())
 
 
@@ -231,8 +227,6 @@ def _written(robot: Robot, name: str) -> Span:
 
 def _why_not(found: NavigationOfRobot, around: WorldOfRobot | None, place: Place) -> str:
     """Return why a robot cannot stand at a place; nothing if it can."""
-    from rbxcompose.domains.worlds.contact import MAP, overlap  # imports numpy
-
     column, row = found.grid.to_cells((place.x, place.y)).tolist()
     rows, columns = found.grid.cells.shape
     if not (0 <= column < columns and 0 <= row < rows):

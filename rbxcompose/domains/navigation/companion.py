@@ -11,8 +11,7 @@ import math
 from collections.abc import Sequence
 from enum import StrEnum
 
-import numpy as np
-
+from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
 from rbxcompose.domains.bases.driving import GoToCore, GoToSettings
 from rbxcompose.domains.navigation.costs import LayeredCosts

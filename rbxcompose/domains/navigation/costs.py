@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
+from rbxcompose.base.arrays import AnyArray, Array, ArrayLike, Bools, Bytes, Indices, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.worlds.contact import in_polygon, outside_polygon
@@ -24,9 +22,6 @@ LEAST = 0.02  # [m^2] of what moves
 ROUNDING = 1e-4  # [m] of clearances
 TURNED = 1000 * math.tau  # [rad] that no angle of a scan reaches
 FAR = 1e6  # [cells] to an obstacle if there is none
-
-Costs8 = NDArray[np.uint8]
-Numbers = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +53,7 @@ class CostZone:
     corners: tuple[Point2, ...]
     share: float = 0.0
 
-    def cells(self, grid: GridMap) -> NDArray[np.bool_]:
+    def cells(self, grid: GridMap) -> Bools:
         """Return which cells of a map have their middles in it."""
         rows, columns = grid.cells.shape
         middles = grid.to_points(np.stack(np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5), -1))
@@ -71,9 +66,9 @@ class TracedScan:
 
     rows: slice
     columns: slice
-    passed: NDArray[np.bool_]
+    passed: Bools
     """Which cells of these rows and columns rays pass."""
-    ends: tuple[NDArray[np.intp], NDArray[np.intp]]
+    ends: tuple[Indices, Indices]
     """Rows and columns of the cells in which rays end."""
 
 
@@ -122,7 +117,7 @@ class LayeredCosts:
     def __init__(self, grid: GridMap, settings: CostSettings, zones: Sequence[CostZone] = ()) -> None:
         self.grid, self.settings = grid, settings
         self._walls = grid.cells >= SOLID
-        self._zones: dict[str, NDArray[np.bool_]] = {}  # to keep out of
+        self._zones: dict[str, Bools] = {}  # to keep out of
         self._unknown = grid.cells == UNKNOWN
         self.shares = np.ones(grid.cells.shape)
         """Of the speed, in each cell."""
@@ -132,16 +127,16 @@ class LayeredCosts:
                 self.shares[inside] = np.minimum(self.shares[inside], zone.share)
             else:
                 self._zones[zone.name] = inside | self._zones.get(zone.name, False)
-        self._lasting: NDArray[np.bool_] = np.any([self._walls, *self._zones.values()], 0)
-        self._marks: NDArray[np.bool_] = np.zeros(grid.cells.shape, bool)
+        self._lasting: Bools = np.any([self._walls, *self._zones.values()], 0)
+        self._marks: Bools = np.zeros(grid.cells.shape, bool)
         self._free = np.zeros(grid.cells.shape, bool)  # passed by a ray since it was marked
         self._past = [(self._marks, self._free)] * 2  # what they were one to two `RECENT` ago, and up to one
         self._kept = -math.inf  # [s] at which the latter was kept
-        self.moving: Numbers = np.empty((0, 2))
+        self.moving: Array = np.empty((0, 2))
         """Points (n, 2) of `map` [m] near to the sensor, at which it sees something where nothing was a second ago."""
-        self.away: Numbers = np.zeros(grid.cells.shape)
+        self.away: Array = np.zeros(grid.cells.shape)
         """How far the middle of each cell is from that of the nearest obstacle [m], exactly up to the inflation."""
-        self.values: Costs8 = np.zeros(grid.cells.shape, np.uint8)
+        self.values: Bytes = np.zeros(grid.cells.shape, np.uint8)
         self._samples = _samples(settings.outline, grid.resolution)
         self._inflate(slice(None), slice(None))
 
@@ -210,14 +205,14 @@ class LayeredCosts:
         """Return whether the map or a zone always keeps the robot from a point of `map` [m]."""
         return bool(self._at(self._lasting, x, y, False))
 
-    def clearance(self, poses: Numbers) -> float:
+    def clearance(self, poses: Array) -> float:
         """Return how near to something the robot comes [m] at poses (n, 3) in `map` [m], [rad]; below 0 it touches it.
 
         Ways keep off further, by up to the side of a cell: who follows one may be a little off.
         """
         return self._clearance(poses, self.away)
 
-    def comes_nearer(self, pose: Pose2, poses: Sequence[Pose2] | Numbers, least: float) -> bool:
+    def comes_nearer(self, pose: Pose2, poses: Sequence[Pose2] | Array, least: float) -> bool:
         """Return whether less than `least` [m] is left to something at some poses, and less than at a pose before.
 
         So a robot may leave what it is too near to. Each zone counts by itself, as all things do: a robot within a zone
@@ -234,7 +229,7 @@ class LayeredCosts:
         near = self._clearances(rows_of(Pose2(x, y)))
         return min(near, key=lambda name: near[name][0])
 
-    def _clearances(self, *parts: Numbers) -> dict[str, list[float]]:
+    def _clearances(self, *parts: Array) -> dict[str, list[float]]:
         """Return the clearances of some poses each from all things, which have no name, and from each zone to keep out
         of; large ones if they are farther away than the robot extends."""
         cells = self.grid.to_cells(np.concatenate(parts)[:, :2])
@@ -248,7 +243,7 @@ class LayeredCosts:
             for name, found in solid.items()
         }
 
-    def _clearance(self, poses: Numbers, distances: Numbers, first: NDArray[np.intp] | float = 0) -> float:
+    def _clearance(self, poses: Array, distances: Array, first: Indices | float = 0) -> float:
         """Return the clearance of poses, given how far [m] cells are from something: those from the `first` one on, at
         (column, row)."""
         from scipy.ndimage import map_coordinates
@@ -270,7 +265,7 @@ class LayeredCosts:
         """Return how near to something the robot comes at some poses [m]."""
         return self.clearance(rows_of(*poses))
 
-    def room_at(self, points: Numbers) -> float:
+    def room_at(self, points: Array) -> float:
         """Return the radius of the largest circle for which there is room at each of some points (n, 2) of `map` [m].
 
         Without obstacles up to the inflation, it is larger than that.
@@ -282,7 +277,7 @@ class LayeredCosts:
         return float(away.min()) - math.sqrt(0.5) * self.grid.resolution
 
     @property
-    def solid(self) -> NDArray[np.bool_]:
+    def solid(self) -> Bools:
         """Return which cells something is in."""
         return self._lasting | self._marks
 
@@ -300,7 +295,7 @@ class LayeredCosts:
         """Return the share of the speed at a point of `map` [m]."""
         return float(self._at(self.shares, x, y, 1.0))
 
-    def _at(self, table: NDArray[Any], x: float, y: float, beside: float) -> Any:
+    def _at(self, table: AnyArray, x: float, y: float, beside: float) -> Any:
         """Return what a table has at a point of `map` [m]: for one point, faster than `look_up`."""
         row, column = self.cell_of(x, y)
         rows, columns = table.shape
@@ -327,19 +322,19 @@ class LayeredCosts:
         self.values[rows, columns] = found.astype(np.uint8)
 
 
-def rows_of(*poses: Pose2) -> Numbers:
+def rows_of(*poses: Pose2) -> Array:
     """Return poses as an array (n, 3): [m], [m], [rad]."""
     return np.array([(at.x, at.y, at.heading) for at in poses]).reshape(-1, 3)
 
 
-def distances(solid: NDArray[np.bool_]) -> Numbers:
+def distances(solid: Bools) -> Array:
     """Return how far the middle of each cell is from that of the nearest solid one [cells]."""
     from scipy.ndimage import distance_transform_edt
 
     return np.asarray(distance_transform_edt(~solid)) if solid.any() else np.full(solid.shape, FAR)
 
 
-def _samples(outline: PolygonFootprint | None, side: float) -> Numbers:
+def _samples(outline: PolygonFootprint | None, side: float) -> Array:
     """Return circles (n, 3) which nearly cover a robot, in its frame: x, y and radius [m].
 
     Those of radius 0 are on its rim: what is outside is near to one of them. The others find what is inside.
@@ -359,9 +354,7 @@ def _samples(outline: PolygonFootprint | None, side: float) -> Numbers:
     return np.column_stack((found, np.concatenate((np.zeros(len(found) - inside.sum()), within[inside]))))
 
 
-def _passed(
-    shape: tuple[int, ...], corner: tuple[float, float], side: float, angles: Numbers, lengths: Numbers
-) -> NDArray[np.bool_]:
+def _passed(shape: tuple[int, ...], corner: tuple[float, float], side: float, angles: Array, lengths: Array) -> Bools:
     """Return which cells have a middle that rays pass by less than half of the angle between two of them.
 
     `corner` is where the first cell begins, seen from the sensor, as (row, column) [cells]; `lengths` are in metres.

@@ -6,12 +6,11 @@ from __future__ import annotations
 import math
 from enum import StrEnum
 
-import numpy as np
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2, wrap_angle
 from rbxcompose.domains.bases.driving import GoToCore, GoToSettings
-from rbxcompose.domains.navigation.costs import INSCRIBED, LayeredCosts, Numbers
+from rbxcompose.domains.navigation.costs import INSCRIBED, LayeredCosts
 from rbxcompose.domains.navigation.planner import PlannedPath
 
 ASIDE = math.radians(50)  # bearing of the way ahead above which the robot turns on the spot
@@ -306,14 +305,14 @@ def _near(wanted: float, now: float, change: float) -> float:
     return min(max(wanted, now - change), now + change)
 
 
-def _arc(pose: Pose2, velocity: Velocity2, times: Numbers) -> Numbers:
+def _arc(pose: Pose2, velocity: Velocity2, times: Array) -> Array:
     """Return where a robot is after some times [s]: poses (n, 3) in `map` [m], [rad]."""
     half = velocity.angular * times / 2
     chord, along = velocity.linear * times * np.sinc(half / math.pi), pose.heading + half
     return np.stack((pose.x + chord * np.cos(along), pose.y + chord * np.sin(along), along + half), -1)
 
 
-def _swept(pose: Pose2, angle: float, costs: LayeredCosts) -> Numbers:
+def _swept(pose: Pose2, angle: float, costs: LayeredCosts) -> Array:
     """Return poses (n, 3) during a turn on the spot between which no point of the robot moves by more than a cell."""
     count = max(1, math.ceil(abs(angle) * costs.settings.reach / costs.grid.resolution))
     headings = pose.heading + angle * np.arange(1, count + 1) / count

@@ -13,9 +13,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, Bools, Ints32, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.navigation.costs import LayeredCosts
@@ -34,9 +32,6 @@ TURN = 50.0  # cost of a turn from one heading to the next: that of a cell where
 KEPT = 0.012  # [m] to everything: a little more than those who follow the way
 TOUCHED = 1000.0  # of a state in which the robot touches something
 
-Grid = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-Indices = NDArray[np.int32]
 Cell = tuple[int, int]
 
 
@@ -48,7 +43,7 @@ class LatticeWay:
     misses: float
 
 
-def search(costs: LayeredCosts, weights: Grid, outline: PolygonFootprint, start: Pose2, goal: Pose2) -> LatticeWay:
+def search(costs: LayeredCosts, weights: Array, outline: PolygonFootprint, start: Pose2, goal: Pose2) -> LatticeWay:
     """Return the cheapest way to the cell and heading of a goal, or to the state of its heading that is nearest to it.
 
     `weights` (rows, columns) are what it costs to cross each cell, -1 where the robot must not be at any heading. A
@@ -86,7 +81,7 @@ def margin(side: float) -> float:
 class _States:
     """The states of a map, numbered; its cells are counted with a margin of one, row by row."""
 
-    def __init__(self, costs: LayeredCosts, weights: Grid, outline: PolygonFootprint, start: Pose2) -> None:
+    def __init__(self, costs: LayeredCosts, weights: Array, outline: PolygonFootprint, start: Pose2) -> None:
         self._turned = costs.grid.origin.heading
         around = np.pad(weights, 1, constant_values=-1.0)
         self.width, self._weights = around.shape[1], around.ravel()
@@ -125,9 +120,9 @@ class _States:
         """Return the number of the state that is nearest to a heading in a cell."""
         return int(self.numbers[self.heading_at(heading), (cell[0] + 1) * self.width + cell[1] + 1])
 
-    def edges(self) -> tuple[Grid, tuple[Indices, Indices]]:
+    def edges(self) -> tuple[Array, tuple[Ints32, Ints32]]:
         """Return what each motion costs, and the states between which it leads."""
-        found: list[tuple[Grid, Indices, Indices]] = []
+        found: list[tuple[Array, Ints32, Ints32]] = []
         for heading, (up, right) in enumerate(STEPS):
             numbers, step = self.numbers[heading], up * self.width + right
             cells = np.flatnonzero(numbers >= 0)

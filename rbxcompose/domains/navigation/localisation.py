@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
+from rbxcompose.base.arrays import Array, ArrayLike, Bools, Indices, Ints, Singles, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.worlds.grid_map import SOLID, GridMap
@@ -25,10 +23,6 @@ HALVINGS = 12  # of the interval in which a scan's power is searched
 AT_ONCE = 500  # particles
 CANDIDATES = 5000  # poses at random among which a scan may find the robot again
 RARE = 1e-9  # of the belief that it is elsewhere: people and furniture alone shall hardly prove that
-
-Poses = NDArray[np.float64]
-Numbers = NDArray[np.float64]
-Singles = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,19 +156,19 @@ class ParticleFilter:
         return self.correction.compose(self._odometry or Pose2())
 
     @property
-    def poses(self) -> Poses:
+    def poses(self) -> Array:
         """Return the particles (n, 3) as x, y [m] and heading [rad] in `map`."""
         step = self._step()
         return _moved(self._poses, step.x, step.y, step.heading)
 
     @property
-    def covariance(self) -> Numbers:
+    def covariance(self) -> Array:
         """Return the covariance (3, 3) of x, y and heading of all particles around the pose [m^2, m rad, rad^2]."""
         away = self.poses - (self.pose.x, self.pose.y, self.pose.heading)
         away[:, 2] = _wrapped(away[:, 2])
         return away.T @ away / len(away)
 
-    def _begin(self, poses: Poses, estimate: Pose2) -> None:
+    def _begin(self, poses: Array, estimate: Pose2) -> None:
         self._poses = poses
         self._is_due = True
         self._slow = self._fast = self.settings.hit * math.exp(-0.5) + self.settings.random  # at one sigma: it fits
@@ -182,7 +176,7 @@ class ParticleFilter:
         self._sampled = self._odometry or Pose2()
         self.correction = estimate.compose(self._sampled.inverse())
 
-    def _anywhere(self, count: int) -> Poses:
+    def _anywhere(self, count: int) -> Array:
         cells = self._free[self._random.integers(len(self._free), size=count)]
         spots = self.grid.to_points(cells[:, ::-1] + self._random.random((count, 2)))
         return np.column_stack((spots, self._random.uniform(-math.pi, math.pi, count)))
@@ -220,7 +214,7 @@ class ParticleFilter:
         self._fast += settings.fast * (likelihood - self._fast)
         return max(0.0, 1 - self._fast / self._slow)
 
-    def _enough(self, poses: Poses, weights: Numbers) -> int:
+    def _enough(self, poses: Array, weights: Array) -> int:
         """Return how many particles to draw: with the bins that they fill, more are needed (Fox's bound)."""
         settings = self.settings
         draws = self._random.choice(len(weights), settings.most, p=weights)
@@ -233,12 +227,12 @@ class ParticleFilter:
         is_enough = np.arange(1, settings.most + 1) >= np.maximum(needed, settings.least)
         return int(is_enough.argmax()) + 1 if is_enough.any() else settings.most
 
-    def _drawn(self, weights: Numbers, count: int) -> NDArray[np.intp]:
+    def _drawn(self, weights: Array, count: int) -> Indices:
         """Return as many indices, by weight: systematically, which adds the least noise."""
         steps = (np.arange(count) + self._random.random()) / max(1, count)
         return np.minimum(np.searchsorted(np.cumsum(weights), steps), len(weights) - 1)
 
-    def _echoes(self, sensor: Pose2, angles: Numbers, ranges: Numbers) -> Singles:
+    def _echoes(self, sensor: Pose2, angles: Array, ranges: Array) -> Singles:
         """Return the points (n, 2) in the base [m] at which some rays end."""
         with np.errstate(invalid="ignore"):
             echoes = np.flatnonzero((ranges > 0) & (ranges <= self.settings.farthest) & np.isfinite(angles))
@@ -248,12 +242,12 @@ class ParticleFilter:
         x, y = sensor.x + ranges[echoes] * np.cos(along), sensor.y + ranges[echoes] * np.sin(along)
         return np.stack((x, y), -1).astype(np.float32)
 
-    def _fits(self, poses: Poses, points: Singles) -> Singles:
+    def _fits(self, poses: Array, points: Singles) -> Singles:
         """Return the logarithm of a scan's likelihood for each pose; some at once, so that they stay in the cache."""
         parts = range(0, len(poses), AT_ONCE)
         return np.concatenate([self._look_up(poses[at : at + AT_ONCE], points).sum(1) for at in parts])
 
-    def _look_up(self, poses: Poses, points: Singles) -> Singles:
+    def _look_up(self, poses: Array, points: Singles) -> Singles:
         """Return the logarithms of likelihoods (poses, points) of echoes that particles have at points of the base."""
         side, table = self.grid.resolution, self._table
         column, row = self.grid.to_cells(poses[:, :2]).T
@@ -286,7 +280,7 @@ def _log_likelihoods(grid: GridMap, settings: LocalisationSettings) -> Singles:
     return np.log(likelihoods).astype(np.float32)
 
 
-def _tempered(fits: Singles, priors: Numbers) -> Numbers:
+def _tempered(fits: Singles, priors: Array) -> Array:
     """Return weights with a sum of 1 by logarithms of likelihoods, and weights before.
 
     Echoes are not as independent as a product of their likelihoods takes them for. A scan that would leave too few
@@ -294,7 +288,7 @@ def _tempered(fits: Singles, priors: Numbers) -> Numbers:
     """
     below = (fits - fits.max()).astype(float)
 
-    def weights(power: float) -> Numbers:
+    def weights(power: float) -> Array:
         found = priors * np.exp(power * below)
         return np.asarray(found / found.sum())
 
@@ -308,7 +302,7 @@ def _tempered(fits: Singles, priors: Numbers) -> Numbers:
     return weights(low)
 
 
-def _moved(poses: Poses, x: Numbers | float, y: Numbers | float, turn: float, error: Numbers | float = 0.0) -> Poses:
+def _moved(poses: Array, x: Array | float, y: Array | float, turn: float, error: Array | float = 0.0) -> Array:
     """Return poses after a motion in the base, with an error of the heading that grows evenly on the way."""
     heading = poses[:, 2] + error / 2
     cos, sin = np.cos(heading), np.sin(heading)
@@ -316,18 +310,18 @@ def _moved(poses: Poses, x: Numbers | float, y: Numbers | float, turn: float, er
     return np.column_stack((poses[:, 0] + cos * x - sin * y, poses[:, 1] + sin * x + cos * y, turned))
 
 
-def _wrapped(angles: Numbers) -> Numbers:
+def _wrapped(angles: Array) -> Array:
     """Return angles [rad] within (-pi, pi]."""
     return np.asarray(math.pi - np.remainder(math.pi - angles, math.tau))
 
 
-def _bins(poses: Poses) -> NDArray[np.int64]:
+def _bins(poses: Array) -> Ints:
     """Return the number of the bin of each pose."""
     x, y, turn = np.floor(poses / (BIN, BIN, TURN_BIN)).astype(np.int64).T
     return np.asarray((x * (1 << 20) + y) * (1 << 6) + turn)
 
 
-def _clustered(poses: Poses, weights: Numbers, before: Pose2 | None = None) -> Pose2:
+def _clustered(poses: Array, weights: Array, before: Pose2 | None = None) -> Pose2:
     """Return the middle of the heaviest cluster; the one around the pose before, unless that is much lighter."""
     _, inverse = np.unique(_bins(poses), return_inverse=True)
     found, weight = _shifted(poses, weights, np.asarray(inverse == np.bincount(inverse, weights).argmax()))
@@ -337,7 +331,7 @@ def _clustered(poses: Poses, weights: Numbers, before: Pose2 | None = None) -> P
     return found
 
 
-def _shifted(poses: Poses, weights: Numbers, members: NDArray[np.bool_]) -> tuple[Pose2, float]:
+def _shifted(poses: Array, weights: Array, members: Bools) -> tuple[Pose2, float]:
     """Return the middle of a cluster after some steps of mean shift from its first members, and its weight."""
     for _ in range(SHIFTS):
         share, turns = weights[members] / weights[members].sum(), poses[members, 2]
@@ -347,7 +341,7 @@ def _shifted(poses: Poses, weights: Numbers, members: NDArray[np.bool_]) -> tupl
     return middle, float(weights[members].sum())
 
 
-def _near(poses: Poses, middle: Pose2) -> NDArray[np.bool_]:
+def _near(poses: Array, middle: Pose2) -> Bools:
     """Return which poses are in the same cluster as its middle."""
     away = np.hypot(poses[:, 0] - middle.x, poses[:, 1] - middle.y)
     return np.asarray((away <= NEAR) & (np.abs(_wrapped(poses[:, 2] - middle.heading)) <= TURN_NEAR))

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from typing import TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rbxcompose import sdk
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.geometry import Pose2, Transform3
 from rbxcompose.domains.worlds.poses import message_of, pose_in
 from rbxcompose.domains.worlds.world import MAP_FRAME
@@ -43,7 +41,7 @@ class Localiser(sdk.Component[C]):
         header = Header(stamp=to_time(self.stamp + AHEAD), frame_id=MAP_FRAME)
         self.tf(TFMessage(transforms=(geometry.TransformStamped(header, ODOM, transform),)))
 
-    def publish_pose(self, pose: Pose2, covariance: NDArray[np.float64], stamp: Time) -> None:
+    def publish_pose(self, pose: Pose2, covariance: Array, stamp: Time) -> None:
         """Publish where the robot was at a stamp, with the covariance of x, y [m^2] and heading [rad^2] (3, 3)."""
         spread = np.zeros((6, 6))
         spread[PLANAR] = covariance

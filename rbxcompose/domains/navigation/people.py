@@ -12,15 +12,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
+from rbxcompose.base.arrays import Array, ArrayLike, Bools, Ints, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.navigation.costs import distances
 from rbxcompose.domains.worlds.grid_map import SOLID, GridMap
-
-Numbers = NDArray[np.float64]
 
 GRAZING = math.radians(10)  # of a ray to a surface that is seen as one
 LEAST_JUMP = 0.12  # [m]
@@ -46,7 +42,7 @@ class KnownWalls:
         """Take a map, and how near to its walls [m] an echo is one of them: the error of the map and of the pose."""
         self._grid, self._near = grid, (distances(grid.cells >= SOLID) - 0.5) * grid.resolution <= margin
 
-    def explain(self, points: Numbers) -> NDArray[np.bool_]:
+    def explain(self, points: Array) -> Bools:
         """Return which points (n, 2) of `map` [m] are of a wall; beside the map none is."""
         return self._grid.look_up(self._near, points, False)
 
@@ -104,9 +100,7 @@ def sightings(
     return bodies + _paired(legs)
 
 
-def _pieces(
-    points: Numbers, lengths: Numbers, counts: NDArray[np.bool_], step: float, is_round: bool
-) -> Iterator[NDArray[np.int_]]:
+def _pieces(points: Array, lengths: Array, counts: Bools, step: float, is_round: bool) -> Iterator[Ints]:
     """Yield the indices of the rays of each thing, in their order."""
     after = np.roll(np.arange(len(points)), -1)
     apart = np.hypot(*(points[after] - points).T)
@@ -124,7 +118,7 @@ def _pieces(
             yield piece
 
 
-def _is_hidden(edge: int, beside: int, ranges: Numbers, lengths: Numbers, step: float, is_round: bool) -> bool:
+def _is_hidden(edge: int, beside: int, ranges: Array, lengths: Array, step: float, is_round: bool) -> bool:
     """Return whether something before it hides what is behind an edge; the end of the view does."""
     if not 0 <= beside < len(ranges):
         if not is_round:

@@ -6,9 +6,7 @@ import math
 from collections.abc import Callable
 from itertools import pairwise
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, Bools, Ints32, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, wrap_angle
 from rbxcompose.base.units import LENGTH, format_quantity
@@ -25,8 +23,6 @@ SAMPLES = 4  # of a straight line in each cell
 ASIDE = 0.02  # [m] to everything that a robot which is no circle keeps on a straight line: it may get a little off
 CORRIDOR = 1  # rough cells to each side of the rough way in which the exact one is searched
 
-Grid = NDArray[np.float64]
-Indices = NDArray[np.int32]
 Cell = tuple[int, int]
 
 
@@ -99,7 +95,7 @@ def _at_goal(costs: LayeredCosts, goal: Pose2) -> str:
 
 
 def _plan_for(
-    outline: PolygonFootprint, costs: LayeredCosts, weights: Grid, start: Pose2, goal: Pose2, tolerance: float
+    outline: PolygonFootprint, costs: LayeredCosts, weights: Array, start: Pose2, goal: Pose2, tolerance: float
 ) -> PlannedPath:
     """Return the way of a robot that is no circle, on which there is room for it at each heading that it has there."""
     first, last = costs.cell_of(start.x, start.y), costs.cell_of(goal.x, goal.y)
@@ -140,7 +136,7 @@ def _end_with_room(costs: LayeredCosts, cells: list[Cell], start: Pose2, goal: P
     return Pose2(x, y, goal.heading)
 
 
-def _weights(costs: LayeredCosts) -> Grid:
+def _weights(costs: LayeredCosts) -> Array:
     """Return what it costs to cross each cell; -1 where the robot must not be."""
     table = NEUTRAL + np.arange(256.0)
     table[[LETHAL, INSCRIBED]] = -1.0
@@ -148,7 +144,7 @@ def _weights(costs: LayeredCosts) -> Grid:
     return table.take(costs.values)
 
 
-def _open_around(costs: LayeredCosts, weights: Grid, at: Cell) -> None:
+def _open_around(costs: LayeredCosts, weights: Array, at: Cell) -> None:
     """Let a robot that touches something leave it, on the shortest way: through what is near, but not nearer to it."""
     side = costs.grid.resolution
     reach = math.ceil(costs.settings.radius / side) + 1
@@ -157,11 +153,11 @@ def _open_around(costs: LayeredCosts, weights: Grid, at: Cell) -> None:
     weights[at] = TOUCHED
 
 
-def _is_in(cell: Cell, grid: Grid) -> bool:
+def _is_in(cell: Cell, grid: Array) -> bool:
     return all(0 <= index < size for index, size in zip(cell, grid.shape, strict=True))
 
 
-def _search(weights: Grid, first: Cell, last: Cell) -> list[Cell] | None:
+def _search(weights: Array, first: Cell, last: Cell) -> list[Cell] | None:
     """Return the cells of the cheapest way, None if there is none; a large grid is searched roughly first."""
     if weights.size > LARGE and (corridor := _corridor(weights, first, last)) is not None:
         found = _exact(np.where(corridor, weights, -1.0), first, last)
@@ -170,7 +166,7 @@ def _search(weights: Grid, first: Cell, last: Cell) -> list[Cell] | None:
     return _exact(weights, first, last)
 
 
-def _exact(weights: Grid, first: Cell, last: Cell) -> list[Cell] | None:
+def _exact(weights: Array, first: Cell, last: Cell) -> list[Cell] | None:
     """Return the cells of the cheapest way from one to another of eight neighbours, None if there is none."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import dijkstra
@@ -180,9 +176,9 @@ def _exact(weights: Grid, first: Cell, last: Cell) -> list[Cell] | None:
     free = np.flatnonzero(flat > 0)
     number = np.full(flat.size, -1, np.int32)
     number[free] = np.arange(free.size)
-    starts: list[Indices] = []
-    ends: list[Indices] = []
-    costs: list[Grid] = []
+    starts: list[Ints32] = []
+    ends: list[Ints32] = []
+    costs: list[Array] = []
     for step, length in ((1, 1.0), (width, 1.0), (width + 1, math.sqrt(2)), (width - 1, math.sqrt(2))):
         open_ends = number[free + step] >= 0
         here = free[open_ends]
@@ -201,7 +197,7 @@ def _exact(weights: Grid, first: Cell, last: Cell) -> list[Cell] | None:
     return [(int(cell) // width - 1, int(cell) % width - 1) for cell in free[way[::-1]]]
 
 
-def _corridor(weights: Grid, first: Cell, last: Cell) -> NDArray[np.bool_] | None:
+def _corridor(weights: Array, first: Cell, last: Cell) -> Bools | None:
     """Return which cells are near to the cheapest way on a grid of fewer cells."""
     rows, columns = (math.ceil(size / ROUGH) for size in weights.shape)
     padded = np.full((rows * ROUGH, columns * ROUGH), -1.0)
@@ -222,7 +218,7 @@ def _corridor(weights: Grid, first: Cell, last: Cell) -> NDArray[np.bool_] | Non
     return near.repeat(ROUGH, 0).repeat(ROUGH, 1)[: weights.shape[0], : weights.shape[1]]
 
 
-def _reached(weights: Grid, first: Cell) -> NDArray[np.bool_]:
+def _reached(weights: Array, first: Cell) -> Bools:
     """Return the cells that the robot can come to."""
     from scipy.ndimage import label
 
@@ -230,7 +226,7 @@ def _reached(weights: Grid, first: Cell) -> NDArray[np.bool_]:
     return np.asarray(areas == areas[first])
 
 
-def _nearest(cells: NDArray[np.bool_], to: Cell, side: float) -> tuple[Cell, float]:
+def _nearest(cells: Bools, to: Cell, side: float) -> tuple[Cell, float]:
     """Return the cell that is nearest to another one, and its distance [m]."""
     rows, columns = np.nonzero(cells)
     away = np.hypot(rows - to[0], columns - to[1])
@@ -238,7 +234,7 @@ def _nearest(cells: NDArray[np.bool_], to: Cell, side: float) -> tuple[Cell, flo
     return (int(rows[best]), int(columns[best])), float(away[best]) * side
 
 
-def _smoothed(costs: LayeredCosts, weights: Grid, cells: list[Cell], start: Pose2, goal: Pose2) -> PlannedPath:
+def _smoothed(costs: LayeredCosts, weights: Array, cells: list[Cell], start: Pose2, goal: Pose2) -> PlannedPath:
     """Return the way without corners that save nothing, with poses about a cell apart."""
     points = np.array([(column + 0.5, row + 0.5) for row, column in cells])  # (column, row)
     ends_there = costs.cell_of(goal.x, goal.y) == cells[-1]
@@ -285,7 +281,7 @@ def _furthest(may_skip: Callable[[int, int], bool], count: int, at: int) -> int:
     return reach
 
 
-def _has_room(costs: LayeredCosts, begin: Grid, end: Grid, before: float, after: float) -> bool:
+def _has_room(costs: LayeredCosts, begin: Array, end: Array, before: float, after: float) -> bool:
     """Return whether there is room for a robot on a line in `map` [m], and to turn to it and from it [rad]."""
     (x, y), heading = (end - begin).tolist(), math.atan2(*(end - begin)[::-1])
     count = math.ceil(math.hypot(x, y) / costs.grid.resolution)
@@ -298,7 +294,7 @@ def _has_room(costs: LayeredCosts, begin: Grid, end: Grid, before: float, after:
     return costs.clearance(np.concatenate(poses)) >= ASIDE
 
 
-def _is_as_cheap(weights: Grid, points: Grid) -> bool:
+def _is_as_cheap(weights: Array, points: Array) -> bool:
     """Return whether the straight line between the ends of a way crosses nothing dearer than the way does."""
     first, last = points[0], points[-1]
     count = math.ceil(SAMPLES * float(np.abs(last - first).max())) + 1

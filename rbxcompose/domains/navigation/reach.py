@@ -8,18 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Bools, Ints32, np
 from rbxcompose.domains.navigation.costs import CostZone
 from rbxcompose.domains.worlds.contact import outside_polygon
 from rbxcompose.domains.worlds.grid_map import SOLID, UNKNOWN, GridMap
 from rbxcompose.domains.worlds.shapes import Point2, WorldBox, WorldCylinder, WorldHull, WorldShape
 
 HALVINGS = 6  # in the search for a radius that fits
-
-Bools = NDArray[np.bool_]
-Areas = NDArray[np.int32]
 
 
 class ReachableAreas:
@@ -49,7 +44,7 @@ class ReachableAreas:
         self.areas = self.with_radius(radius)
         """(rows, columns): 0 where the robot does not fit, else the number of the area."""
 
-    def with_radius(self, radius: float) -> Areas:
+    def with_radius(self, radius: float) -> Ints32:
         """Return the areas of a robot of another radius [m]."""
         side = self.grid.resolution
         blocked = _grown(self._walls, radius / side + 1) | self._unknown
@@ -83,7 +78,7 @@ class ReachableAreas:
         """
         (column, row), (last_column, last_row) = np.floor(self.grid.to_cells([one, other])).astype(int).tolist()
 
-        def ends(areas: Areas) -> tuple[int, int]:
+        def ends(areas: Ints32) -> tuple[int, int]:
             return int(areas[row, column]), int(areas[last_row, last_column])
 
         low, high, split = 0.0, self.radius, self.areas
@@ -152,7 +147,7 @@ def _grown(cells: Bools, reach: float) -> Bools:
     return found
 
 
-def _labelled(free: Bools) -> Areas:
+def _labelled(free: Bools) -> Ints32:
     """Return the number of the area of each free cell, from 1 on, where eight cells are neighbours; 0 for others.
 
     Free cells in a row are one run. Runs that touch those of the next row get the lowest number of them, until all of

@@ -16,8 +16,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from rbxcompose.base.arrays import np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import TEMPORARY, read_regular, replace_file
 from rbxcompose.domains.policies.episode import ACTION, PICTURES, STATE, EpisodeFrame, Features, NoEpisodeError

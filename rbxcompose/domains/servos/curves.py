@@ -13,6 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
 
+from rbxcompose.base.arrays import np
 from rbxcompose.base.dataclass import dataclass
 
 NEGLIGIBLE = 1e-13  # a coefficient of the highest power that is smaller than this times the greatest one
@@ -223,6 +224,4 @@ def _roots(polynomial: Coefficients) -> list[float]:
         return []
     if len(kept) == 2:
         return [-kept[0] / kept[1]]
-    import numpy as np  # a tenth of the time of `check`, and plans of most robots need no roots
-
     return [float(root.real) for root in np.roots(kept[::-1]) if abs(root.imag) <= 1e-6]

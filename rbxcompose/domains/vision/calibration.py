@@ -11,16 +11,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
-from numpy.typing import NDArray
 
+from rbxcompose.base.arrays import Array, Bytes, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
 from rbxcompose.domains.worlds.optics import Intrinsics
-
-Numbers = NDArray[np.float64]
-GreyPicture = NDArray[np.uint8]
 
 LARGEST, LARGEST_FILE = 100_000_000, 100_000  # [bytes] of a picture, and of a calibration
 MODELS = {"plumb_bob": (0, 4, 5), "rational_polynomial": (8,)}
@@ -43,7 +39,7 @@ class Chessboard:
         """Take the side of a square [m]."""
         self.columns, self.rows, self.square = columns, rows, square
 
-    def corners(self, picture: GreyPicture) -> tuple[Numbers, Numbers]:
+    def corners(self, picture: Bytes) -> tuple[Array, Array]:
         """Return places of corners on the board (n, 2) [m] and in a picture in grey (n, 2) [px], if all are seen."""
         import cv2
 
@@ -64,7 +60,7 @@ class TagSheet:
 
         self.size, self.places, self._finder = size, places, TagFinder(family)
 
-    def corners(self, picture: GreyPicture) -> tuple[Numbers, Numbers]:
+    def corners(self, picture: Bytes) -> tuple[Array, Array]:
         """Return the same of the tags that are seen."""
         on_board, on_picture = [], []
         square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float) * self.size
@@ -85,9 +81,9 @@ CalibrationBoard = Chessboard | TagSheet
 class BoardView:
     """A board in a picture."""
 
-    board: Numbers
+    board: Array
     """Corners on the board (n, 2) [m]."""
-    picture: Numbers
+    picture: Array
     """The same in the picture (n, 2) [px]."""
 
 
@@ -119,7 +115,7 @@ class CalibrationViews:
         self.size: tuple[int, int] | None = None
         """Width and height of the pictures."""
 
-    def take(self, picture: GreyPicture) -> str:
+    def take(self, picture: Bytes) -> str:
         """Take a picture (h, w); return why it is left out, or nothing."""
         size = picture.shape[1], picture.shape[0]
         if self.size is not None and size != self.size:
@@ -180,7 +176,7 @@ class CalibrationViews:
         return Calibrated(camera, float(miss), known_to, tuple(float(one) for one in np.ravel(misses)))
 
 
-def _alike(view: BoardView, board: Numbers, corners: Numbers, diagonal: float) -> bool:
+def _alike(view: BoardView, board: Array, corners: Array, diagonal: float) -> bool:
     """Return whether the corners that two views have in common are at nearly the same places."""
     known = {tuple(place): seen for place, seen in zip(view.board.tolist(), view.picture, strict=True)}
     pairs = ((known.get(tuple(place)), seen) for place, seen in zip(board.tolist(), corners, strict=True))
@@ -188,11 +184,11 @@ def _alike(view: BoardView, board: Numbers, corners: Numbers, diagonal: float) -
     return bool(moved) and max(moved) < SAME * diagonal
 
 
-def picture_files(paths: Sequence[Any]) -> list[tuple[str, GreyPicture | None]]:
+def picture_files(paths: Sequence[Any]) -> list[tuple[str, Bytes | None]]:
     """Return files with their pictures in grey, None for those that are no pictures."""
     import cv2
 
-    found: list[tuple[str, GreyPicture | None]] = []
+    found: list[tuple[str, Bytes | None]] = []
     for path in paths:
         try:
             data = np.frombuffer(read_regular(path, LARGEST), np.uint8)

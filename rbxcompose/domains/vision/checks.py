@@ -12,6 +12,8 @@ from rbxcompose.base.findings import WIRING, Finding, Severity, Span
 from rbxcompose.base.units import LENGTH, TIME, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
+from rbxcompose.domains.vision.calibration import CameraFileError, read_calibration
+from rbxcompose.domains.worlds.tag_pictures import FAMILIES
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.manifest.validate import NOT_A_CHOICE
 from rbxcompose.sdk import CommandsMotion
@@ -55,8 +57,6 @@ def unknown_tag(robot: Robot) -> Iterator[Finding]:
     for made in robot.components.values():
         if (detector := _detector(robot, made)) is None:
             continue
-        from rbxcompose.domains.worlds.tag_pictures import FAMILIES  # imports numpy
-
         known: Any = detector.config
         names = [*known.names, *known.boards]
         numbers = set(map(str, range(FAMILIES[known.family].total)))
@@ -161,8 +161,6 @@ def _focal_length(camera: RobotComponent) -> float | None:
     if camera.type_name == SIMULATED:
         return float(config.intrinsics.fx)
     if camera.type_name == REAL and config.calibration:
-        from rbxcompose.domains.vision.calibration import CameraFileError, read_calibration  # imports numpy
-
         try:
             return read_calibration(Path(config.calibration)).fx
         except CameraFileError:

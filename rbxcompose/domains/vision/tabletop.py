@@ -15,15 +15,11 @@ from collections.abc import Iterable, Sequence
 from itertools import count
 from typing import Literal, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, Bools, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3, quaternion_from_yaw
 from rbxcompose.domains.worlds.physics.solids import apply
 
-Numbers = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 TRIES = 300  # planes through three points
 SAMPLE = 1500  # cells by which these are compared
 BEST = 5  # of them are refined
@@ -102,11 +98,11 @@ class TablePlane(NamedTuple):
     c: float
     off: float
 
-    def over(self, points: Numbers) -> Numbers:
+    def over(self, points: Array) -> Array:
         """Return how far points (n, 3) are above it (n,)."""
         return np.asarray(points[:, 2] - self.heights(points))
 
-    def heights(self, points: Numbers) -> Numbers:
+    def heights(self, points: Array) -> Array:
         """Return its height at points (n, 2 or 3)."""
         return np.asarray(points[:, :2] @ (self.a, self.b) + self.c)
 
@@ -117,16 +113,14 @@ class _Footprint(NamedTuple):
     `off` is how far points are off it, root mean square; `miss` is the mean of what counts of that.
     """
 
-    middle: Numbers
+    middle: Array
     yaw: float
     sides: tuple[float, float]
     off: float
     miss: float
 
 
-def find_things(
-    points: Numbers, camera: Transform3, settings: TabletopSettings | None = None, seed: int = 1
-) -> Tabletop:
+def find_things(points: Array, camera: Transform3, settings: TabletopSettings | None = None, seed: int = 1) -> Tabletop:
     """Return the table and the things that a camera at a pose in the level frame sees.
 
     `points` are in the frame of the camera: (n, 3), or (h, w, 3) by pixels, of which those at edges are left out that
@@ -160,7 +154,7 @@ def find_things(
     return Tabletop(_table(top, plane), tuple(found))
 
 
-def _is_of_surface(rows: Numbers) -> Flags:
+def _is_of_surface(rows: Array) -> Bools:
     """Return which points (h, w, 3) have a neighbour beside and one above or below that are of the same surface, unless
     that is seen from a flat angle: what is as narrow as a pixel is measured badly.
     """
@@ -178,7 +172,7 @@ def _is_of_surface(rows: Numbers) -> Flags:
     return found
 
 
-def cells_of(points: Numbers, side: float) -> Numbers:
+def cells_of(points: Array, side: float) -> Array:
     """Return the mean of the points (n, 3) in each cell (m, 3)."""
     if not len(points):
         return points
@@ -191,7 +185,7 @@ def cells_of(points: Numbers, side: float) -> Numbers:
     return np.column_stack([np.bincount(which, points[:, axis]) for axis in range(3)]) / counts[:, None]
 
 
-def table_plane(cells: Numbers, settings: TabletopSettings, random: np.random.Generator) -> tuple[TablePlane, Flags]:
+def table_plane(cells: Array, settings: TabletopSettings, random: np.random.Generator) -> tuple[TablePlane, Bools]:
     """Return the level plane with the most cells, and which cells (n,) are of it, without other things of its height.
 
     Three points of similar heights make a plane; the best of them are refined by least squares.
@@ -215,7 +209,7 @@ def table_plane(cells: Numbers, settings: TabletopSettings, random: np.random.Ge
     levels = corners[:, 0, 2] - np.einsum("ij,ij->i", slopes, corners[:, 0, :2])
     off = sample[:, 2] - (slopes @ sample[:, :2].T + levels[:, None])
     order = np.argsort(-(np.abs(off) < THICK).sum(1), kind="stable")[:BEST]
-    best: tuple[TablePlane, Flags] | None = None
+    best: tuple[TablePlane, Bools] | None = None
     for index in order:
         found = _refined(
             cells, TablePlane(float(slopes[index, 0]), float(slopes[index, 1]), float(levels[index]), THICK)
@@ -231,7 +225,7 @@ def table_plane(cells: Numbers, settings: TabletopSettings, random: np.random.Ge
     return plane, is_of
 
 
-def _refined(cells: Numbers, plane: TablePlane) -> tuple[TablePlane, Flags] | None:
+def _refined(cells: Array, plane: TablePlane) -> tuple[TablePlane, Bools] | None:
     """Return a plane through the cells near one, and which those are; None if there are too few."""
     is_of = np.abs(plane.over(cells)) < THICK
     for _ in range(3):
@@ -246,14 +240,14 @@ def _refined(cells: Numbers, plane: TablePlane) -> tuple[TablePlane, Flags] | No
     return plane, is_of
 
 
-def _hull(points: Numbers) -> Numbers:
+def _hull(points: Array) -> Array:
     """Return the sides of the convex hull of points (n, 2) as (m, 3): a x + b y + c <= 0 within it."""
     from scipy.spatial import ConvexHull
 
     return np.asarray(ConvexHull(points).equations)
 
 
-def parts_of(points: Numbers, gap: float, eye: Numbers | None = None) -> list[Numbers]:
+def parts_of(points: Array, gap: float, eye: Array | None = None) -> list[Array]:
     """Return points (n, 3) in parts that are farther from each other than `gap`, the largest first.
 
     Along the sight of an eye, gaps may be wider: sides seen from a flat angle have few points.
@@ -277,7 +271,7 @@ def parts_of(points: Numbers, gap: float, eye: Numbers | None = None) -> list[Nu
     return sorted(parts, key=len, reverse=True)
 
 
-def fitted(cells: Numbers, plane: TablePlane, eye: Numbers, voxel: float) -> TabletopThing | None:
+def fitted(cells: Array, plane: TablePlane, eye: Array, voxel: float) -> TabletopThing | None:
     """Return the box or the cylinder that explains the cells (n, 3) of a thing better, seen from `eye`.
 
     What counts is its outline: the cells of its sides, and the rim of its top, unless that is seen from a flat angle,
@@ -307,7 +301,7 @@ def fitted(cells: Numbers, plane: TablePlane, eye: Numbers, voxel: float) -> Tab
     return TabletopThing(kind, (*best.sides, height), pose, confidence)
 
 
-def _circle(points: Numbers) -> _Footprint | None:
+def _circle(points: Array) -> _Footprint | None:
     """Return the circle nearest to points (n, 2); None if they are too flat to be part of one."""
     middle = points.mean(0)
     own = points - middle
@@ -325,12 +319,12 @@ def _circle(points: Numbers) -> _Footprint | None:
     return _Footprint(middle + at, 0.0, (2 * radius, 2 * radius), *_missed(np.hypot(*(own - at).T) - radius))
 
 
-def _missed(off: Numbers) -> tuple[float, float]:
+def _missed(off: Array) -> tuple[float, float]:
     """Return how far points are off a shape (n,): root mean square, and mean of what counts."""
     return float(np.sqrt(np.mean(off**2))), float(np.minimum(np.abs(off), FAR_OFF).mean())
 
 
-def _rectangle(points: Numbers, sight: Numbers, is_seen_above: bool, voxel: float) -> _Footprint:
+def _rectangle(points: Array, sight: Array, is_seen_above: bool, voxel: float) -> _Footprint:
     """Return the rectangle to whose sides points (n, 2) are nearest; what is hidden along `sight` is made up."""
     middle = points.mean(0)
     own = points - middle
@@ -361,7 +355,7 @@ def _rectangle(points: Numbers, sight: Numbers, is_seen_above: bool, voxel: floa
     return _Footprint(at, turn, (float(size[0]), float(size[1])), *missed)
 
 
-def _off_sides(points: Numbers, turns: Numbers) -> Numbers:
+def _off_sides(points: Array, turns: Array) -> Array:
     """Return how far points (n, 2) are off the sides of the rectangle around them at each turn (m,)."""
     cos, sin = np.cos(turns), np.sin(turns)
     turned = np.stack((points @ np.stack((cos, sin)), points @ np.stack((-sin, cos))), -1)  # (n, m, 2)
@@ -369,12 +363,12 @@ def _off_sides(points: Numbers, turns: Numbers) -> Numbers:
     return np.asarray(np.minimum(_gaps(turned, low, high), FAR_OFF).mean(0))
 
 
-def _gaps(turned: Numbers, low: Numbers, high: Numbers) -> Numbers:
+def _gaps(turned: Array, low: Array, high: Array) -> Array:
     """Return how far points (..., 2) are from the nearest side of a rectangle."""
     return np.asarray(np.minimum(np.abs(turned - low), np.abs(high - turned)).min(-1))
 
 
-def _table(top: Numbers, plane: TablePlane) -> TabletopThing:
+def _table(top: Array, plane: TablePlane) -> TabletopThing:
     """Return a table as a plate of which its cells (n, 3) are the upper side: what is below is not seen."""
     from scipy.spatial import ConvexHull
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rbxcompose import sdk
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, Transform3
 from rbxcompose.domains.worlds.poses import NewestMessage
@@ -41,7 +39,7 @@ class WatchedTag:
     score: float
     camera: Transform3
     """Its pose in that frame when it saw the tag."""
-    covariance: NDArray[np.float64]
+    covariance: Array
     """Of the pose, about the axes of the camera (6, 6): position [m^2], then rotation [rad^2]."""
     names: frozenset[str]
     """Its name and its number."""

@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, Bytes, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.worlds.optics import Intrinsics
 from rbxcompose.domains.worlds.physics.solids import quaternion_of, rotation_matrix
-from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, GreyPicture, dictionary
+from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, dictionary
 
-Numbers = NDArray[np.float64]
 PIXEL_NOISE = 0.3  # standard deviation of a corner after its refinement [px]
 FAR_OFF = 3.0  # a tag whose corners miss its pose by more is none, or is bent [px]
 
@@ -24,11 +21,11 @@ class SeenTag:
     """A tag in a picture."""
 
     number: int
-    corners: Numbers
+    corners: Array
     """In pixels (4, 2): top left, top right, bottom right, bottom left, as the tag is printed."""
     pose: Transform3 | None = None
     """In the optical frame of the camera: x to the right of the tag, y up, z out of it. None if its size is unknown."""
-    covariance: Numbers | None = None
+    covariance: Array | None = None
     """Of the pose (6, 6): position in the optical frame [m^2], then rotation about its axes [rad^2]."""
     miss: float = 0.0
     """How far the corners are from where the pose has them, root mean square [px]."""
@@ -55,7 +52,7 @@ class TagFinder:
         self._detector = cv2.aruco.ArucoDetector(dictionary(family), settings)
         self._size, self._sizes = size, dict(sizes or {})
 
-    def find(self, picture: GreyPicture, camera: Intrinsics | None = None) -> list[SeenTag]:
+    def find(self, picture: Bytes, camera: Intrinsics | None = None) -> list[SeenTag]:
         """Return the tags of a picture in grey (h, w), by number and then from left to right.
 
         Poses need a camera and the size of the tag.
@@ -73,13 +70,13 @@ class TagFinder:
         return sorted(seen, key=lambda tag: (tag.number, tag.corners[:, 0].mean()))
 
 
-def square(size: float) -> Numbers:
+def square(size: float) -> Array:
     """Return the corners of a tag in its frame (4, 3) [m], in the order of `SeenTag.corners`."""
     half = size / 2
     return np.array([(-half, half, 0), (half, half, 0), (half, -half, 0), (-half, -half, 0)], float)
 
 
-def _posed(number: int, corners: Numbers, size: float, camera: Intrinsics) -> SeenTag | None:
+def _posed(number: int, corners: Array, size: float, camera: Intrinsics) -> SeenTag | None:
     """Return a tag with its pose; None if no pose in front of the camera explains it.
 
     A square has two poses that look nearly alike, mirrored at the line of sight: T. Collins and A. Bartoli,
@@ -88,7 +85,7 @@ def _posed(number: int, corners: Numbers, size: float, camera: Intrinsics) -> Se
     import cv2
 
     points = square(size)
-    ways: list[tuple[float, Numbers, Numbers]] = []
+    ways: list[tuple[float, Array, Array]] = []
     # The first fails for a square that the camera faces exactly, where there is no second pose either.
     for method in (cv2.SOLVEPNP_IPPE_SQUARE, cv2.SOLVEPNP_ITERATIVE):
         try:
@@ -114,7 +111,7 @@ def _posed(number: int, corners: Numbers, size: float, camera: Intrinsics) -> Se
 
 def board_pose(
     tags: Sequence[SeenTag], places: Mapping[int, Transform3], sizes: Mapping[int, float], camera: Intrinsics
-) -> tuple[Transform3, Numbers] | None:
+) -> tuple[Transform3, Array] | None:
     """Return where a board with tags at `places` in its frame is in the optical frame, with the covariance (6, 6).
 
     All corners that are seen count together, so that a board is steadier than its tags. None without a tag of it, or
@@ -139,7 +136,7 @@ def board_pose(
     return pose_from(turn, shift), spread(points, turn, shift, camera)
 
 
-def _refined(points: Numbers, corners: Numbers, turn: Numbers, shift: Numbers, camera: Intrinsics) -> list[Numbers]:
+def _refined(points: Array, corners: Array, turn: Array, shift: Array, camera: Intrinsics) -> list[Array]:
     """Return the rotation vector and the translation (3, 1) that explain corners best, near given ones."""
     import cv2
 
@@ -147,12 +144,12 @@ def _refined(points: Numbers, corners: Numbers, turn: Numbers, shift: Numbers, c
     return [np.asarray(one, float) for one in found]
 
 
-def placed_square(place: Transform3, size: float) -> Numbers:
+def placed_square(place: Transform3, size: float) -> Array:
     """Return the corners of a tag that is at a place (4, 3) [m]."""
     return np.array([place.apply((x, y, z)) for x, y, z in square(size).tolist()])
 
 
-def spread(points: Numbers, turn: Numbers, shift: Numbers, camera: Intrinsics) -> Numbers:
+def spread(points: Array, turn: Array, shift: Array, camera: Intrinsics) -> Array:
     """Return the covariance of a pose (6, 6), by corners that are off by `PIXEL_NOISE`, to the first order."""
     import cv2
 
@@ -168,7 +165,7 @@ def spread(points: Numbers, turn: Numbers, shift: Numbers, camera: Intrinsics) -
     return np.asarray(np.linalg.pinv(both.T @ both) * PIXEL_NOISE**2)
 
 
-def pose_from(turn: Numbers, shift: Numbers) -> Transform3:
+def pose_from(turn: Array, shift: Array) -> Transform3:
     """Return a rotation vector (3, 1) and a translation (3, 1) as a transform."""
     import cv2
 

@@ -9,6 +9,7 @@ from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.units import LENGTH, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.domains.worlds.contact import MAP, in_polygon, overlap
 from rbxcompose.domains.worlds.sections.world import world
 from rbxcompose.sdk.capabilities import Drives
 
@@ -21,7 +22,6 @@ def start_in_something(robot: Robot) -> Iterator[Finding]:
     contents = robot.manifest.contents
     if "world" not in contents.root or not contents.is_simulated or (found := contents.of(world)) is None:
         return
-    from rbxcompose.domains.worlds.contact import MAP, in_polygon, overlap  # imports numpy
     from rbxcompose.domains.worlds.shapes import CircleFootprint
 
     depth, what = overlap(found.file.grid, found.solid_at(0.0), CircleFootprint(found.radius), found.start)

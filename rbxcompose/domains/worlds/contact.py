@@ -6,9 +6,7 @@ import math
 from collections.abc import Sequence
 from functools import lru_cache
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
+from rbxcompose.base.arrays import Array, ArrayLike, Bools, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, wrap_angle
 from rbxcompose.domains.worlds.grid_map import SOLID, GridMap
@@ -30,8 +28,6 @@ REFINED = 16  # poses between the last free one and the first that is not, exami
 NOISE = 1e-12  # depth that is rounding [m]
 TOUCHING = 1e-3  # what is so near to a robot touches it [m]
 
-Numbers = NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True)
 class FirstContact:
@@ -49,9 +45,9 @@ class FirstContact:
 class _Obstacles:
     """What is near, in `map` [m]: rectangles, circles, and polygons, with the name of each in this order."""
 
-    rectangles: Numbers
+    rectangles: Array
     """(n, 6): x, y, cosine and sine of the heading, half of length and width."""
-    circles: Numbers
+    circles: Array
     """(n, 3): x, y, radius."""
     polygons: tuple[tuple[PolygonFootprint, Pose2], ...]
     names: tuple[str, ...]
@@ -104,7 +100,7 @@ def first_contact(
 
 def touching(
     grid: GridMap, shapes: Sequence[WorldShape], footprint: CircleFootprint, pose: Pose2, within: float
-) -> Numbers:
+) -> Array:
     """Return the directions in which a round robot touches something, in its frame (n,) [rad].
 
     What is up to `within` [m] away from its rim counts, as for the bumpers of a robot, which stand out by so much.
@@ -164,7 +160,7 @@ def _first(
     start = np.array((before.x, before.y, before.heading))
     change = np.array((after.x - before.x, after.y - before.y, wrap_angle(after.heading - before.heading)))
 
-    def gaps(parts: Numbers) -> Numbers:
+    def gaps(parts: Array) -> Array:
         return _gaps(near, footprint, start + change * parts[:, None])
 
     at_first = gaps(np.array([begin]))[0]
@@ -188,7 +184,7 @@ def _first(
     return FirstContact(begin, pose_between(before, after, begin), what)
 
 
-def _gaps(near: _Obstacles, footprint: Footprint, poses: Numbers) -> Numbers:
+def _gaps(near: _Obstacles, footprint: Footprint, poses: Array) -> Array:
     """Return how far a robot at poses (p, 3) is from each obstacle [m], (p, n); less than 0 is how deep it overlaps.
 
     Between corners it may be less than the distance, but has the same sign.
@@ -222,19 +218,19 @@ def _gaps(near: _Obstacles, footprint: Footprint, poses: Numbers) -> Numbers:
     extent = np.abs(nx * c + ny * s) * a + np.abs(ny * c - nx * s) * b
     middle = nx * (cx - poses[:, 0, None, None]) + ny * (cy - poses[:, 1, None, None])
     by_edges = (middle - extent - offsets).max(-1)
-    to_rectangles: Numbers = np.maximum(by_sides, by_edges)
+    to_rectangles: Array = np.maximum(by_sides, by_edges)
     away = near.circles[:, :2] - poses[:, None, :2]
     to_circles = outside_polygon(footprint, away @ turn) - near.circles[:, 2]
     to_polygons = [_between(footprint, poses, polygon, at) for polygon, at in near.polygons]
     return np.concatenate((to_rectangles, to_circles, *to_polygons), 1)
 
 
-def _into(at: Pose2, points: Numbers) -> Numbers:
+def _into(at: Pose2, points: Array) -> Array:
     """Return points of `map` (..., 2) in the frame of a pose."""
     return (points - (at.x, at.y)) @ _turn(at)
 
 
-def _between(footprint: PolygonFootprint, poses: Numbers, polygon: PolygonFootprint, at: Pose2) -> Numbers:
+def _between(footprint: PolygonFootprint, poses: Array, polygon: PolygonFootprint, at: Pose2) -> Array:
     """Return how far a robot at poses (p, 3) is from a polygon at a pose (p, 1), or less than 0.
 
     It is the largest gap between them along the normals of their edges.
@@ -252,7 +248,7 @@ def _between(footprint: PolygonFootprint, poses: Numbers, polygon: PolygonFootpr
 
 
 @lru_cache(maxsize=64)
-def _edges(footprint: PolygonFootprint) -> tuple[Numbers, Numbers, Numbers]:
+def _edges(footprint: PolygonFootprint) -> tuple[Array, Array, Array]:
     """Return corners (k, 2), the outward normals (k, 2) of the edges behind them, and their distances to the origin."""
     corners = np.array(footprint.points)
     along = np.roll(corners, -1, 0) - corners
@@ -260,21 +256,21 @@ def _edges(footprint: PolygonFootprint) -> tuple[Numbers, Numbers, Numbers]:
     return corners, normals, (normals * corners).sum(-1)
 
 
-def _in_rectangles(rectangles: Numbers, points: Numbers) -> tuple[Numbers, Numbers]:
+def _in_rectangles(rectangles: Array, points: Array) -> tuple[Array, Array]:
     """Return points of `map` (..., 1 or n, k, 2) in the frames of rectangles: x and y (..., n, k)."""
     cx, cy, cos, sin = rectangles.T[:4, :, None]
     x, y = points[..., 0] - cx, points[..., 1] - cy
     return x * cos + y * sin, y * cos - x * sin
 
 
-def _outside_rectangles(rectangles: Numbers, points: Numbers) -> Numbers:
+def _outside_rectangles(rectangles: Array, points: Array) -> Array:
     """Return how far points of `map` (..., 1, k, 2) are outside of rectangles, or less than 0: (..., n, k)."""
     x, y = _in_rectangles(rectangles, points)
     x, y = np.abs(x) - rectangles[:, 4, None], np.abs(y) - rectangles[:, 5, None]
     return np.hypot(np.maximum(x, 0.0), np.maximum(y, 0.0)) + np.minimum(np.maximum(x, y), 0.0)
 
 
-def _nearest(footprint: PolygonFootprint, points: Numbers) -> Numbers:
+def _nearest(footprint: PolygonFootprint, points: Array) -> Array:
     """Return the points on the outline of a polygon that are nearest to points (..., 2) of its frame."""
     corners, _, _ = _edges(footprint)
     along = np.roll(corners, -1, 0) - corners
@@ -284,7 +280,7 @@ def _nearest(footprint: PolygonFootprint, points: Numbers) -> Numbers:
     return np.take_along_axis(on_edges, best[..., None, None], -2)[..., 0, :]
 
 
-def outside_polygon(footprint: PolygonFootprint, points: Numbers) -> Numbers:
+def outside_polygon(footprint: PolygonFootprint, points: Array) -> Array:
     """Return how far points (..., 2) of its frame are outside of a polygon, or less than 0: (...)."""
     _, normals, offsets = _edges(footprint)
     beyond = (points @ normals.T - offsets).max(-1)
@@ -292,7 +288,7 @@ def outside_polygon(footprint: PolygonFootprint, points: Numbers) -> Numbers:
     return np.asarray(np.where(beyond < 0, beyond, np.hypot(away[..., 0], away[..., 1])))
 
 
-def _around_circle(near: _Obstacles, pose: Pose2) -> tuple[Numbers, Numbers]:
+def _around_circle(near: _Obstacles, pose: Pose2) -> tuple[Array, Array]:
     """Return where obstacles are, as points of the frame of a robot (n, 2), and how far from its middle.
 
     The points are the nearest ones of rectangles and polygons, and the middles of circles.
@@ -311,13 +307,13 @@ def _around_circle(near: _Obstacles, pose: Pose2) -> tuple[Numbers, Numbers]:
     return found, away
 
 
-def _turn(pose: Pose2) -> Numbers:
+def _turn(pose: Pose2) -> Array:
     """Return the matrix that turns rows of `map` into the frame of a pose."""
     cos, sin = math.cos(pose.heading), math.sin(pose.heading)
     return np.array([[cos, -sin], [sin, cos]])
 
 
-def in_polygon(corners: Sequence[Point2], x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
+def in_polygon(corners: Sequence[Point2], x: ArrayLike, y: ArrayLike) -> Bools:
     """Return which points (...) are in a polygon: those from which a line to the right crosses its sides oddly."""
     px, py = np.asarray(x, float), np.asarray(y, float)
     inside = np.zeros(px.shape, bool)

@@ -11,12 +11,10 @@ import re
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import yaml
-from numpy.typing import ArrayLike, NDArray
 
+from rbxcompose.base.arrays import AnyArray, Array, ArrayLike, Bools, Indices, Ints8, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import need
@@ -38,10 +36,6 @@ YES_OR_NO = {"0": False, "1": True, "false": False, "true": True, "no": False, "
 WRITTEN = {"occupied_thresh": 0.65, "free_thresh": 0.196}  # by map_saver; its grey for unknown lies between them
 GREYS = {OCCUPIED: 0, UNKNOWN: 205, FREE: 254}
 
-Cells = NDArray[np.int8]
-Points = NDArray[np.float64]
-Rectangles = NDArray[np.intp]
-
 
 class MapError(Exception):
     """Raised for a map that cannot be read, with a sentence that says why."""
@@ -56,7 +50,7 @@ class GridMap:
             and below 1e15.
     """
 
-    cells: Cells
+    cells: Ints8
     """(rows, columns), the lowest y first: 0 is free, 100 occupied, -1 unknown, the rest are percents."""
     resolution: float
     """Side of a cell [m]."""
@@ -73,24 +67,24 @@ class GridMap:
         if not all(abs(number) < MOST for number in origin):
             raise MapError(f"the origin is three finite numbers below 1e15, not {', '.join(map(str, origin))}")
 
-    def to_cells(self, points: ArrayLike) -> Points:
+    def to_cells(self, points: ArrayLike) -> Array:
         """Return points (..., 2) of `map` [m] as (column, row) counted in cells from the origin; whole at corners."""
         cos, sin = math.cos(self.origin.heading), math.sin(self.origin.heading)
         x, y = np.moveaxis(np.asarray(points, float), -1, 0)
         x, y = x - self.origin.x, y - self.origin.y
         return np.stack((cos * x + sin * y, cos * y - sin * x), -1) / self.resolution
 
-    def to_points(self, cells: ArrayLike) -> Points:
+    def to_points(self, cells: ArrayLike) -> Array:
         """Return (column, row) (..., 2) as points of `map` [m]: the inverse; add 0.5 to indices for the centres."""
         cos, sin = math.cos(self.origin.heading), math.sin(self.origin.heading)
         u, v = np.moveaxis(np.asarray(cells, float) * self.resolution, -1, 0)
         return np.stack((self.origin.x + cos * u - sin * v, self.origin.y + sin * u + cos * v), -1)
 
-    def occupied_at(self, points: ArrayLike) -> NDArray[np.bool_]:
+    def occupied_at(self, points: ArrayLike) -> Bools:
         """Return for points (..., 2) of `map` [m] whether each is in an occupied cell; beside the map none is."""
         return np.asarray(self.look_up(self.cells, points, FREE) >= SOLID)
 
-    def look_up(self, table: NDArray[Any], points: ArrayLike, beside: float) -> NDArray[Any]:
+    def look_up(self, table: AnyArray, points: ArrayLike, beside: float) -> AnyArray:
         """Return what a table (rows, columns) has for the cells of points (..., 2) of `map` [m]; `beside` the map."""
         found = np.floor(self.to_cells(points))
         with np.errstate(invalid="ignore"):
@@ -100,7 +94,7 @@ class GridMap:
 
 
 def grid_from(
-    image: NDArray[Any],
+    image: AnyArray,
     resolution: float,
     origin: Pose2,
     *,
@@ -142,7 +136,7 @@ def grid_from(
     return GridMap(cells, resolution, origin)
 
 
-def _values(shade: Points, negate: bool, mode: str, occupied_thresh: float, free_thresh: float) -> Cells:
+def _values(shade: Array, negate: bool, mode: str, occupied_thresh: float, free_thresh: float) -> Ints8:
     """Return the value of a cell for each shade, which is 0 for black and 1 for white."""
     if mode == "raw":
         percents = np.floor(shade * 255 + 0.5)
@@ -233,7 +227,7 @@ def _check_size(width: int, height: int) -> None:
         raise MapError(f"a map has 1 to {MOST_CELLS:,} cells, not {width} x {height}")
 
 
-def _image(data: bytes, name: str) -> tuple[NDArray[Any], int]:
+def _image(data: bytes, name: str) -> tuple[AnyArray, int]:
     """Return a picture, and the number that is white in it."""
     if data.startswith(b"\x89PNG"):
         return _png(data, name)
@@ -259,7 +253,7 @@ def _image(data: bytes, name: str) -> tuple[NDArray[Any], int]:
     return pixels[: width * height].reshape(height, width), white
 
 
-def _png(data: bytes, name: str) -> tuple[NDArray[Any], int]:
+def _png(data: bytes, name: str) -> tuple[AnyArray, int]:
     try:
         from PIL import Image
     except ImportError:
@@ -303,7 +297,7 @@ def map_files(grid: GridMap, name: str) -> dict[str, bytes]:
     return {f"{name}.yaml": text.encode(), f"{name}.pgm": header + table[grid.cells[::-1].view(np.uint8)].tobytes()}
 
 
-def wall_rectangles(grid: GridMap) -> Rectangles:
+def wall_rectangles(grid: GridMap) -> Indices:
     """Return rectangles (n, 4) that cover the occupied cells, and nothing else, without overlap.
 
     Each is its first column and row, and the first column and row behind it, in cells. Occupied runs of a row are
@@ -314,7 +308,7 @@ def wall_rectangles(grid: GridMap) -> Rectangles:
     return by_rows if len(by_rows) <= len(by_columns) else by_columns
 
 
-def _merged_runs(solid: NDArray[np.bool_]) -> Rectangles:
+def _merged_runs(solid: Bools) -> Indices:
     """Return rectangles (n, 4) of equal runs in consecutive rows."""
     change = np.diff(np.pad(solid, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     rows, starts = np.nonzero(change == 1)

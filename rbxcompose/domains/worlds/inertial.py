@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, Velocity2, conjugate, multiply, rotate
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.sensor_msgs import Imu
 from rbxcompose.msgs.std_msgs import Header
 
-Numbers = NDArray[np.float64]
 GRAVITY = 9.81  # [m/s^2]
 EXACT = np.zeros(3)
 
@@ -51,13 +48,13 @@ def on_base(
 def imu_message(
     header: Header,
     reading: ImuReading,
-    turn_error: Numbers = EXACT,
-    error: Numbers = EXACT,
+    turn_error: Array = EXACT,
+    error: Array = EXACT,
     variances: tuple[float, float] = (0.0, 0.0),
 ) -> Imu:
     """Return a reading with errors as a message; a covariance of zeros is one that is not known."""
 
-    def with_error(exact: Vector3, wrong: Numbers) -> geometry.Vector3:
+    def with_error(exact: Vector3, wrong: Array) -> geometry.Vector3:
         return geometry.Vector3(*(np.array(exact) + wrong).tolist())
 
     return Imu(

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, Bytes, Singles, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.msgs.builtin_interfaces import Time
@@ -17,9 +15,6 @@ from rbxcompose.msgs.sensor_msgs import CameraInfo, Image, PointCloud2, PointFie
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
 
-Numbers = NDArray[np.float64]
-Colours = NDArray[np.uint8]
-Depths = NDArray[np.float32]
 MOST_BENT = 3.0  # times as wide as a picture is the one that is bent to it
 ROUNDS = 20  # of the iteration that straightens what a lens has bent
 DISTORTIONS = {"": (0, 4, 5), "plumb_bob": (0, 4, 5), "rational_polynomial": (0, 8), "thin_prism": (12, 14)}
@@ -92,16 +87,16 @@ class Intrinsics:
         return "plumb_bob" if len(self.distortion) <= 5 else "rational_polynomial"
 
     @cached_property
-    def matrix(self) -> Numbers:
+    def matrix(self) -> Array:
         """Return them as a matrix (3, 3)."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1.0]])
 
     @cached_property
-    def coefficients(self) -> Numbers:
+    def coefficients(self) -> Array:
         """Return the distortion for OpenCV (n,)."""
         return np.array(self.distortion or (0.0,) * 4, float)
 
-    def straight(self, pixels: Numbers) -> Numbers:
+    def straight(self, pixels: Array) -> Array:
         """Return x / z and y / z of the directions of pixels (n, 2), by iteration as OpenCV does it."""
         bent = (np.asarray(pixels, float) - (self.cx, self.cy)) / (self.fx, self.fy)
         found = bent
@@ -110,7 +105,7 @@ class Intrinsics:
             found = (bent - aside) / radial
         return found
 
-    def _bending(self, straight: Numbers) -> tuple[Numbers, Numbers]:
+    def _bending(self, straight: Array) -> tuple[Array, Array]:
         """Return by which directions (n, 2) are multiplied (n, 1), and what is then added to them (n, 2)."""
         k1, k2, p1, p2, k3, k4, k5, k6 = (*self.distortion, *(0.0,) * 8)[:8]
         x, y = straight.T
@@ -122,7 +117,7 @@ class Intrinsics:
         return radial[:, None], np.stack((right, down), 1)
 
     @cached_property
-    def rays(self) -> Numbers:
+    def rays(self) -> Array:
         """Return the direction of each pixel, with z = 1 (h, w, 3)."""
         across, down = np.meshgrid(np.arange(self.width, dtype=float), np.arange(self.height, dtype=float))
         x, y = self.straight(np.column_stack((across.ravel(), down.ravel()))).T
@@ -168,19 +163,19 @@ def info_message(header: Header, camera: Intrinsics) -> CameraInfo:
     )
 
 
-def picture_message(header: Header, colours: Colours) -> Image:
+def picture_message(header: Header, colours: Bytes) -> Image:
     """Return colours (h, w, 3) as a message."""
     height, width, _ = colours.shape
     return Image(header, height, width, "rgb8", 0, 3 * width, np.ascontiguousarray(colours).tobytes())
 
 
-def depth_message(header: Header, depths: Depths) -> Image:
+def depth_message(header: Header, depths: Singles) -> Image:
     """Return depths (h, w) [m] as a message, as REP 118 has it."""
     height, width = depths.shape
     return Image(header, height, width, "32FC1", 0, 4 * width, depths.astype("<f4").tobytes())
 
 
-def cloud_message(header: Header, rays: Numbers, depths: Depths, colours: Colours) -> PointCloud2:
+def cloud_message(header: Header, rays: Array, depths: Singles, colours: Bytes) -> PointCloud2:
     """Return depths [m] along rays (h, w, 3) as a cloud with a point for each pixel; without a depth, it is nan."""
     height, width = depths.shape
     known = np.where(np.isfinite(depths), depths, np.float32(math.nan))

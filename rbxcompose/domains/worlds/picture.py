@@ -8,18 +8,14 @@ import re
 from collections.abc import Iterator, Sequence
 from html import escape
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, Bytes, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.body.meshes import need
 from rbxcompose.domains.worlds.grid_map import SOLID, GridMap
 from rbxcompose.domains.worlds.shapes import CircleFootprint, Footprint
-from rbxcompose.domains.worlds.world import NO_WALLS
+from rbxcompose.domains.worlds.world import no_walls
 from rbxcompose.domains.worlds.world_file import WorldFile
-
-Points = NDArray[np.float64]
 
 LONGEST = 1000  # [pixels] of the longer side
 MARGIN = 0.5  # [m] around everything
@@ -35,7 +31,7 @@ _DOT, _POINTER = 0.08, 0.25  # [m]
 class DrawnLine:
     """A line or, if it is filled, an area: points (n, 2) in `map` [m]."""
 
-    points: Points
+    points: Array
     colour: str
     is_filled: bool = False
     is_dashed: bool = False
@@ -75,13 +71,13 @@ def marks_of(world: WorldFile) -> Iterator[DrawnLine | DrawnLabel]:
         yield DrawnLabel((pose.x, pose.y), name, 1.3)
 
 
-def placed(points: Points, pose: Pose2) -> Points:
+def placed(points: Array, pose: Pose2) -> Array:
     """Return points (n, 2) [m] of the frame of a pose in the frame in which the pose is."""
     cos, sin = math.cos(pose.heading), math.sin(pose.heading)
     return np.asarray(points @ np.array([(cos, sin), (-sin, cos)]) + (pose.x, pose.y))
 
 
-def _corners(footprint: Footprint) -> Points:
+def _corners(footprint: Footprint) -> Array:
     if isinstance(footprint, CircleFootprint):
         turns = np.linspace(0.0, math.tau, _ROUND, endpoint=False)
         return footprint.radius * np.stack((np.cos(turns), np.sin(turns)), -1)
@@ -103,7 +99,7 @@ class PictureView:
     width: int
     height: int
 
-    def pixels(self, points: Points) -> Points:
+    def pixels(self, points: Array) -> Array:
         """Return points (..., 2) of `map` [m] as pixels, counted from the left upper corner."""
         return (np.asarray(points) - (self.left, self.top)) * (self.scale, -self.scale)
 
@@ -111,7 +107,7 @@ class PictureView:
 def view_of(world: WorldFile, marks: Sequence[DrawnLine | DrawnLabel]) -> PictureView:
     """Return the view that shows the map and all marks, with a margin."""
     points = [mark.points for mark in marks if isinstance(mark, DrawnLine)]
-    if world.grid is not NO_WALLS:
+    if world.grid is not no_walls():
         rows, columns = world.grid.cells.shape
         points.append(world.grid.to_points([(0, 0), (columns, 0), (0, rows), (columns, rows)]))
     whole = np.concatenate(points or [np.zeros((1, 2))])
@@ -141,7 +137,7 @@ def svg_of(world: WorldFile) -> str:
 
 def _svg_map(grid: GridMap, view: PictureView) -> Iterator[str]:
     """Yield the cells of each kind as one path of rows, in a frame of cells."""
-    if grid is NO_WALLS:
+    if grid is no_walls():
         return
     (x, y), (along_x, along_y), (up_x, up_y) = view.pixels(grid.to_points([(0, 0), (1, 0), (0, 1)]))
     frame = f"matrix({along_x - x:.6g} {along_y - y:.6g} {up_x - x:.6g} {up_y - y:.6g} {x:.6g} {y:.6g})"
@@ -196,7 +192,7 @@ def png_of(world: WorldFile) -> bytes:
     return out.getvalue()
 
 
-def _ground(grid: GridMap, view: PictureView) -> NDArray[np.uint8]:
+def _ground(grid: GridMap, view: PictureView) -> Bytes:
     """Return the map, (height, width, 3): each pixel has the colour of the cell at its middle."""
     x, y = np.meshgrid(np.arange(view.width) + 0.5, np.arange(view.height) + 0.5)
     points = np.stack((x, -y), -1) / view.scale + (view.left, view.top)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.geometry import Pose2, Transform3
 from rbxcompose.msgs.geometry_msgs import Pose
 from rbxcompose.msgs.poses import pose_message, pose_of
@@ -12,12 +13,6 @@ from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.sdk.bound import Look
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Numbers = NDArray[np.float64]
 
 
 def pose_in(message: Pose) -> Pose2:
@@ -30,10 +25,8 @@ def message_of(pose: Pose2) -> Pose:
     return pose_message(Transform3.from_pose2(pose))
 
 
-def rays_of(scan: LaserScan) -> tuple[Numbers, Numbers]:
+def rays_of(scan: LaserScan) -> tuple[Array, Array]:
     """Return the angles [rad] and the ranges [m] of a scan as it has them: they may be no numbers."""
-    import numpy as np  # robots without a laser need none
-
     ranges = np.asarray(scan.ranges, np.float64)
     with np.errstate(invalid="ignore", over="ignore"):
         angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges), dtype=np.float64)

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
+from rbxcompose.base.arrays import Array, ArrayLike, Bools, np
 from rbxcompose.domains.worlds.grid_map import SOLID, GridMap
 from rbxcompose.domains.worlds.shapes import Point2, WorldBox, WorldCylinder, WorldHull, WorldShape, convex_hull
 
@@ -17,14 +15,12 @@ TINY = 1e-12  # stands for 0 in a direction
 AT_ONCE = 1 << 14  # crossings that are examined together: so many stay in the cache
 LEAST = 16  # of a ray
 
-Numbers = NDArray[np.float64]
-
 
 class _Axis(NamedTuple):
     """Of rays along one axis of a map: where they begin, their directions, and how many cells it has."""
 
     at: float
-    direction: Numbers
+    direction: Array
     size: int
 
 
@@ -44,7 +40,7 @@ class Rays:
 
     def cast(
         self, origin: Point2, angles: ArrayLike, most: float, shapes: Sequence[WorldShape] = (), z: float = 0.0
-    ) -> Numbers:
+    ) -> Array:
         """Return how far rays go [m] from `origin` in `map` at `angles` (n,) [rad]; inf for `most` [m] and beyond.
 
         Occupied cells are solid squares of any height; what is unknown, or beside the map, is free. Shapes count if
@@ -64,7 +60,7 @@ class Rays:
         found[found >= most] = math.inf
         return found
 
-    def _to_map(self, origin: Point2, angles: Numbers, most: float) -> Numbers:
+    def _to_map(self, origin: Point2, angles: Array, most: float) -> Array:
         """Return the distances to occupied cells [m], or inf."""
         if self.grid.occupied_at(origin):
             return np.zeros(angles.shape)
@@ -78,7 +74,7 @@ class Rays:
         return np.asarray(hit * self.grid.resolution)
 
 
-def _to_side(solid: NDArray[np.bool_], along: _Axis, other: _Axis, limit: Numbers) -> Numbers:
+def _to_side(solid: Bools, along: _Axis, other: _Axis, limit: Array) -> Array:
     """Return the distances until rays enter an occupied cell through a side that is normal to an axis, or inf [cells].
 
     `solid` (cells along the axis, cells along the other one) has a margin of one cell.
@@ -117,7 +113,7 @@ def _to_side(solid: NDArray[np.bool_], along: _Axis, other: _Axis, limit: Number
     return hit
 
 
-def _to_shapes(shapes: Sequence[WorldShape], origin: Point2, angles: Numbers, z: float) -> Numbers:
+def _to_shapes(shapes: Sequence[WorldShape], origin: Point2, angles: Array, z: float) -> Array:
     """Return the distances to the nearest of some convex shapes [m] at a height `z` [m], or inf."""
     boxes: list[tuple[float, ...]] = []
     cylinders: list[tuple[float, ...]] = []
@@ -168,7 +164,7 @@ def _turned(x: float, y: float, angle: float) -> Point2:
     return cos * x - sin * y, sin * x + cos * y
 
 
-def _to_polygon(corners: Sequence[Point2], origin: Point2, angles: Numbers) -> Numbers:
+def _to_polygon(corners: Sequence[Point2], origin: Point2, angles: Array) -> Array:
     """Return how far rays go until they are in a convex polygon whose corners turn left [m], or inf."""
     if len(corners) < 3:
         return np.full(angles.shape, math.inf)
@@ -184,12 +180,12 @@ def _to_polygon(corners: Sequence[Point2], origin: Point2, angles: Numbers) -> N
     return np.asarray(np.where((enters <= leaves) & (leaves >= 0), np.maximum(enters, 0.0), math.inf))
 
 
-def _nearest(enters: Numbers, leaves: Numbers) -> Numbers:
+def _nearest(enters: Array, leaves: Array) -> Array:
     """Return where rays first enter one of some shapes (shapes, rays), or inf: 0 if they begin inside."""
     return np.asarray(np.where((enters <= leaves) & (leaves >= 0), np.maximum(enters, 0.0), math.inf).min(0))
 
 
-def _slab(at: float | Numbers, direction: Numbers, half: float | Numbers) -> tuple[Numbers, Numbers]:
+def _slab(at: float | Array, direction: Array, half: float | Array) -> tuple[Array, Array]:
     """Return the distances at which rays enter and leave what is between -half and half."""
     safe = np.where(np.abs(direction) < TINY, TINY, direction)
     low, high = (-half - at) / safe, (half - at) / safe

@@ -7,10 +7,10 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
-import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import Pose2, Transform3
 from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.domains.worlds.world import SimulatedWorld, world_of

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, Bytes, np
 from rbxcompose.base.geometry import Transform3, quaternion_from_yaw
 from rbxcompose.domains.worlds.shapes import ConvexSolid, WorldBox, WorldCylinder, WorldMesh, WorldTag
 
-GreyPicture = NDArray[np.uint8]
 DEFAULT_FAMILY = "tag36h11"
 ABOVE = 1e-3  # [m]
 FILLS = 0.8  # of the shorter side of a face: a tag whose size is not said
@@ -44,8 +42,8 @@ TAG_FAMILIES: TypeAlias = Literal[tuple(FAMILIES)]  # type: ignore[valid-type]
 
 TagSide: TypeAlias = Literal["front", "back", "left", "right", "top"]
 _UPRIGHT = (0.5, 0.5, 0.5, 0.5)  # x of the tag along y of the thing, y along z, z along x
-_LYING = quaternion_from_yaw(-np.pi / 2)
-_TURNS = {"front": 0.0, "left": np.pi / 2, "back": np.pi, "right": -np.pi / 2}
+_LYING = quaternion_from_yaw(-math.pi / 2)
+_TURNS = {"front": 0.0, "left": math.pi / 2, "back": math.pi, "right": -math.pi / 2}
 
 
 def dictionary(family: str) -> Any:
@@ -59,7 +57,7 @@ def dictionary(family: str) -> Any:
     return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, FAMILIES[family].opencv))
 
 
-def tag_picture(number: int, family: str = DEFAULT_FAMILY, module: int = 1, margin: int = 1) -> GreyPicture:
+def tag_picture(number: int, family: str = DEFAULT_FAMILY, module: int = 1, margin: int = 1) -> Bytes:
     """Return a tag in black and white (n, n), `module` pixels for each of its cells and a white margin of cells.
 
     Raises:
@@ -86,7 +84,7 @@ def with_margin(size: float, family: str) -> float:
     return size * (1 + 2 / FAMILIES[family].cells)
 
 
-def tag_square(tag: WorldTag) -> NDArray[np.float64]:
+def tag_square(tag: WorldTag) -> Array:
     """Return the corners of a tag with its margin in the frame of its thing (4, 3) [m], from the top left one down and
     around; they are just above the side that it is on, so that they are what is seen."""
     half = with_margin(tag.size, tag.family) / 2

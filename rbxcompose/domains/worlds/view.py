@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 
 import cv2
-import numpy as np
-from numpy.typing import NDArray
 
+from rbxcompose.base.arrays import Array, Bools, Bytes, Indices, Ints32, Singles, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.worlds.grid_map import GridMap, wall_rectangles
@@ -26,12 +25,9 @@ from rbxcompose.domains.worlds.shapes import (
     WorldShape,
     WorldTag,
 )
-from rbxcompose.domains.worlds.tag_pictures import GreyPicture, tag_picture, tag_square
+from rbxcompose.domains.worlds.tag_pictures import tag_picture, tag_square
 from rbxcompose.domains.worlds.world import SimulatedWorld
 
-Numbers = NDArray[np.float64]
-Colours = NDArray[np.uint8]
-Depths = NDArray[np.float32]
 NEAR = 0.02  # nothing is seen nearer than this [m]
 FRACTION = 4  # bits of a fraction of a pixel in outlines
 SKY, GROUND, HOLE = (200, 215, 230), (0.49, 0.46, 0.43), (0.08, 0.08, 0.08)
@@ -58,11 +54,11 @@ _SIDES = np.array(list(BOX_SIDES.values()))
 class WorldFaces:
     """Flat quads, seen from one side; a triangle repeats a corner."""
 
-    corners: Numbers
+    corners: Array
     """In `map` (n, 4, 3) [m]; who sees a face sees them turn left."""
-    colours: Colours
+    colours: Bytes
     """Red, green and blue of each (n, 3)."""
-    pictures: Mapping[int, GreyPicture] = field(default_factory=dict)
+    pictures: Mapping[int, Bytes] = field(default_factory=dict)
     """What is on a face besides its colour, by its number: from the first corner down to the second one."""
 
     @classmethod
@@ -86,7 +82,7 @@ class WorldView:
     def __init__(self, world: SimulatedWorld) -> None:
         self._world = world
         self._colours = dict(zip((shape.name for shape in world.shapes), world.colours, strict=False))
-        self._pictures: dict[tuple[int, str], GreyPicture] = {}  # of tags
+        self._pictures: dict[tuple[int, str], Bytes] = {}  # of tags
         still = [shape for shape in world.shapes if shape.path is None]
         parts = [_ground(world), _walls(world.grid), *(self._faces_of(shape) for shape in still)]
         self._still = WorldFaces.joined(parts)
@@ -116,7 +112,7 @@ class WorldView:
         return replace(face, pictures={0: self._pictures[key]})
 
 
-def _painted(corners: Numbers, colour: Sequence[float]) -> WorldFaces:
+def _painted(corners: Array, colour: Sequence[float]) -> WorldFaces:
     """Return faces of one colour, from 0 to 1."""
     return WorldFaces(corners, np.tile(np.round(np.array(colour) * 255).astype(np.uint8), (len(corners), 1)))
 
@@ -143,9 +139,9 @@ def _walls(grid: GridMap) -> WorldFaces:
     return _painted(_turned(corners, grid.origin.x, grid.origin.y, grid.origin.heading), WALLS)
 
 
-def _corners_of(shape: WorldShape) -> Numbers:
+def _corners_of(shape: WorldShape) -> Array:
     """Return the faces of a shape in `map` (n, 4, 3) [m]."""
-    corners: Numbers
+    corners: Array
     match shape.solid:
         case WorldBox(size=size):
             corners = (_CORNERS * size)[_SIDES]
@@ -164,7 +160,7 @@ def _corners_of(shape: WorldShape) -> Numbers:
     return _turned(corners, shape.pose.x, shape.pose.y, shape.pose.heading, shape.z)
 
 
-def _turned(corners: Numbers, x: float, y: float, heading: float, z: float = 0.0) -> Numbers:
+def _turned(corners: Array, x: float, y: float, heading: float, z: float = 0.0) -> Array:
     cos, sin = math.cos(heading), math.sin(heading)
     return np.asarray(corners @ np.array([(cos, sin, 0), (-sin, cos, 0), (0, 0, 1)]) + (x, y, z))
 
@@ -215,7 +211,7 @@ def draw(
     return DepthPicture(colours, depths)
 
 
-def _may_be_seen(points: Numbers, offsets: Numbers, camera: Intrinsics) -> NDArray[np.intp]:
+def _may_be_seen(points: Array, offsets: Array, camera: Intrinsics) -> Indices:
     """Return which faces look at a camera and are not wholly behind it, or beside its picture."""
     sides = np.array(
         [
@@ -229,7 +225,7 @@ def _may_be_seen(points: Numbers, offsets: Numbers, camera: Intrinsics) -> NDArr
     return np.flatnonzero((offsets < 0) & (points[:, :, 2].max(1) > NEAR) & ~is_beside)
 
 
-def _ahead(outline: Numbers) -> Numbers:
+def _ahead(outline: Array) -> Array:
     """Return the part of a polygon (n, 3) that is before the camera; some of it is."""
     found = []
     for before, here in zip(np.roll(outline, 1, 0), outline, strict=True):
@@ -240,7 +236,7 @@ def _ahead(outline: Numbers) -> Numbers:
     return np.array(found)
 
 
-def _facing(points: Numbers, normals: Numbers) -> Numbers:
+def _facing(points: Array, normals: Array) -> Array:
     """Return the cosine of the angle between the normal of each face and its direction to the origin (n,), 0 from
     behind: how bright light from there makes it."""
     middles = points.mean(1)
@@ -248,7 +244,7 @@ def _facing(points: Numbers, normals: Numbers) -> Numbers:
     return np.asarray(np.maximum(0.0, -np.einsum("ij,ij->i", middles, normals) / np.maximum(lengths, 1e-12)))
 
 
-def _coloured(faces: WorldFaces, bright: Numbers, shown: NDArray[np.int32]) -> Colours:
+def _coloured(faces: WorldFaces, bright: Array, shown: Ints32) -> Bytes:
     """Return the colour of each pixel (h, w, 3), by the face that it shows and how bright each face is (n, 3)."""
     palette = np.zeros((len(bright) + 1, 4), np.uint8)  # as whole numbers, which are looked up at once
     palette[:-1, :3] = faces.colours * np.minimum(bright, 1.0)
@@ -257,14 +253,7 @@ def _coloured(faces: WorldFaces, bright: Numbers, shown: NDArray[np.int32]) -> C
     return np.asarray(cv2.cvtColor(found.reshape(*shown.shape, 4), cv2.COLOR_BGRA2BGR), np.uint8)
 
 
-def _paint(
-    colours: Colours,
-    where: NDArray[np.bool_],
-    picture: GreyPicture,
-    corners: Numbers,
-    camera: Intrinsics,
-    bright: Numbers,
-) -> None:
+def _paint(colours: Bytes, where: Bools, picture: Bytes, corners: Array, camera: Intrinsics, bright: Array) -> None:
     """Paint a picture on a face with corners (4, 3) in the optical frame [m], in the pixels that show it (h, w)."""
     rows, columns = np.flatnonzero(where.any(1)), np.flatnonzero(where.any(0))
     if not len(rows):
@@ -301,7 +290,7 @@ class Lens:
         places = x * np.float32(straight.fx) + straight.cx, y * np.float32(straight.fy) + straight.cy
         self._map = None if straight is camera else tuple(each.astype(np.float32) for each in places)
 
-    def bent(self, colours: Colours, depths: Depths) -> tuple[Colours, Depths]:
+    def bent(self, colours: Bytes, depths: Singles) -> tuple[Bytes, Singles]:
         """Return the picture and the depths of a camera, which were drawn for `camera.unbent`."""
         if self._map is None:
             return colours, depths

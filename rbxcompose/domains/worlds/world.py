@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from functools import cached_property
+from dataclasses import field, replace
+from functools import cache, cached_property
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, Bools, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.worlds.contact import TOUCHING, FirstContact, first_contact, in_polygon, overlap, touching
 from rbxcompose.domains.worlds.grid_map import GridMap
 from rbxcompose.domains.worlds.poses import message_of, pose_in
-from rbxcompose.domains.worlds.ray_casting import Numbers, Rays
+from rbxcompose.domains.worlds.ray_casting import Rays
 from rbxcompose.domains.worlds.shapes import (
     CircleFootprint,
     Point2,
@@ -34,10 +32,15 @@ from rbxcompose.msgs.nav_msgs import MapMetaData, OccupancyGrid
 from rbxcompose.msgs.poses import pose_message, pose_of
 from rbxcompose.msgs.std_msgs import Header
 
-NO_WALLS = GridMap(np.zeros((1, 1), np.int8), 1.0)
 MAP_FRAME = "map"
 ROUNDING = 1e-9  # [m]
 FORESEEN = 0.1  # [s] for which a robot is taken to go on as it did when it was heard
+
+
+@cache
+def no_walls() -> GridMap:
+    """Return the map of a world that has none; it is always the same one."""
+    return GridMap(np.zeros((1, 1), np.int8), 1.0)
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,7 @@ class SimulatedWorld:
     """What a robot is in, and where and how large it is; `start` is in `map`, lengths are in metres."""
 
     name: str = ""
-    grid: GridMap = NO_WALLS
+    grid: GridMap = field(default_factory=no_walls)
     shapes: tuple[WorldShape, ...] = ()
     start: Pose2 = Pose2()
     radius: float = 0.2
@@ -83,7 +86,7 @@ class SimulatedWorld:
         motion = RobotsMotion(np.array(rows, float).reshape(-1, 5), now)
         return self._changed(("rays", "_extents", "_standing", "_still", "_moving"), motion=motion)
 
-    def robots_at(self, time: float) -> Numbers:
+    def robots_at(self, time: float) -> Array:
         """Return x, y [m] and heading [rad] in `map` of each other robot at a time [s] (n, 3)."""
         if self.motion is None:
             return np.array([_at_start(robot)[:3] for robot in self.robots], float).reshape(-1, 3)
@@ -111,19 +114,19 @@ class SimulatedWorld:
         footprint = CircleFootprint(self.radius + TOUCHING)
         near = [shape.at(time) for shape in self._moving if shape.is_between(0.0, self.height)]
         near += self._robots_near((pose.x, pose.y), footprint.radius, time, 0.0) if self.robots else []
-        return frozenset(shape.name for shape in near if overlap(NO_WALLS, [shape], footprint, pose)[1])
+        return frozenset(shape.name for shape in near if overlap(no_walls(), [shape], footprint, pose)[1])
 
     @property
     def moving(self) -> frozenset[str]:
         """Return the names of what moves: shapes with a path, and other robots."""
         return frozenset(shape.name for shape in (*self._moving, *self.robots))
 
-    def touching(self, pose: Pose2, within: float, time: float) -> Numbers:
+    def touching(self, pose: Pose2, within: float, time: float) -> Array:
         """Return the directions in which something is within `within` [m] of the robot, in its frame (n,) [rad]."""
         near = self.shapes_near((pose.x, pose.y), self.radius + within, time, 0.0, self.height)
         return touching(self.grid, near, CircleFootprint(self.radius), pose, within)
 
-    def over_holes(self, pose: Pose2, points: Sequence[Point2]) -> NDArray[np.bool_]:
+    def over_holes(self, pose: Pose2, points: Sequence[Point2]) -> Bools:
         """Return below which points in the frame of a robot at `pose` there is no ground (n,)."""
         placed = [pose.compose(Pose2(x, y)) for x, y in points]
         x, y = [at.x for at in placed], [at.y for at in placed]
@@ -132,7 +135,7 @@ class SimulatedWorld:
             missing |= in_polygon(hole.corners, x, y)
         return missing
 
-    def distances(self, origin: Point2, angles: Numbers, most: float, time: float, z: float) -> Numbers:
+    def distances(self, origin: Point2, angles: Array, most: float, time: float, z: float) -> Array:
         """Return how far rays at the height `z` [m] go from a point of `map` at `angles` [rad]; inf beyond `most`."""
         return self.rays.cast(origin, angles, most, self.shapes_near(origin, most, time, z, z), z)
 
@@ -152,7 +155,7 @@ class SimulatedWorld:
         return [WorldShape(robot.name, robot.solid, Pose2(*at)) for robot, at in near]
 
     @cached_property
-    def _extents(self) -> Numbers:
+    def _extents(self) -> Array:
         """Return how far each other robot extends, and how high it is (2, n) [m]."""
         return np.array([(robot.solid.reach, robot.solid.height) for robot in self.robots], float).reshape(-1, 2).T
 
@@ -165,7 +168,7 @@ class SimulatedWorld:
         return [part for shape in self.shapes if shape.path is None for part in shape.convex]
 
     @cached_property
-    def _standing(self) -> Numbers:
+    def _standing(self) -> Array:
         """Return x, y, how far it extends, and the heights of bottom and top of each shape that stands (5, n) [m]."""
         rows = [(one.pose.x, one.pose.y, one.solid.reach, one.z, one.z + one.solid.height) for one in self._still]
         return np.array(rows, float).reshape(-1, 5).T
@@ -175,11 +178,11 @@ class SimulatedWorld:
 class RobotsMotion:
     """How robots move since a robot time [s]: x, y [m], heading [rad], speed [m/s], turn rate [rad/s] of each."""
 
-    at_first: Numbers
+    at_first: Array
     """(n, 5)."""
     since: float
 
-    def at(self, time: float) -> Numbers:
+    def at(self, time: float) -> Array:
         """Return x, y and heading of each at a time [s] (n, 3); after `FORESEEN` they stand."""
         age = min(max(time - self.since, 0.0), FORESEEN)
         x, y, heading, speed, turn_rate = self.at_first.T
@@ -207,14 +210,14 @@ def grid_of(message: OccupancyGrid) -> GridMap:
     """
     about = message.info
     if not len(message.data):
-        return NO_WALLS
+        return no_walls()
     cells = np.asarray(message.data, np.int8).reshape(about.height, about.width)
     return GridMap(cells, about.resolution, pose_in(about.origin))
 
 
 def world_message(world: SimulatedWorld, header: Header, time: float = 0.0) -> ours.World:
     """Return a world as a message; `time` is robot time [s] at the stamp of the header."""
-    grid = OccupancyGrid(header=header) if world.grid is NO_WALLS else grid_message(world.grid, header)
+    grid = OccupancyGrid(header=header) if world.grid is no_walls() else grid_message(world.grid, header)
     colours = world.colours or ("",) * len(world.shapes)
     shapes = tuple(map(_shape_message, world.shapes, colours))
     at = world.start

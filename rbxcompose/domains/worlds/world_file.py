@@ -8,10 +8,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.config import Angle, Config, Length, Mass, Name, Place, Ratio, Time
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Report, Span, kind
@@ -29,7 +28,7 @@ from rbxcompose.domains.worlds.shapes import (
     WorldShape,
 )
 from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, TAG_FAMILIES, TagSide, tag_on
-from rbxcompose.domains.worlds.world import NO_WALLS
+from rbxcompose.domains.worlds.world import no_walls
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.fields import FileName
 from rbxcompose.manifest.files import resolve, shown_name
@@ -243,7 +242,7 @@ def read_world(path: Path, documents: Documents, span: Span) -> WorldFile | None
     read = validate(WorldModel, root, (), documents.report) if root is not None else None
     if read is None or root is None:
         return None
-    grid, file = NO_WALLS, None
+    grid, file = no_walls(), None
     if read.map is not None:
         written = value_span(root, ("map",))
         found = resolve(read.map, path, written)
@@ -312,7 +311,7 @@ def world_mesh(path: Path, scale: Vector3) -> WorldMesh:
     return WorldMesh(tuple(_hull(np.asarray(part.vertices, float), path.name) for part in parts))
 
 
-def _hull(points: NDArray[np.float64], name: str) -> tuple[float, WorldHull]:
+def _hull(points: Array, name: str) -> tuple[float, WorldHull]:
     """Return the height of a part above the ground [m], and its convex hull."""
     import trimesh
 

@@ -20,9 +20,7 @@ from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import AnyArray, Array, np
 from rbxcompose.base.config import Config, Length, Time
 from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.geometry import Transform3
@@ -51,7 +49,7 @@ from rbxcompose.domains.arms.command_line import (
 )
 from rbxcompose.domains.arms.goals import goal_of
 from rbxcompose.domains.arms.motion import figures as measures
-from rbxcompose.domains.arms.motion.groups import Array, moved_links
+from rbxcompose.domains.arms.motion.groups import moved_links
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseSolutions, PoseTarget, Posture, searched
 from rbxcompose.domains.arms.motion.path_constraints import KeptTip
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest, Planning
@@ -261,7 +259,7 @@ def run_inverse(arguments: argparse.Namespace, robot: ArmOfRobot, works: ArmWork
     raise NotDoneError(NO_MOTION.at(None, words))
 
 
-def _target(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[Any]) -> PoseTarget:
+def _target(arguments: argparse.Namespace, works: ArmWorks, start: AnyArray) -> PoseTarget:
     """Return the pose that is asked for, in the frame of the root."""
     links, pose = works.kinematics.poses(start), read_written(FramePose, arguments.target).to_transform()
     if arguments.frame and arguments.frame not in links:
@@ -278,7 +276,7 @@ def _target(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[Any])
 
 
 def _found(
-    arguments: argparse.Namespace, works: ArmWorks, robot: ArmOfRobot, target: PoseTarget, start: NDArray[Any]
+    arguments: argparse.Namespace, works: ArmWorks, robot: ArmOfRobot, target: PoseTarget, start: AnyArray
 ) -> PoseSolutions:
     solver, began = works.solver, perf_counter()
     prefer = arguments.prefer or solver.prefer

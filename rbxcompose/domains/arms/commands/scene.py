@@ -19,10 +19,11 @@ from rbxcompose.commands.console import NotDoneError, emit, misused, refuse, tab
 from rbxcompose.commands.lookup import add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, out_option, run_action
 from rbxcompose.domains.arms import scene_view
+from rbxcompose.domains.arms.command_line import write_picture
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
 from rbxcompose.domains.arms.motion.scene_text import written_scene
 from rbxcompose.domains.arms.sections.scene import NO_MESH, ObjectModel, file_mistake, scene_of
-from rbxcompose.domains.body.meshes import MissingLibraryError
+from rbxcompose.domains.body.meshes import MissingLibraryError, read_mesh
 from rbxcompose.domains.body.model import Body, Geometry
 from rbxcompose.domains.body.urdf import read_body
 from rbxcompose.domains.body.xml_reader import read_urdf
@@ -174,8 +175,6 @@ def _with_triangles(thing: PlacedObject) -> PlacedObject:
 def _read(shape: Geometry) -> Geometry:
     if not shape.file:
         return shape
-    from rbxcompose.domains.body.meshes import read_mesh  # numpy, which other actions do not need
-
     solid = read_mesh(Path(shape.file), shape.file)
     points, triangles = solid.vertices.flatten().tolist(), solid.faces.flatten().tolist()
     return replace(shape, file="", points=tuple(points), triangles=tuple(triangles))
@@ -226,7 +225,6 @@ def _distance_row(pair: PairDistance) -> tuple[str, str, str]:
 
 
 def _picture(arguments: argparse.Namespace) -> int:
-    from rbxcompose.domains.arms.command_line import write_picture  # numpy, which other actions do not need
     from rbxcompose.domains.arms.motion.picture import ArmPicture, draw_arm
 
     view = _view(arguments)

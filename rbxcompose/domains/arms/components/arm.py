@@ -6,9 +6,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
-
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import Vector3, rpy_from_quaternion
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.arms import goals as arm_goals

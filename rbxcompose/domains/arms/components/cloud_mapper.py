@@ -9,15 +9,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import Array, Bools, Ints, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.collisions import Shapes, readers_of
-from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.scene import OCTREE, PLANE, SCENE_LIMITS, PlacedObject, mistake_among
 from rbxcompose.domains.arms.motion.scene_messages import object_message, placed_object
 from rbxcompose.domains.body.model import Body, Geometry
@@ -29,7 +27,6 @@ from rbxcompose.msgs.sensor_msgs import JointState, PointCloud2
 from rbxcompose.msgs.stamps import NANOSECONDS, to_nanoseconds
 from rbxcompose.sdk.updater import TaskStatus
 
-Keys = NDArray[np.int64]
 _BITS = 21  # of the number of a cell along each axis
 _HALF, _MASK = 1 << (_BITS - 1), (1 << _BITS) - 1
 
@@ -39,7 +36,7 @@ class SeenCells:
 
     def __init__(self, side: float, forget: float) -> None:
         self.side, self.forget = side, forget
-        self._keys: Keys = np.empty(0, dtype=np.int64)  # sorted
+        self._keys: Ints = np.empty(0, dtype=np.int64)  # sorted
         self._seen: Array = np.empty(0)
 
     def __len__(self) -> int:
@@ -64,17 +61,14 @@ class SeenCells:
         """Return the middles of all cells [m], of shape (n, 3)."""
         return self._middles(self._keys)
 
-    def _key(self, points: Array) -> Keys:
+    def _key(self, points: Array) -> Ints:
         cells = np.floor(points / self.side).astype(np.int64) + _HALF
         cells = cells[np.all((cells >= 0) & (cells <= _MASK), axis=1)]
         return np.asarray(cells[:, 0] << 2 * _BITS | cells[:, 1] << _BITS | cells[:, 2])
 
-    def _middles(self, keys: Keys) -> Array:
+    def _middles(self, keys: Ints) -> Array:
         cells = np.stack([keys >> 2 * _BITS, keys >> _BITS & _MASK, keys & _MASK], axis=1)
         return (cells - _HALF + 0.5) * self.side
-
-
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +104,7 @@ class SpaceFilter:
         """Tell points within these objects, too; an octree is none of them: it is made of points."""
         self._objects = tuple(self._of_objects(objects))
 
-    def within(self, points: Array, poses: Mapping[str, Transform3], padding: float) -> Flags:
+    def within(self, points: Array, poses: Mapping[str, Transform3], padding: float) -> Bools:
         """Return which points, of shape (n, 3) in the root's frame, are less than `padding` [m] from a shape.
 
         `poses` are those of links in the root's frame.
@@ -135,12 +129,12 @@ class SpaceFilter:
         return FilledSpace(link, shape, pose, np.array(box.min_), np.array(box.max_))
 
 
-def _within(space: FilledSpace, points: Array, pose: Transform3, padding: float) -> Flags:
+def _within(space: FilledSpace, points: Array, pose: Transform3, padding: float) -> Bools:
     own = (points - pose.translation) @ rotation_matrix(pose.rotation)  # in the frame of the shape
     if space.shape.kind == PLANE:
         *normal, offset = space.shape.size
         return np.asarray(own @ normal + offset <= padding)
-    inside: Flags = np.all((own >= space.low - padding) & (own <= space.high + padding), axis=1)
+    inside: Bools = np.all((own >= space.low - padding) & (own <= space.high + padding), axis=1)
     if space.shape.kind == "sphere":
         inside &= np.einsum("ij,ij->i", own, own) <= (space.shape.size[0] + padding) ** 2
     elif space.shape.kind in ("cylinder", "cone", "capsule"):

@@ -8,9 +8,9 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import numpy as np
 from pydantic import Field
 
+from rbxcompose.base.arrays import np
 from rbxcompose.base.findings import Finding
 from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, angle_between
 from rbxcompose.base.printable import plain

@@ -10,10 +10,10 @@ import math
 from collections.abc import Collection, Iterable
 from dataclasses import replace
 
-import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3, angle_between
 from rbxcompose.base.levels import Level

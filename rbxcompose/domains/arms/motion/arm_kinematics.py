@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, Ints, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
-from rbxcompose.domains.arms.motion.groups import ArmGroup, Array, leader_of
+from rbxcompose.domains.arms.motion.groups import ArmGroup, leader_of
 from rbxcompose.domains.arms.motion.numba_cache import is_installed
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.pinocchio_model import PinocchioModel
@@ -28,7 +26,7 @@ class _Entry:
     turns: bool
 
 
-def _arrays(entries: Sequence[_Entry]) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array]:
+def _arrays(entries: Sequence[_Entry]) -> tuple[Ints, Ints, Array, Array]:
     """Return places, indices, multipliers and offsets of several of them."""
     rows = np.array([(each.place, each.index, each.multiplier, each.offset) for each in entries], dtype=float)
     places, indices, multipliers, offsets = rows.reshape(-1, 4).T

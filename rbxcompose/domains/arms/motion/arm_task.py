@@ -8,15 +8,14 @@ from dataclasses import field, replace
 from functools import partial
 from typing import Protocol, TypeVar
 
-import numpy as np
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion import inverse_kinematics
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import pairs_shown
-from rbxcompose.domains.arms.motion.groups import Array, JointSpace
+from rbxcompose.domains.arms.motion.groups import JointSpace
 from rbxcompose.domains.arms.motion.inverse_kinematics import Posture, kept_solutions, searched
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory, speeds_of
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip

@@ -12,13 +12,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import ArrayLike
-
+from rbxcompose.base.arrays import Array, ArrayLike, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, Array, JointSpace, moved_links, solid_link
+from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, JointSpace, moved_links, solid_link
 from rbxcompose.domains.arms.motion.octree_files import cells_in
 from rbxcompose.domains.arms.motion.parametrisation import toppra
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject

@@ -7,10 +7,10 @@ from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbxcompose.base.arrays import Array, Ints
 from rbxcompose.base.geometry import Transform3, Vector3, rotate
-from rbxcompose.domains.arms.motion.groups import ArmGroup, Array, leader_of
+from rbxcompose.domains.arms.motion.groups import ArmGroup, leader_of
 from rbxcompose.domains.arms.motion.numba_cache import borrowed, compiled, inlined
 from rbxcompose.domains.body.model import Body
 
@@ -45,7 +45,6 @@ def apply(frame: Array, point: Array, found: Array) -> None:
         found[row] = frame[row, 0] * point[0] + frame[row, 1] * point[1] + frame[row, 2] * point[2] + frame[row, 3]
 
 
-Indices = NDArray[np.int64]
 ChainRow = tuple[int, int, Transform3, Vector3, int, float, float]  # of a `Chain`
 
 FIXED, TURNS, SLIDES = 0, 1, 2
@@ -58,15 +57,15 @@ class Chain(NamedTuple):
     A joint is at `multipliers * q[joints] + offsets` [rad or m]; `q` are positions of the arm's joints, of shape (n,).
     """
 
-    parents: Indices
+    parents: Ints
     """The frame that carries it, -1 for the root."""
-    kinds: Indices
+    kinds: Ints
     """FIXED, TURNS or SLIDES."""
     places: Array
     """Its frame in that of its parent at position 0, of shape (m, 3, 4): the rotation, then the translation [m]."""
     axes: Array
     """Unit vectors in its own frame, of shape (m, 3)."""
-    joints: Indices
+    joints: Ints
     multipliers: Array
     offsets: Array
 
@@ -204,7 +203,7 @@ class HullWork(NamedTuple):
     nearest: Array
     turned: Array
     gram: Array
-    stack: NDArray[np.int64]
+    stack: Ints
     """Nodes of two trees that are still to be regarded, of shape (k, 2)."""
 
 
@@ -399,8 +398,6 @@ def _is_within(gram: Array) -> bool:
     return bool(t >= 0.0 and u >= 0.0 and w >= 0.0 and t + u + w <= 1.0)
 
 
-Whole = NDArray[np.int64]
-
 LAST, EXAMINED = 0, 1
 """What stands in `Workspace.about`."""
 COARSE = 4  # points of a line that are examined first, and up to twice as many
@@ -413,8 +410,8 @@ class Spheres(NamedTuple):
     centres: Array
     """The middle of each sphere, of shape (k, 3)."""
     radii: Array
-    children: Whole
-    spans: Whole
+    children: Ints
+    spans: Ints
     corners: Array
 
 
@@ -423,28 +420,28 @@ class CompiledModel(NamedTuple):
 
     chain: Chain
     """The links that the arm moves; what is fixed to one of them is in its frame."""
-    groups: Whole
+    groups: Ints
     """Which frame of the chain moves each of s shapes."""
     poses: Array
     """The frame of each shape in the one that moves it, of shape (s, 3, 4)."""
-    kinds: Whole
+    kinds: Ints
     sizes: Array
     """Half lengths of boxes, radius and half length of cylinders, normal and offset of half spaces, of shape (s, 4)."""
-    roots: Whole
+    roots: Ints
     """The first sphere of each shape."""
     spheres: Spheres
-    firsts: Whole
+    firsts: Ints
     """The shape of each of p pairs whose spheres are used."""
-    seconds: Whole
+    seconds: Ints
     margins: Array
     """How far the shapes of each pair must be from each other [m], of shape (p,)."""
     reaches: Array
     """The distance of the middles of both [m] beyond which they are; inf for half spaces."""
     extents: Array
     """How far shapes are from the frame that moves them [m], for each frame of the chain."""
-    couples: Whole
+    couples: Ints
     """The frames of the chain that move the shapes of some pair, of shape (c, 2)."""
-    coupled: Whole
+    coupled: Ints
     """Which of these move the shapes of each pair, of shape (p,)."""
 
 
@@ -460,9 +457,9 @@ class Workspace(NamedTuple):
     """By how much [m] the frames of each pair may have moved to each other when it is to be examined."""
     now: Array
     """By how much each couple of frames can have moved, of shape (c,)."""
-    about: Whole
+    about: Ints
     """The pair that was near last, which is examined first, and how many points were examined."""
-    first: Whole
+    first: Ints
     """Of shape (1, 2): one near pair of one point."""
     between: Array
     axes: Array
@@ -491,7 +488,7 @@ def workspace(model: CompiledModel) -> Workspace:
 
 
 @compiled
-def near_pairs(model: CompiledModel, points: Array, found: Whole, work: Workspace) -> int:
+def near_pairs(model: CompiledModel, points: Array, found: Ints, work: Workspace) -> int:
     """Write which pairs may be too near at points of shape (m, n), as rows of (point, pair); return how many.
 
     It ends when `found`, of shape (k, 2), is full: then the last point that is in it may lack pairs. What is farther
@@ -735,7 +732,7 @@ def levers(model: CompiledModel, points: Array) -> Array:
 
 
 @inlined
-def _is_any_due(due: Array, now: Array, coupled: Whole) -> bool:
+def _is_any_due(due: Array, now: Array, coupled: Ints) -> bool:
     """Return whether a pair is to be examined."""
     for pair in range(len(due)):  # noqa: SIM110  (numba has no generators here)
         if not due[pair] > now[coupled[pair]]:

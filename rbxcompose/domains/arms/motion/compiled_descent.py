@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rbxcompose.base.arrays import Array
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.compiled_collisions import FIXED, TURNS, Chain, chain_of, matrix_of, place_links
 from rbxcompose.domains.arms.motion.damped_steps import DAMPING, LEAST_DAMPING, LONGEST, PATIENCE, PROGRESS
-from rbxcompose.domains.arms.motion.groups import ArmGroup, Array
+from rbxcompose.domains.arms.motion.groups import ArmGroup
 from rbxcompose.domains.arms.motion.numba_cache import compiled, inlined
 from rbxcompose.domains.body.model import Body
 

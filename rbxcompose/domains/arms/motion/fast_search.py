@@ -13,14 +13,12 @@ from collections.abc import Generator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbxcompose.base.arrays import Array, Ints, Words
 from rbxcompose.domains.arms.motion.compiled_collisions import CompiledModel, Workspace, is_line_free, near_pairs
-from rbxcompose.domains.arms.motion.groups import Array, JointSpace
+from rbxcompose.domains.arms.motion.groups import JointSpace
 from rbxcompose.domains.arms.motion.numba_cache import borrowed, compiled, inlined
 from rbxcompose.domains.arms.motion.search import MARGIN, sample_range
-
-Whole = NDArray[np.int64]
 
 GAIN = 0.02  # of a piece of a path: a shortcut that saves less is not examined
 WIDE = 10_000  # examined positions, after which samples are from all of their ranges
@@ -36,19 +34,19 @@ class SearchTrees(NamedTuple):
 
     nodes: Array
     """Of shape (2, k, n)."""
-    parents: Whole
+    parents: Ints
     """The node before each one, of shape (2, k)."""
-    counts: Whole
+    counts: Ints
     """How many nodes each tree has."""
     domains: Array
     """How far a sample may be from each node to be worth a branch, of shape (2, k); inf until one was not free."""
-    about: Whole
-    seed: NDArray[np.uint64]
+    about: Ints
+    seed: Words
     """The state of the random numbers, of shape (1,)."""
 
 
 @inlined
-def random(seed: NDArray[np.uint64]) -> float:
+def random(seed: Words) -> float:
     """Return a random number from 0 to 1."""
     seed[0] += np.uint64(0x9E3779B97F4A7C15)
     mixed = seed[0]
@@ -135,14 +133,7 @@ def extend(
 
 @compiled
 def shorten(
-    model: CompiledModel,
-    path: Array,
-    count: int,
-    tries: int,
-    step: float,
-    seed: NDArray[np.uint64],
-    about: Whole,
-    work: Workspace,
+    model: CompiledModel, path: Array, count: int, tries: int, step: float, seed: Words, about: Ints, work: Workspace
 ) -> int:
     """Shorten a path of `count` points in place; return how many there are then. It has room for `tries` more."""
     model, path, about, work = borrowed(model), borrowed(path), borrowed(about), borrowed(work)
@@ -182,7 +173,7 @@ def shorten(
 
 
 @inlined
-def reduce(model: CompiledModel, path: Array, count: int, step: float, about: Whole, work: Workspace) -> int:
+def reduce(model: CompiledModel, path: Array, count: int, step: float, about: Ints, work: Workspace) -> int:
     """Leave out points of a path in place where the straight line past them is free; return how many are left."""
     kept, here = 1, 0
     while here < count - 1:

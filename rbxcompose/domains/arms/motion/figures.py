@@ -16,15 +16,15 @@ from itertools import combinations, islice, pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
 import yaml
 
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import STL, TOUCH, coal_shape
-from rbxcompose.domains.arms.motion.groups import Array, JointSpace, leader_of
+from rbxcompose.domains.arms.motion.groups import JointSpace, leader_of
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseTarget, SolverSettings, solved
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionPlanner, MotionRequest

@@ -16,11 +16,9 @@ from collections.abc import Mapping
 from enum import StrEnum
 from itertools import product
 
-import numpy as np
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3, composed, quaternion_between
-from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.section_models import HeadTracking
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.servos.limits import MotionLimits

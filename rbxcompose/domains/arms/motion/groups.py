@@ -8,14 +8,10 @@ from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.servos.limits import MotionLimits
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,7 @@ from dataclasses import replace
 from itertools import product
 from typing import ClassVar, Protocol, TypeVar
 
-import numpy as np
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import (
     Quaternion,
@@ -29,7 +28,7 @@ from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.arm_task import SETTLING, ArmGoal, ArmSite, ArmTask, gone_on
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
 from rbxcompose.domains.arms.motion.grasps import Grasp, grasps_of, least_width, reach_of, solid_of
-from rbxcompose.domains.arms.motion.groups import Array, JointSpace, interpolated
+from rbxcompose.domains.arms.motion.groups import JointSpace, interpolated
 from rbxcompose.domains.arms.motion.inverse_kinematics import TOLERANCE, PoseSearch, PoseTarget, descended, solved
 from rbxcompose.domains.arms.motion.planner import RESOLUTION, MotionPlan, MotionPlanner, MotionRequest, Planning
 from rbxcompose.domains.arms.motion.scene import PlacedObject

@@ -12,7 +12,7 @@ from pathlib import Path
 from struct import Struct, pack
 from typing import Any
 
-import numpy as np
+from rbxcompose.base.arrays import np
 
 LIBRARY = ".so"
 ENTRY, KINDS = "entry", "kinds"  # what a library exports: the function, and the types that it takes

@@ -8,15 +8,14 @@ from dataclasses import replace
 from itertools import zip_longest
 from typing import Protocol
 
-import numpy as np
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import NO_ROTATION, Transform3, angle_between, multiply
 from rbxcompose.domains.arms.motion import scene as scenes
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.arm_task import ArmGoal, ArmSite, ArmTask, GivenTask
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
-from rbxcompose.domains.arms.motion.groups import Array, JointSpace
+from rbxcompose.domains.arms.motion.groups import JointSpace
 from rbxcompose.domains.arms.motion.inverse_kinematics import (
     PoseSearch,
     PoseSolutions,

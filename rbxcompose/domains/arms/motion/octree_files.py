@@ -6,10 +6,8 @@ import struct
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.files import read_regular
-from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.scene import MOST_POINTS
 from rbxcompose.domains.body.model import Geometry
 

@@ -11,10 +11,9 @@ from itertools import pairwise
 from types import ModuleType
 from typing import Any
 
-import numpy as np
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.domains.arms.motion.groups import Array, JointSpace
+from rbxcompose.domains.arms.motion.groups import JointSpace
 
 
 @dataclass(frozen=True, slots=True)

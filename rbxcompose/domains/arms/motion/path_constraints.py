@@ -7,13 +7,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field, replace
 from typing import Any
 
-import numpy as np
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3, conjugate, multiply, quaternion_between
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker
-from rbxcompose.domains.arms.motion.groups import ArmJoint, Array, JointSpace, solid_link
+from rbxcompose.domains.arms.motion.groups import ArmJoint, JointSpace, solid_link
 from rbxcompose.domains.body.model import Body, Geometry
 from rbxcompose.domains.worlds.physics.solids import rotation_matrix
 

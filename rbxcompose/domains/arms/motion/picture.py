@@ -8,12 +8,9 @@ from itertools import pairwise
 from pathlib import Path
 from textwrap import wrap
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, Ints, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3
-from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.octree_files import cells_in
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.body import picture as body_picture
@@ -106,7 +103,7 @@ def _cells(shape: Geometry) -> Solid:
     return Solid(vertices, faces, np.tile(SAND, (len(faces), 1)))
 
 
-def cubes(middles: Array, side: float) -> tuple[Array, NDArray[np.int64]]:
+def cubes(middles: Array, side: float) -> tuple[Array, Ints]:
     """Return corners [m] and triangles of cubes around middles [m], the same number of triangles for each."""
     box = next(body_picture.solids_of(Geometry("box", (side,) * 3), {}))
     corners = (middles[:, None] + box.vertices[None]).reshape(-1, 3)

@@ -8,12 +8,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from textwrap import wrap
 
-import numpy as np
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker
-from rbxcompose.domains.arms.motion.groups import Array, JointSpace
+from rbxcompose.domains.arms.motion.groups import JointSpace
 from rbxcompose.domains.arms.motion.picture import ArmPicture, cubes, solids_in
 from rbxcompose.domains.body.meshes import Solid, joined
 from rbxcompose.domains.body.picture import bounds_of, need_for_pictures, png_of, rendered

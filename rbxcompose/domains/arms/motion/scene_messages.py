@@ -8,10 +8,8 @@ from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.geometry import Transform3, Vector3, quaternion_between
-from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.scene import Colour, PlacedObject, ScenePiece

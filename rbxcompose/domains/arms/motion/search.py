@@ -15,9 +15,8 @@ from collections.abc import Callable, Generator
 from contextlib import closing
 from typing import Any
 
-import numpy as np
-
-from rbxcompose.domains.arms.motion.groups import Array, JointSpace, interpolated
+from rbxcompose.base.arrays import Array, np
+from rbxcompose.domains.arms.motion.groups import JointSpace, interpolated
 from rbxcompose.domains.arms.section_models import OMPL
 
 IsFree = Callable[[Array], bool]

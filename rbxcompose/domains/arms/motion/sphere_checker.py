@@ -14,9 +14,7 @@ import math
 from collections.abc import Collection, Generator, Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, Ints, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion import compiled_collisions, sphere_trees
@@ -24,7 +22,7 @@ from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import CheckedPart, MeshChecker
 from rbxcompose.domains.arms.motion.compiled_collisions import CompiledModel, near_pairs, workspace
 from rbxcompose.domains.arms.motion.fast_search import compile_search, fast_path
-from rbxcompose.domains.arms.motion.groups import Array, JointSpace, leader_of
+from rbxcompose.domains.arms.motion.groups import JointSpace, leader_of
 from rbxcompose.domains.arms.motion.octree_files import cells_in
 from rbxcompose.domains.body.link_pairs import LinkPair
 from rbxcompose.domains.body.model import Geometry
@@ -150,9 +148,7 @@ def _chain(kinematics: ArmKinematics, links: Iterable[str]) -> tuple[compiled_co
     return chain, {name: (index[by], poses[by].inverse().compose(poses[name])) for name, by in carriers.items()}
 
 
-def _ordered(
-    pairs: Sequence[tuple[int, int, float]], kinds: NDArray[np.int64], radii: Array
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+def _ordered(pairs: Sequence[tuple[int, int, float]], kinds: Ints, radii: Array) -> tuple[Ints, Ints, Array]:
     """Return pairs so that the spheres of their first shapes are tested: the smaller solids, which they fit better.
 
     What may be a little within each other is called near as soon as it touches, if it is no box: how deep unions of

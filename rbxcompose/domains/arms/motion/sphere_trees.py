@@ -12,15 +12,12 @@ from contextlib import suppress
 from itertools import product
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
 from xxhash import xxh3_128_hexdigest
 
+from rbxcompose.base.arrays import Array, Ints, Words, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import open_regular, replace_file
-from rbxcompose.domains.arms.motion.groups import Array
 
-Whole = NDArray[np.int64]
 Ball = tuple[Array, float]
 
 SLACK = 1e-6  # [m]
@@ -43,8 +40,8 @@ class SphereTree:
 
     centres: Array
     radii: Array
-    children: Whole
-    spans: Whole
+    children: Ints
+    spans: Ints
     """The first corner of each sphere, and the one after its last, of shape (k, 2); not all spheres have any."""
     corners: Array
     """All that a sphere is for is in their hull, too, of shape (c, 3) [m]."""
@@ -143,7 +140,7 @@ def _is_convex(triangles: Array) -> bool:
     return bool(np.all(np.minimum(heights.max(axis=1), -heights.min(axis=1)) <= FINEST))
 
 
-def _without_corners(centres: Array, radii: Array, children: Whole) -> SphereTree:
+def _without_corners(centres: Array, radii: Array, children: Ints) -> SphereTree:
     return SphereTree(centres, radii, children, np.zeros((len(radii), 2), dtype=np.int64), np.zeros((0, 3)))
 
 
@@ -216,7 +213,7 @@ def _halved_sides(triangles: Array, longest: float) -> Array:
     return np.concatenate((*done, rest))
 
 
-def _interleaved(cells: NDArray[np.uint64]) -> NDArray[np.uint64]:
+def _interleaved(cells: Words) -> Words:
     """Return the bits of three numbers of at most 21 bits, in turn (Morton's code)."""
     found = np.zeros(len(cells), dtype=np.uint64)
     for bit in range(21):

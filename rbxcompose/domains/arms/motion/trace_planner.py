@@ -7,13 +7,12 @@ from collections.abc import Generator, Iterator, Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise
 
-import numpy as np
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, angle_between, conjugate, lerp, multiply, slerp
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
-from rbxcompose.domains.arms.motion.groups import Array, JointSpace
+from rbxcompose.domains.arms.motion.groups import JointSpace
 from rbxcompose.domains.arms.motion.inverse_kinematics import ANGLE_TOLERANCE, TOLERANCE, PoseTarget, descended
 from rbxcompose.domains.arms.motion.parametrisation import MARGIN, Trajectory, jerks_of, speeds_of, timed
 from rbxcompose.domains.arms.motion.planner import FINE, MotionPlan, MotionPlanner, Planning, examined, mistake_in_start

@@ -16,6 +16,7 @@ from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import Finding, Span, kind, suggest
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.printable import plain
+from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.arms.motion.scene import MOST_PADDING, MOST_SHAPES, PlacedObject, mistake_in, settled
 from rbxcompose.domains.arms.motion.scene_text import LARGEST, NO_SCENE, SceneFile, read_scene
 from rbxcompose.domains.arms.section_models import CloudModel
@@ -365,8 +366,6 @@ def file_mistake(model: ObjectModel, file: Path) -> str:
     if model.octree is None:
         problem = mesh_problem(file) if file.suffix.lower() in FORMATS else f"is none of {', '.join(FORMATS)}"
         return problem and f"the mesh '{plain(model.file)}' {problem}"
-    from rbxcompose.domains.arms.motion.octree_files import read_cells  # numpy, which other objects do not need
-
     try:
         cells, _ = read_cells(file, model.octree.cell)
     except ValueError as error:

@@ -233,7 +233,7 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
 
     def on_world(self, message: World) -> None:
         """Stand where the robot is put in this world."""
-        from rbxcompose.domains.worlds.world import world_of  # imports numpy, which most bases do without
+        from rbxcompose.domains.worlds.world import world_of  # most bases are in none
 
         is_new = self.world is None
         self.world = world_of(message)
@@ -316,7 +316,7 @@ class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
 
     def stay_on_ground(self, world: SimulatedWorld, before: Pose2, wheel_distance: float) -> None:
         """Do not move while a wheel has no ground, and tell which one."""
-        from rbxcompose.domains.worlds.sensors import switches  # imports numpy
+        from rbxcompose.domains.worlds.sensors import switches  # which most bases have none of
 
         wheels = {"left": (0.0, wheel_distance / 2), "right": (0.0, -wheel_distance / 2)}
         if self.hangs:

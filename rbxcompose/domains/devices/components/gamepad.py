@@ -14,10 +14,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
 from pydantic import AfterValidator, Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import AT_REST, Velocity2
 from rbxcompose.base.levels import Level

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.devices.nmea import (
     GroundVelocity,

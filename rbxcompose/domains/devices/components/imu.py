@@ -7,10 +7,10 @@ import struct
 from collections import Counter
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.config import BitRate
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Quaternion, Vector3, quaternion_from_rpy

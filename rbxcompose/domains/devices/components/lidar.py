@@ -8,11 +8,10 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import Singles, np
 from rbxcompose.base.config import BitRate
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
@@ -28,7 +27,6 @@ _PACKET = struct.Struct(f"<2xHH{'HB' * POINTS}HHB")
 LENGTH = _PACKET.size  # 47 [B]
 _TURN = 36_000  # [0.01 deg]
 _WIDEST = 3_000  # [0.01 deg] that a packet can span at any speed of the motor
-Ranges = NDArray[np.float32]
 _SLOWEST = 5.0  # [Hz] of turns; it is made for 10
 
 
@@ -106,8 +104,8 @@ class WholeTurn:
     Infinite is no echo, minus infinite one that is too near, and NaN where nothing was measured.
     """
 
-    ranges: Ranges
-    strengths: Ranges
+    ranges: Singles
+    strengths: Singles
     duration: float
 
 
@@ -125,8 +123,8 @@ class TurnMaker:
         self._clear()
 
     def _clear(self) -> None:
-        self._ranges: Ranges = np.full(self._rays, np.nan, np.float32)
-        self._strengths: Ranges = np.zeros(self._rays, np.float32)
+        self._ranges: Singles = np.full(self._rays, np.nan, np.float32)
+        self._strengths: Singles = np.zeros(self._rays, np.float32)
 
     def add(self, packet: LidarPacket) -> Iterator[WholeTurn]:
         """Take a packet in, and yield the turn that it ends."""

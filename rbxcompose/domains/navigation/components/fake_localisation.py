@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.navigation.localiser import BASE, ODOM, Localiser
 from rbxcompose.domains.worlds.poses import pose_in

@@ -6,11 +6,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import ArrayLike, Singles, np
 from rbxcompose.base.geometry import Pose2, wrap_angle
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.navigation.costs import trace
@@ -31,8 +30,6 @@ BEHIND = 0.5  # sides of a cell behind a face in which what has it is marked: it
 SURE = 4.0  # log odds to which a cell goes at most, so that it may change again: 98 %
 IS_OCCUPIED, IS_FREE = math.log(0.65 / 0.35), math.log(0.196 / 0.804)  # the thresholds of map_saver
 WAY, TURNED = 0.1, 0.1  # [m], [rad] by which a sensor moves before the next scan counts: scans of one place err alike
-
-LogOdds = NDArray[np.float32]
 
 
 class MapperConfig(sdk.Config):
@@ -57,7 +54,7 @@ class OccupancyMapper:
         """Take the side of a cell [m], and up to where rays count [m]."""
         self._resolution, self._farthest = resolution, farthest
         self._frame: GridMap | None = None  # where its cells are
-        self._odds: LogOdds = np.zeros((1, 1), np.float32)
+        self._odds: Singles = np.zeros((1, 1), np.float32)
         self._last: Pose2 | None = None  # of the sensor at the last scan that counted
 
     @property
@@ -100,7 +97,7 @@ class OccupancyMapper:
         np.clip(part + change, -SURE, SURE, out=part)
         return True
 
-    def _around(self, sensor: Pose2) -> tuple[GridMap, LogOdds]:
+    def _around(self, sensor: Pose2) -> tuple[GridMap, Singles]:
         """Return the map with enough cells for all that a sensor can see."""
         odds, side = self._odds, self._resolution
         corner = Pose2(*(side * math.floor(place / side) for place in (sensor.x, sensor.y)))

@@ -10,10 +10,10 @@ from itertools import pairwise
 from random import Random
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import AT_REST, Pose2
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import ANGLE, LENGTH, MOST

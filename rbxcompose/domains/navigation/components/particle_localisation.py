@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.navigation.localisation import LocalisationSettings, ParticleFilter

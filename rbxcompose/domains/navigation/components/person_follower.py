@@ -6,10 +6,10 @@ import math
 from dataclasses import replace
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import AT_REST, Pose2
 from rbxcompose.base.units import LENGTH, TIME
 from rbxcompose.domains.bases.driving import BaseDriver

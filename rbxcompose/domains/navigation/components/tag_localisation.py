@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, Transform3, rotate, wrap_angle
 from rbxcompose.base.levels import Level
@@ -23,8 +22,6 @@ from rbxcompose.domains.worlds.physics.solids import rotation_matrix
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.rbxcompose_msgs import Localise
 from rbxcompose.msgs.stamps import to_time
-
-Numbers = NDArray[np.float64]
 
 NOT_SEEN = "not_seen"
 WAY, WAY_TURN, TURN = 0.05, 0.05, 0.05  # errors of odometry [m/m], [rad/m], [rad/rad]
@@ -64,7 +61,7 @@ class PlacedTag:
     name: str
     pose: Pose2
     """Its place in the frame of the robot, and the direction out of it."""
-    covariance: Numbers
+    covariance: Array
     """Of x, y [m^2] and direction [rad^2] (3, 3)."""
     is_square: bool = True
     """Whether it is known how it is turned."""
@@ -77,7 +74,7 @@ class TagFilter:
         """Know where tags are in `map`, with the direction out of each."""
         self.tags = tags
         self.pose: Pose2 | None = None
-        self.covariance: Numbers = np.eye(3) * UNKNOWN
+        self.covariance: Array = np.eye(3) * UNKNOWN
         self.rejected = 0
         """Tags that were not where they should be, one after the other."""
         self._odometry: Pose2 | None = None
@@ -148,7 +145,7 @@ class TagFilter:
         self.rejected, self._elsewhere = 0, None
         return True
 
-    def _begin(self, tag: Pose2, seen: PlacedTag, noise: Numbers) -> None:
+    def _begin(self, tag: Pose2, seen: PlacedTag, noise: Array) -> None:
         """Be where a tag has the robot: what is not known of the tag, is not known of the robot."""
         pose = tag.compose(seen.pose.inverse())
         cos, sin = math.cos(pose.heading), math.sin(pose.heading)
@@ -158,7 +155,7 @@ class TagFilter:
         self.pose, self.covariance = pose, slope @ noise @ slope.T
         self.rejected, self._elsewhere = 0, None
 
-    def _doubt(self, tag: Pose2, seen: PlacedTag, noise: Numbers) -> None:
+    def _doubt(self, tag: Pose2, seen: PlacedTag, noise: Array) -> None:
         """Count tags that have the robot at one place which is another than believed, and go there after a few."""
         self.rejected += 1
         if not seen.is_square:

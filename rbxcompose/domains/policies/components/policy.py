@@ -13,6 +13,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.config import JointName, LocalFiles
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import NotRegularError, TooLargeError, read_regular
@@ -79,8 +80,6 @@ class PolicyNetwork:
         Raises:
             PolicyNetworkError: if it cannot be computed.
         """
-        import numpy as np
-
         given = np.asarray([vector] if self._is_batch else vector, np.float32)
         try:
             found = self._session.run([self._output], {self._input: given})[0]

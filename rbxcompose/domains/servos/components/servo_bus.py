@@ -11,8 +11,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
-import numpy as np
-
+from rbxcompose.base.arrays import np
 from rbxcompose.base.clock import MonotonicClock
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level

@@ -21,8 +21,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Self
 
-import numpy as np
-
+from rbxcompose.base.arrays import np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.devices.serial_ports import LostPortError
 from rbxcompose.domains.servos.bus import FoundServo, ServoReading, ServoStatistics

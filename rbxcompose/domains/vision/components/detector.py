@@ -13,11 +13,10 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import Bytes, Singles, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.manifest.fields import TopicName
@@ -28,8 +27,6 @@ from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.sdk.ports import BULK
 
 SILENCE = 2.0  # [s] without a picture after which diagnostics say so
-Colours = NDArray[np.uint8]
-Numbers = NDArray[np.float32]
 GREY = 114  # of what is beside a picture that is not as long as the network wants it
 LARGEST = 4096  # sides of a picture that a network may want [px]
 
@@ -92,7 +89,7 @@ class Letterbox:
     top: int
 
 
-def fitted(picture: Colours, width: int, height: int) -> tuple[Numbers, Letterbox]:
+def fitted(picture: Bytes, width: int, height: int) -> tuple[Singles, Letterbox]:
     """Return a picture (h, w, 3) as a network wants it (1, 3, height, width), from 0 to 1, and how it was fitted."""
     import cv2
 
@@ -125,7 +122,7 @@ def form_of(shape: Sequence[int], classes: int | None) -> AnswerForm:
 
 
 def things_of(
-    answers: Numbers, box: Letterbox, names: Sequence[str], confidence: float, overlap: float, size: tuple[int, int]
+    answers: Singles, box: Letterbox, names: Sequence[str], confidence: float, overlap: float, size: tuple[int, int]
 ) -> list[FoundThing]:
     """Return what answers of a network say of a picture of a size (width, height), by their score.
 
@@ -200,7 +197,7 @@ class Network:
         self.names = names_in(written.get("names", ""))
         """Of its classes, if the file has them."""
 
-    def answers(self, planes: Numbers) -> Numbers:
+    def answers(self, planes: Singles) -> Singles:
         """Return the first answer of the network to a picture (1, 3, height, width).
 
         Raises:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.levels import Level
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.clouds import CloudError, points_of

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import Array
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.vision.sections.tags import KnownTags
-from rbxcompose.domains.vision.tags import Numbers, SeenTag, TagFinder, board_pose
+from rbxcompose.domains.vision.tags import SeenTag, TagFinder, board_pose
 from rbxcompose.domains.worlds.optics import Intrinsics
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import geometry_msgs as geometry
@@ -52,7 +53,7 @@ class Sight:
     """First that by which it is known; a tag with a name has its number, too."""
     size: float
     pose: Transform3 | None
-    covariance: Numbers | None
+    covariance: Array | None
     doubt: float = 0.0
 
     @property

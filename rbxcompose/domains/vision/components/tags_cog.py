@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.domains.vision.tag_watcher import names_of
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.domains.worlds.optics import picture_message
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.sensor_msgs import Image

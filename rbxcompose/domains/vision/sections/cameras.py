@@ -11,6 +11,7 @@ from pydantic import Field
 
 from rbxcompose.base.config import Angle, Config, Frequency, Length, Time
 from rbxcompose.base.findings import Finding, kind
+from rbxcompose.domains.vision.calibration import CameraFileError, read_calibration
 from rbxcompose.domains.worlds.sections.world import world
 from rbxcompose.manifest.fields import FileName
 from rbxcompose.manifest.files import resolve
@@ -54,8 +55,6 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             config["view"] = f"{model.view!r} rad"
             places = dict[str, KeyPath]()
             if model.calibration is not None:
-                from rbxcompose.domains.vision.calibration import read_calibration  # imports numpy
-
                 known = read_calibration(Path(model.calibration))
                 config["pinhole"] = [known.fx, known.fy, known.cx, known.cy]
                 config["distortion"] = list(known.distortion)
@@ -96,8 +95,6 @@ def cameras(reading: Reading[CameraModel]) -> dict[str, CameraModel]:
 
 def _unlike(file: Path, size: tuple[int, int]) -> str:
     """Return why a file is no calibration of a camera with pictures of a size, or nothing."""
-    from rbxcompose.domains.vision.calibration import CameraFileError, read_calibration  # imports numpy
-
     try:
         known = read_calibration(file)
     except CameraFileError as error:

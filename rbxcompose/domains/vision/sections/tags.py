@@ -11,6 +11,7 @@ from rbxcompose.base.config import Angle, Config, Length, Name, Refers
 from rbxcompose.base.findings import kind
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
 from rbxcompose.domains.vision.sections.cameras import CAMERA, cameras
+from rbxcompose.domains.worlds.optics import optical_frame
 from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, TAG_FAMILIES, no_tag
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring
@@ -103,8 +104,6 @@ class TagsModel(KnownTags):
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     if (found := contents.of(tags)) is None or found.camera is None:
         return
-    from rbxcompose.domains.worlds.optics import optical_frame  # imports numpy
-
     camera = contents.of(cameras)[found.camera]
     config = {
         **{name: getattr(found, name) for name in KnownTags.model_fields},

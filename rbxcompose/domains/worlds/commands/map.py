@@ -11,8 +11,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
+from rbxcompose.base.arrays import np
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import kind
 from rbxcompose.base.units import LENGTH, format_quantity

@@ -26,7 +26,7 @@ from rbxcompose.domains.body.meshes import MissingLibraryError
 from rbxcompose.domains.worlds.picture import png_of, svg_of
 from rbxcompose.domains.worlds.sections.world import world
 from rbxcompose.domains.worlds.shapes import WorldBox, WorldCylinder, WorldMesh, WorldShape
-from rbxcompose.domains.worlds.world import NO_WALLS
+from rbxcompose.domains.worlds.world import no_walls
 from rbxcompose.domains.worlds.world_file import WORLD, WorldFile, WorldObjectModel, read_world
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.files import find, shown_name
@@ -199,7 +199,7 @@ def data_of(found: WorldFile) -> dict[str, object]:
     }
     return {
         "name": found.name,
-        "map": None if grid is NO_WALLS else about,
+        "map": None if grid is no_walls() else about,
         "objects": {name: _object(thing.placed(name), thing.colour) for name, thing in found.objects.items()},
         "spawn": {name: _plain(pose) for name, pose in found.spawn.items()},
         "places": {

@@ -6,11 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, field_validator
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import Bytes, Singles, np
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.worlds.optics import (
     TO_OPTICAL,
@@ -38,8 +37,6 @@ if TYPE_CHECKING:
 PICTURES = ("image", "depth", "points")
 SILENCE = 5.0  # [s] without a picture of the engine after which that is reported
 SIGHT = 50.0  # how far pictures show something, at least [m]
-Colours = NDArray[np.uint8]
-Depths = NDArray[np.float32]
 Side = Annotated[int, Field(ge=16, le=2048)]
 
 
@@ -218,7 +215,7 @@ class CameraSim(WorldSensor[CameraSimConfig]):
         depths = np.frombuffer(message.data, "<f4").reshape(message.height, message.width)
         self.show(header, pixels(colour), depths)
 
-    def show(self, header: Header, colours: Colours, depths: Depths) -> None:
+    def show(self, header: Header, colours: Bytes, depths: Singles) -> None:
         """Publish what was seen without distortion as this camera shows it."""
         wanted = self.wanted
         colours, depths = self.lens.bent(colours, depths)
@@ -231,14 +228,14 @@ class CameraSim(WorldSensor[CameraSimConfig]):
             if "points" in wanted:
                 self.tell(self.bound["points"], cloud_message(header, self.camera.rays, depths, colours))
 
-    def grainy(self, colours: Colours) -> Colours:
+    def grainy(self, colours: Bytes) -> Bytes:
         """Return colours with the grain of the camera."""
         if not self.config.grain:
             return colours
         noise = self.random.normal(0.0, self.config.grain, colours.shape)
         return np.clip(np.rint(colours + noise), 0, 255).astype(np.uint8)
 
-    def measured(self, depths: Depths) -> Depths:
+    def measured(self, depths: Singles) -> Singles:
         """Return depths with noise; -inf is too near, and inf too far, as REP 117 says it."""
         config = self.config
         if config.noise:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import AT_REST, Velocity2
 from rbxcompose.domains.worlds.inertial import ImuReading, imu_message, on_base
 from rbxcompose.domains.worlds.sensors import SensorConfig, WorldSensor

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.domains.worlds.sensors import SensorConfig, WorldSensor
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.sensor_msgs import LaserScan
@@ -59,7 +58,7 @@ class LaserSim(WorldSensor[LaserSimConfig]):
         config = self.config
         is_round = config.view > math.tau - 1e-6  # the last ray is not the first again
         self.step_angle = config.view / max(1, config.rays if is_round else config.rays - 1)
-        self.angles: NDArray[np.float64] = -config.view / 2 + self.step_angle * np.arange(config.rays, dtype=float)
+        self.angles: Array = -config.view / 2 + self.step_angle * np.arange(config.rays, dtype=float)
         self.random = np.random.default_rng(config.seed)
 
     def step(self, dt: float) -> None:

@@ -6,17 +6,17 @@ import math
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import Field
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import Pose2, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.worlds.grid_map import read_map
 from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.domains.worlds.sensors import OTHERS
 from rbxcompose.domains.worlds.shapes import WorldCylinder, WorldShape
-from rbxcompose.domains.worlds.world import FORESEEN, MAP_FRAME, NO_WALLS, SimulatedWorld, world_message
+from rbxcompose.domains.worlds.world import FORESEEN, MAP_FRAME, SimulatedWorld, no_walls, world_message
 from rbxcompose.domains.worlds.world_file import WorldHoleModel, WorldLightModel, WorldObjectModel
 from rbxcompose.msgs import rbxcompose_msgs
 from rbxcompose.msgs.nav_msgs import Odometry
@@ -114,7 +114,7 @@ class WorldSim(sdk.Component[WorldConfig]):
         self.silent: tuple[str, ...] = ()
         self.whole = SimulatedWorld(
             config.name,
-            read_map(Path(config.map)) if config.map else NO_WALLS,
+            read_map(Path(config.map)) if config.map else no_walls(),
             tuple(model.placed(name) for name, model in config.objects.items()),
             Pose2(*config.start),
             config.radius,

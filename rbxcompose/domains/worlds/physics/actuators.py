@@ -6,8 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
+from rbxcompose.base.arrays import np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.worlds.physics.rigid import GRAVITY
 from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, PhysicsWheels, PlacedParts, rolls_freely

@@ -6,9 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import Pose2, Transform3, Velocity2
 from rbxcompose.domains.worlds.inertial import ImuReading
 from rbxcompose.domains.worlds.physics.conversion import OF_ROBOT, TIMESTEP, PhysicsModel, convert, xyzw
@@ -17,7 +15,6 @@ from rbxcompose.domains.worlds.physics.robot import PhysicsRobot
 from rbxcompose.domains.worlds.physics.solids import BodyRepair, rotation_matrix
 from rbxcompose.domains.worlds.world import SimulatedWorld
 
-Numbers = NDArray[np.float64]
 HOLDING = 0.05  # [s] in which wheels make up for an angle that they are behind
 BEHIND = 0.1  # [m/s] that they turn faster for that, at most
 

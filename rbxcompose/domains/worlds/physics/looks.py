@@ -7,9 +7,7 @@ import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Bytes, Singles, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.body.meshes import GREY, MissingLibraryError, read_mesh
@@ -56,9 +54,9 @@ class PhysicsCamera:
 class DepthPicture(NamedTuple):
     """What a camera sees."""
 
-    colours: NDArray[np.uint8]
+    colours: Bytes
     """(height, width, 3): red, green, blue; the upper row first."""
-    depths: NDArray[np.float32]
+    depths: Singles
     """(height, width): distance along the optical axis [m]; inf where nothing is in sight."""
 
 

@@ -6,17 +6,14 @@ from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
 
-import numpy as np
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.body.model import FLOATING, Body, BodyJoint, BodyLink
 from rbxcompose.domains.worlds.physics.solids import (
     BodyRepair,
     BodyRepairs,
-    Matrix,
     PhysicalShape,
-    Points,
     apply,
     box_inertia,
     rotation_matrix,
@@ -45,12 +42,12 @@ class RigidPart:
     """Each collision shape with its link, and its frame in that of this part."""
     mass: float = 0.0
     """In kg."""
-    centre: Points = field(default_factory=lambda: np.zeros(3))
+    centre: Array = field(default_factory=lambda: np.zeros(3))
     """Of mass (3,) [m]."""
-    inertia: Matrix = field(default_factory=lambda: np.zeros((3, 3)))
+    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
     """About the centre, along the axes of the frame (3, 3) [kg m^2]."""
 
-    def add_mass(self, mass: float, centre: Points, inertia: Matrix) -> None:
+    def add_mass(self, mass: float, centre: Array, inertia: Array) -> None:
         """Add a mass with its centre and its inertia about it, both in this frame (parallel axis theorem)."""
         if (whole := self.mass + mass) <= 0.0:
             return

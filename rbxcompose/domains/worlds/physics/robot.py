@@ -7,14 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 
-import numpy as np
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Span
 from rbxcompose.base.geometry import Transform3, Vector3, rotate
 from rbxcompose.domains.body.model import Body, BodyLink, Geometry, Shape
 from rbxcompose.domains.worlds.physics.rigid import RigidPart
-from rbxcompose.domains.worlds.physics.solids import Points, apply
+from rbxcompose.domains.worlds.physics.solids import apply
 
 FOOTPRINT = "base_footprint"
 LEVEL = 5e-3  # what ends within this above the lowest point of a robot reaches the ground, too [m]
@@ -90,13 +89,13 @@ class PlacedParts:
         """Return the height of the lowest point of a part [m], inf without shapes."""
         return float(min((points[:, 2].min() for points in self.points_of(index)), default=math.inf))
 
-    def points_of(self, index: int) -> list[Points]:
+    def points_of(self, index: int) -> list[Array]:
         """Return the outermost points of each shape of a part in the frame of the base (n, 3) [m]."""
         pose = self.poses[index]
         return [apply(pose.compose(at), solid.points) for _, solid, at in self.parts[index].shapes]
 
     @property
-    def centre(self) -> Points:
+    def centre(self) -> Array:
         """Return the centre of all mass in the frame of the base (3,) [m]."""
         masses = np.array([part.mass for part in self.parts])
         centres = [apply(pose, part.centre[None])[0] for part, pose in zip(self.parts, self.poses, strict=True)]

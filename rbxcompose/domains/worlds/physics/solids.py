@@ -7,9 +7,7 @@ from collections.abc import Mapping, MutableSequence
 from itertools import product
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Quaternion, Transform3, Vector3
 from rbxcompose.domains.body.meshes import MissingLibraryError, read_mesh
@@ -19,9 +17,6 @@ THIN = 1e-4  # a side below this is raised to it [m]
 FLAT = 1e-3  # a mesh below this has no hull, but is a box of this thickness [m]
 FACINGS = 1024  # directions in which corners of a mesh are looked for
 RIM = 32  # points on the rim of what is round
-
-Points = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,16 +42,16 @@ class PhysicalShape:
     """Sides; or radius, and length without caps; none for a hull [m]."""
     origin: Transform3
     """Its frame in that of the link."""
-    points: Points
+    points: Array
     """(n, 3): its outermost points in its own frame [m]."""
 
     @property
-    def placed(self) -> Points:
+    def placed(self) -> Array:
         """Return its outermost points in the frame of the link (n, 3) [m]."""
         return apply(self.origin, self.points)
 
 
-def rotation_matrix(rotation: Quaternion) -> Matrix:
+def rotation_matrix(rotation: Quaternion) -> Array:
     """Return the matrix (3, 3) of a unit quaternion."""
     x, y, z, w = rotation
     return np.array(
@@ -68,7 +63,7 @@ def rotation_matrix(rotation: Quaternion) -> Matrix:
     )
 
 
-def apply(pose: Transform3, points: Points) -> Points:
+def apply(pose: Transform3, points: Array) -> Array:
     """Return points (n, 3) of the inner frame of a pose in its outer frame."""
     return np.asarray(points @ rotation_matrix(pose.rotation).T + pose.translation)
 
@@ -93,7 +88,7 @@ def shapes_of(link: BodyLink, shapes: tuple[Shape, ...], meshes: Mapping[str, Pa
     return found
 
 
-def outermost(kind: str, size: tuple[float, ...]) -> Points:
+def outermost(kind: str, size: tuple[float, ...]) -> Array:
     """Return the outermost points of a solid in its frame (n, 3) [m]; of what is round, some of them."""
     if kind == "box":
         return np.array(list(product(*((-side / 2, side / 2) for side in size))))
@@ -137,7 +132,7 @@ def _hull(link: str, shape: Shape, meshes: Mapping[str, Path], repairs: BodyRepa
     return PhysicalShape("box", size, origin, outermost("box", size))
 
 
-def extreme(points: Points) -> Points:
+def extreme(points: Array) -> Array:
     """Return points (n, 3) without those that are the farthest in none of `FACINGS` evenly spread directions.
 
     The directions are a Fibonacci lattice. What is lost of a hull is within (1 - cos 3 deg) of its radius.
@@ -152,7 +147,7 @@ def extreme(points: Points) -> Points:
     return np.asarray(points[np.unique(np.concatenate([(points @ block).argmax(0) for block in blocks]))])
 
 
-def _vertices(geometry: Geometry, meshes: Mapping[str, Path]) -> Points:
+def _vertices(geometry: Geometry, meshes: Mapping[str, Path]) -> Array:
     """Return the corners of a mesh (n, 3) [m]."""
     if geometry.points:
         return np.array(geometry.points).reshape(-1, 3)
@@ -162,7 +157,7 @@ def _vertices(geometry: Geometry, meshes: Mapping[str, Path]) -> Points:
     return np.asarray(vertices)
 
 
-def quaternion_of(matrix: Matrix) -> Quaternion:
+def quaternion_of(matrix: Array) -> Quaternion:
     """Return the unit quaternion of a rotation matrix (3, 3).
 
     The largest of the four components is computed first (S. W. Shepperd, Quaternion from Rotation Matrix, 1978).
@@ -181,7 +176,7 @@ def quaternion_of(matrix: Matrix) -> Quaternion:
     return (x, y, z, w)
 
 
-def box_inertia(mass: float, low: Points, high: Points) -> tuple[Vector3, Matrix]:
+def box_inertia(mass: float, low: Array, high: Array) -> tuple[Vector3, Array]:
     """Return the centre [m] of a solid box between two corners, and its inertia (3, 3) about it [kg m^2]."""
     squares = np.maximum(high - low, FLAT) ** 2
     x, y, z = ((low + high) / 2).tolist()
