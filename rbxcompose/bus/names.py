@@ -9,6 +9,7 @@ from typing import NamedTuple
 from rbxcompose.base.dataclass import dataclass
 
 LONGEST_NAME = 247  # rmw's limit: 255 bytes less the prefixes that some middleware adds
+TRANSFORMS = ("/tf", "/tf_static")  # topics of transforms
 ADMIN = "rbx/"  # prefix of the keys that are not part of ROS 2
 EXCHANGE_DOMAIN = 0  # of what robots share
 DENIED = "rbx_denied/"  # prefix of keys at which messages of other hosts are denied

@@ -4,12 +4,12 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.evaluate import evaluate, holds
 from rbxcompose.base.expressions.text import Template, condition_in_words
 from rbxcompose.base.expressions.tree import Expression, Number
-from rbxcompose.base.expressions.types import UNKNOWN, Type, TypeKind
+from rbxcompose.base.expressions.types import PLACED, UNKNOWN, Type, TypeKind
 from rbxcompose.base.expressions.values import NotArrivedError, Value
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.facts import is_simple, is_sure, takes_time
 from rbxcompose.missions.engine.events import Logged, Reported, SkillEnded, SkillStarted, Transition
-from rbxcompose.missions.engine.instant_actions import PLACED, Getter, act, act_safely, fields_of, getter, place
+from rbxcompose.missions.engine.instant_actions import Getter, act, act_safely, fields_of, getter, place
 from rbxcompose.missions.engine.task import Leaf, MovedChildren, Site, Task
 from rbxcompose.missions.engine.world import Watched
 from rbxcompose.missions.language.fields import (

@@ -13,7 +13,7 @@ from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Refused
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
-from rbxcompose.bus.names import ActionNames, Attachment, data_key, decode_attachment
+from rbxcompose.bus.names import TRANSFORMS, ActionNames, Attachment, data_key, decode_attachment
 from rbxcompose.bus.tokens import EntityKind, mangle
 from rbxcompose.bus.topics import Publisher
 from rbxcompose.bus.transport import Arrival, NoTransport, OnReply, Question, TransportReply
@@ -437,9 +437,6 @@ def _belong_together(first: Recorded, record: Recorded) -> bool:
     )
 
 
-FRAMES = ("/tf", "/tf_static")
-
-
 @dataclass(frozen=True, slots=True)
 class ReplayResult:
     """The result: the number of messages that were as recorded, the first that was not, and what went wrong."""
@@ -458,7 +455,7 @@ def missing_topics(plan: Plan, instance: Instance, topics: Iterable[RecordedTopi
         if isinstance(port, In) and instance.topic(name) in published:
             wanted.add(instance.topic(name))
         if isinstance(port, Looks):
-            wanted |= {frame for frame in FRAMES if frame in published}
+            wanted |= {frame for frame in TRANSFORMS if frame in published}
     return sorted(wanted - recorded)
 
 

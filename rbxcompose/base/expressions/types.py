@@ -185,6 +185,8 @@ TYPES: Mapping[str, Type] = MappingProxyType(
 )
 """The types that a manifest names by one word; a `choice` needs its choices: `choice_of`."""
 
+PLACED, STRUCTURED = (TypeKind.PLACE, TypeKind.POSE), (TypeKind.LIST, TypeKind.MAP)
+
 # A text becomes a place where one is expected, and a place a pose.
 _STANDS_FOR = {
     (TypeKind.TEXT, TypeKind.PLACE),

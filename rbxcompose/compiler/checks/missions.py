@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rbxcompose.base.config import MISSION as MISSION_NAME
 from rbxcompose.base.expressions import tree as syntax
-from rbxcompose.base.expressions.types import FLAG, TypeKind
+from rbxcompose.base.expressions.types import FLAG, PLACED
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import MISSIONS, OWN, WIRING, Finding, Related, Severity, Span, suggest
 from rbxcompose.base.units import TIME, format_quantity
@@ -85,16 +85,15 @@ def _expressions(program: Program) -> Iterator[tuple[ScalarNode, syntax.Expressi
                     continue  # reported where missions are read
 
 
-_PLACED = (TypeKind.PLACE, TypeKind.POSE)  # these are looked up where inputs are bound
-
-
 @check("RBX4131", closed=("places",))
 def place_in_data(robot: Robot) -> Iterator[Finding]:
     """The data or inputs of a mission name a place that the robot does not know."""
     places = robot.manifest.places
     for mission in robot.missions.values():
         program, known = mission.program, {**shortened(mission.program), **constants(mission)}
-        defaults = {name for name, one in program.inputs.items() if one.type.kind not in _PLACED}
+        defaults = {
+            name for name, one in program.inputs.items() if one.type.kind not in PLACED
+        }
         names = program.data.keys() | mission.given.keys() | defaults
         wrong = {name: _without(value, places) for name, value in known.items() if name in names}
         for node, name, datum in places_taken(program, robot.names.skills):

@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Any
 
 from rbxcompose.base.config import NAMES, Name
-from rbxcompose.base.expressions.types import COUNT, FLAG, TYPES, Type, TypeKind, quantity_of
+from rbxcompose.base.expressions.types import COUNT, FLAG, PLACED, TYPES, Type, TypeKind, quantity_of
 from rbxcompose.base.units import TIME
 from rbxcompose.compiler.schema.robot import document
 from rbxcompose.compiler.schema.scalars import DEFINITIONS, Schema, computed, schemas_of
@@ -197,7 +197,7 @@ def _of_field(field: Field) -> Schema:
 
 def _argument(wanted: Type) -> Schema:
     """Return the schema of an argument of a skill."""
-    if wanted.kind in (TypeKind.PLACE, TypeKind.POSE):
+    if wanted.kind in PLACED:
         return {**WORD, "type": ["string", "object"], "x-names": "place"}
     return computed(FLAG) if wanted.kind is TypeKind.FLAG else EXPRESSION
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import NeededFile, Report, Span
+from rbxcompose.bus.names import TRANSFORMS
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.manifest.system_file import HostModel, LinkModel, SystemRobotModel
@@ -78,7 +79,6 @@ class Crossing:
         return any(giver != taker for giver in givers for taker in takers)
 
 
-FRAMES = ("/tf", "/tf_static")  # what a process subscribes to for components that look up frames
 _GIVES = (Out, Serves, ServesAction)
 _TAKES = (In, Calls, CallsAction)
 
@@ -120,7 +120,7 @@ def _ends(instance: Instance, host: str) -> Iterator[tuple[tuple[str, str], End]
     ports: Mapping[str, Port[Any]] = cls.ports(instance.config)
     if any(isinstance(port, Looks) for port in ports.values()):
         looks = next(port for port in ports.values() if isinstance(port, Looks))
-        yield from (((topic, TFMessage.TYPE), End(instance.name, host, looks)) for topic in FRAMES)
+        yield from (((topic, TFMessage.TYPE), End(instance.name, host, looks)) for topic in TRANSFORMS)
     for wire in instance.wires:
         port = ports.get(wire.port)
         if isinstance(port, (*_GIVES, *_TAKES)) and wire.topic:

@@ -7,6 +7,7 @@ from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.printable import plain
 from rbxcompose.base.transforms import TransformTree
 from rbxcompose.bus.graph import GraphName, WireType, find
+from rbxcompose.bus.names import TRANSFORMS
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.guest import NO_NAME, NOBODY, Guest, ReceivedMessage
 from rbxcompose.commands.messages import EchoReader
@@ -18,7 +19,6 @@ from rbxcompose.msgs.std_msgs import String
 from rbxcompose.msgs.tf2_msgs import TFMessage
 
 DESCRIPTION = "robot_description"
-_TOPICS = ("/tf", "/tf_static")
 
 
 def described(guest: Guest, wanted: str | None) -> GraphName:
@@ -74,7 +74,7 @@ class ReceivedFrames:
         self.tree = TransformTree()
         self.writers: dict[str, str] = {}  # names of nodes, by frame
         self._guest = guest
-        self._topics = [graph_name for graph_name in guest.graph().topics if graph_name.name.endswith(_TOPICS)]
+        self._topics = [graph_name for graph_name in guest.graph().topics if graph_name.name.endswith(TRANSFORMS)]
         self._nodes = {end.gid: end.node for topic in self._topics for end in topic.givers}
         self._waiting = set(self._nodes)
         for topic in self._topics:

@@ -5,7 +5,18 @@ from dataclasses import replace
 
 from rbxcompose.base.expressions.check import check
 from rbxcompose.base.expressions.tree import Number, Word, walk
-from rbxcompose.base.expressions.types import COUNT, PLACE, TEXT, UNKNOWN, Type, TypeKind, choice_of, quantity_of
+from rbxcompose.base.expressions.types import (
+    COUNT,
+    PLACE,
+    PLACED,
+    STRUCTURED,
+    TEXT,
+    UNKNOWN,
+    Type,
+    TypeKind,
+    choice_of,
+    quantity_of,
+)
 from rbxcompose.base.findings import Finding, Related, Span, clauses, nearest, suggest
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import NUMBER, QUOTIENT, TIME, Dimension, example
@@ -24,9 +35,6 @@ from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import FieldShape, parse_type
 from rbxcompose.msgs.fields import measure_of
 from rbxcompose.msgs.types import Message
-
-PLACED = (TypeKind.PLACE, TypeKind.POSE)
-STRUCTURED = (TypeKind.LIST, TypeKind.MAP)
 
 
 @mission_check("RBX4105", is_fixable=True)

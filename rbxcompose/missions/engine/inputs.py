@@ -5,7 +5,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from rbxcompose.base.config import Place
-from rbxcompose.base.expressions.types import TypeKind
+from rbxcompose.base.expressions.types import PLACED
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import Finding, Span
 from rbxcompose.manifest.tree import NOWHERE, Entry, ScalarNode
@@ -116,7 +116,7 @@ def _given(declared: Input, entry: Entry, findings: list[Finding]) -> Datum | No
 
 def _placed(datum: Datum, places: Mapping[str, Place], removed: Mapping[str, Span], findings: list[Finding]) -> Value:
     """Return the value; for the name of a place, return the place itself."""
-    if datum.type.kind not in (TypeKind.PLACE, TypeKind.POSE):
+    if datum.type.kind not in PLACED:
         return datum.value
     name = str(datum.value)
     if name in removed:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from rbxcompose.base.expressions.evaluate import evaluate
 from rbxcompose.base.expressions.text import parse_template
 from rbxcompose.base.expressions.tree import Expression, ExpressionNode, FieldAccess, Index, Variable
-from rbxcompose.base.expressions.types import Type, TypeKind
+from rbxcompose.base.expressions.types import PLACED, Type, TypeKind
 from rbxcompose.base.expressions.values import Value, is_located, is_named_pose, is_same
 from rbxcompose.manifest.tree import ScalarNode, TreeNode
 from rbxcompose.missions.engine.events import Logged, Published
@@ -143,7 +143,6 @@ def _do(deeds: Deeds, task: Task) -> None:
 
 
 Getter = Callable[[Task], Value]
-PLACED = (TypeKind.PLACE, TypeKind.POSE)
 
 
 def getter(value: TreeNode, wanted: Type) -> Getter:

@@ -4,13 +4,12 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import assert_never
 
-from rbxcompose.base.levels import Level
+from rbxcompose.base.levels import LOG_LEVELS, Level
 from rbxcompose.base.units import format_number
 from rbxcompose.missions.engine import events
 from rbxcompose.missions.engine.world import show
 from rbxcompose.missions.program.program import RESTART
 
-LEVELS = {"info": Level.OK, "warn": Level.WARN, "error": Level.ERROR}
 RESULTS = {"success": Level.OK, "halted": Level.OK, "failure": Level.WARN}
 
 
@@ -59,7 +58,7 @@ class MissionStory:
             case events.Published(topic=topic, fields=fields):
                 return Level.OK, f"published on {topic}: {show(None, fields)}"
             case events.Logged(level=level, text=text):
-                return LEVELS[level], text
+                return LOG_LEVELS[level], text
             case events.Reported(place=place, message=message):
                 return Level.WARN, f"{place}: {message}"
             case events.Stopped(node=node, place=place, text=name, after=after):

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.tree import Expression
-from rbxcompose.base.expressions.types import TYPES, UNKNOWN, Type, TypeKind, choice_of
+from rbxcompose.base.expressions.types import STRUCTURED, TYPES, UNKNOWN, Type, choice_of
 from rbxcompose.base.findings import Finding, Related, Report, Span
 from rbxcompose.manifest.arguments import CHOICE, unknown_type
 from rbxcompose.manifest.documents import misspelt_keys, with_keys
@@ -73,7 +73,7 @@ def _input(name: str, entry: Entry, report: Report) -> Input:
     if (wanted := _type(name, value, entry, report)) is None:
         return Input(name, UNKNOWN, place, is_sound=False)
     default, least, most = (_value(value.get(key), wanted, f"'{key}'", report) for key in ("default", "min", "max"))
-    if default and wanted.kind in (TypeKind.LIST, TypeKind.MAP):
+    if default and wanted.kind in STRUCTURED:
         wanted = default.type
     is_sound = value.entries.keys() <= {*INPUT_KEYS} and (default is not None or "default" not in value)
     read = Input(name, wanted, place, default, _number(least), _number(most), is_sound)

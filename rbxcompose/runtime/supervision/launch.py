@@ -26,11 +26,9 @@ from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
 from rbxcompose.runtime.supervision.judge import FiledRules
 from rbxcompose.runtime.supervision.leftovers import end_leftovers
 from rbxcompose.runtime.supervision.prefork import Launch
-from rbxcompose.runtime.supervision.supervisor import Supervisor
+from rbxcompose.runtime.supervision.supervisor import ENDINGS, Supervisor
 
 FINDINGS = 1  # exit code: nothing was started
-
-_ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +80,7 @@ class Started:
         self.pid = pid
         self._reports = reports
         self._received = b""
-        self._previous = {number: signal.signal(number, self._pass_on) for number in _ENDINGS}
+        self._previous = {number: signal.signal(number, self._pass_on) for number in ENDINGS}
 
     def wait_for_report(self, seconds: float | None) -> LaunchReport | None:
         """Return its next report, or None if there is none within `seconds` [s].
@@ -124,14 +122,14 @@ def start_supervisor(plan: Plan, options: RunOptions, rules: FiledRules | None =
     clock = MonotonicClock()
     ours, theirs = os.pipe2(os.O_CLOEXEC)
     caller = os.getpid()
-    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDINGS)  # an interrupt waits until its handler is installed
+    signal.pthread_sigmask(signal.SIG_BLOCK, ENDINGS)  # an interrupt waits until its handler is installed
     pid = os.fork()
     if pid == 0:
         os.close(ours)
         _become_supervisor(plan, options, rules, clock, theirs, caller)
     os.close(theirs)
     started = Started(pid, ours)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDINGS)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDINGS)
     return started
 
 

@@ -97,7 +97,7 @@ def _written(instance: Instance) -> set[str]:
 
 _TAIL = 8000  # [B] of a process's printed output that go into the log
 _LONGEST_WAIT = 60.0  # [s]
-_ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _OWNER = "supervisor"
 
 
@@ -148,10 +148,10 @@ class Supervisor:
 
     def run(self) -> int:
         """Run the robot from the first fork to the last exit and return the exit code."""
-        for number in _ENDINGS:
+        for number in ENDINGS:
             signal.signal(number, self._on_signal)
         signal.set_wakeup_fd(self._wake.fileno(), warn_on_full_buffer=False)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDINGS)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDINGS)
         adopt_orphans()
         self._parent: Parent | None = Parent(self._launch)
         self._parent_process = self._parent.process

@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.bus.names import ActionNames, data_key, resolve
+from rbxcompose.bus.names import TRANSFORMS, ActionNames, data_key, resolve
 from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, RobotMission
 from rbxcompose.compiler.model.values import triggers_of
@@ -24,7 +24,6 @@ from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serve
 
 Keys = tuple[tuple[str, str], ...]  # its purpose, and the key
 MISSION = "mission"  # the component that runs missions
-TRANSFORMS = ("/tf", "/tf_static")  # what a look-up subscribes to
 STATUSES = "/diagnostics"  # where every component publishes without declaring it
 _FOLD = "missions"  # the key of the box of those
 MANY = 6  # missions, or open wires of the same box: more of them hide the rest, and are folded

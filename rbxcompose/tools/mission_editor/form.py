@@ -14,7 +14,7 @@ from typing import Any
 
 from rbxcompose.base.config import PLACE
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.types import Type, TypeKind
+from rbxcompose.base.expressions.types import PLACED, STRUCTURED, Type, TypeKind
 from rbxcompose.base.requests import Refused
 from rbxcompose.base.units import Dimension, units_of
 from rbxcompose.compiler.model.robot import Robot
@@ -32,7 +32,6 @@ from rbxcompose.tools.mission_editor.patches import FIXED, LINE, LINES, TEXT, ch
 from rbxcompose.tools.mission_editor.yaml_places import BLOCK_MARK, Path, PlacedNode, TextLines, placed
 
 _VALUES = frozenset(("string", "number", "integer", "boolean", "null"))
-_HAS_PARTS = (TypeKind.LIST, TypeKind.MAP)
 _MOST = 200  # names to choose from
 _UNKNOWN = Type(TypeKind.UNKNOWN)
 
@@ -116,7 +115,7 @@ class _FormDrawing:
     ) -> dict[str, Any]:
         shape = shape_of(self.lines, there)
         is_empty = there is None or (there.form == "scalar" and not there.text)
-        if is_empty and ((of is not None and of.kind in _HAS_PARTS) or not _takes_value(schema)):
+        if is_empty and ((of is not None and of.kind in STRUCTURED) or not _takes_value(schema)):
             shape = LINES
         spot = Spot(self.document, Cursor(self.root, where, "", "", False), self.known, self.guide)
         return {
@@ -136,7 +135,7 @@ _NO_CHOICES: Mapping[str, Any] = {"choices": [], "only": False, "units": [], "de
 def _choices(value: GuidedValue, spot: Spot, schema: Mapping[str, Any], of: Type | None) -> dict[str, Any]:
     """Return what a field takes: its unit, and what can be chosen; `only` if it is nothing but one of these."""
     only = [str(word) for word in schema.get("enum", ())]
-    kind = PLACE if of is not None and of.kind in (TypeKind.PLACE, TypeKind.POSE) else value.names
+    kind = PLACE if of is not None and of.kind in PLACED else value.names
     names = spot.known.of(kind, spot.cursor.path) if kind else {}
     of_skill = of.choices if of is not None else ()
     flags = ("true", "false") if of is not None and of.kind is TypeKind.FLAG else ()

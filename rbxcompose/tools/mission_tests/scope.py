@@ -5,12 +5,11 @@ from collections.abc import Iterator, Mapping
 from rbxcompose.base.config import Place
 from rbxcompose.base.expressions.evaluate import evaluate
 from rbxcompose.base.expressions.text import fill, parse_template
-from rbxcompose.base.expressions.types import POSE, UNKNOWN, Type, TypeKind
+from rbxcompose.base.expressions.types import PLACED, POSE, STRUCTURED, UNKNOWN, Type, TypeKind
 from rbxcompose.base.expressions.values import NotArrived, Value, is_named_pose, is_number, is_same
 from rbxcompose.base.findings import Finding
 from rbxcompose.manifest.tree import ScalarNode, TreeNode
 from rbxcompose.missions.analysis.examined import NodeScope, View, check_written
-from rbxcompose.missions.engine.instant_actions import PLACED
 from rbxcompose.missions.engine.world import POSE as POSE_NAME
 from rbxcompose.missions.engine.world import RobotValues, show
 from rbxcompose.missions.language.literals import WrongValue, literal, typed
@@ -19,7 +18,6 @@ from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.tools.mission_tests import codes
 from rbxcompose.tools.mission_tests.model import ValueSetting
 
-STRUCTURED = (TypeKind.LIST, TypeKind.MAP)
 CLOSE = 1e-6  # relative difference up to which numbers are equal
 
 

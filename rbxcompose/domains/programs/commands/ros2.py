@@ -21,6 +21,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
 from rbxcompose.base.findings import Edit, Fix, Span, apply_fixes, kind
 from rbxcompose.base.requests import OutsideError
+from rbxcompose.bus.names import TRANSFORMS
 from rbxcompose.commands import options
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, write_report
 from rbxcompose.commands.messages import to_json
@@ -217,7 +218,7 @@ def edits_of(node: RosNode, component: MappingNode, text: str) -> Iterator[Edit]
 
 def _written(topic: str) -> str:
     """Return a topic as a manifest writes it: `scan` for `/scan`, but `/tf` as it is."""
-    return topic if topic in ("/tf", "/tf_static") else topic.removeprefix("/")
+    return topic if topic in TRANSFORMS else topic.removeprefix("/")
 
 
 def _is_flow(node: MappingNode, text: str) -> bool:
