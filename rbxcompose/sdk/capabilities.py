@@ -165,6 +165,9 @@ class Charges(Capability):
     """It ends at or above this charge (a ratio)."""
 
 
+TELEOP = "teleop"  # the input of a mux that is for people
+
+
 @dataclass(frozen=True, slots=True)
 class Forwards(Capability):
     """A mux: it forwards messages from one of `inputs` to `output`; the first of them has the highest priority."""

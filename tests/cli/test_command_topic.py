@@ -8,9 +8,9 @@ import pytest
 
 from rbxcompose.bus.graph import GraphEnd, GraphName, WireType
 from rbxcompose.commands.console import NotDoneError
+from rbxcompose.compiler.plan.teleoperation import teleoperated
 from rbxcompose.domains.bases.commands.drive import command_topic
 from rbxcompose.msgs.geometry_msgs import Twist
-from rbxcompose.runtime.supervision.supervisor import teleoperated
 from rbxcompose.testing import check_text
 
 ROBOT = """rbx: 1
@@ -44,6 +44,11 @@ MUXED = [
 
 def test_of_a_mux_it_is_the_open_input_of_the_highest_priority(tmp_path: Path) -> None:
     assert teleoperated(check_text(ROBOT, tmp_path).plan) == {"base": "/cmd_vel/joystick"}
+
+
+def test_of_a_mux_with_an_input_for_people_it_is_that_one(tmp_path: Path) -> None:
+    own = ROBOT.replace("pad:", "teleop:")
+    assert teleoperated(check_text(own, tmp_path).plan) == {"base": "/cmd_vel/teleop"}
 
 
 def test_without_a_mux_it_is_the_base_unless_something_commands_it(tmp_path: Path) -> None:

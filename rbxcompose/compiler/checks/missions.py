@@ -91,9 +91,7 @@ def place_in_data(robot: Robot) -> Iterator[Finding]:
     places = robot.manifest.places
     for mission in robot.missions.values():
         program, known = mission.program, {**shortened(mission.program), **constants(mission)}
-        defaults = {
-            name for name, one in program.inputs.items() if one.type.kind not in PLACED
-        }
+        defaults = {name for name, one in program.inputs.items() if one.type.kind not in PLACED}
         names = program.data.keys() | mission.given.keys() | defaults
         wrong = {name: _without(value, places) for name, value in known.items() if name in names}
         for node, name, datum in places_taken(program, robot.names.skills):

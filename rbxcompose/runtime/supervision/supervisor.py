@@ -4,7 +4,7 @@ import os
 import selectors
 import signal
 import socket
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from types import FrameType
 from typing import Any
@@ -14,8 +14,8 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.endpoints import is_private, socket_of
-from rbxcompose.compiler.plan.model import Instance, Plan
-from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.compiler.plan.teleoperation import teleoperated
 from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.control import ControlServer
 from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, Gauge, RobotFolder, RobotState
@@ -28,7 +28,7 @@ from rbxcompose.runtime.supervision.members import DEAD, LOOK, SILENT_FOR, Phase
 from rbxcompose.runtime.supervision.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
 from rbxcompose.runtime.supervision.setting_changes import SettingChanges, WhenJudged
-from rbxcompose.sdk.capabilities import Drains, Drives, Forwards, RunsMissions
+from rbxcompose.sdk.capabilities import Drains, RunsMissions
 from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type, declared
 
@@ -59,40 +59,6 @@ def gauges_of(plan: Plan) -> dict[str, Gauge]:
             if isinstance(port, Out) and port.interface is not None:
                 found[instance.name] = Gauge(instance.topic(drains.level), port.interface.TYPE, port.unit)
     return found
-
-
-def teleoperated(plan: Plan) -> dict[str, str]:
-    """Return the topic that takes a person's velocities, by base; a base that no input is free for is left out.
-
-    If a mux decides who commands the base, this is its open input of the highest priority on which nothing in the
-    robot publishes. An input that another mux feeds leads to the inputs of that one.
-    """
-    found = dict[str, str]()
-    for base in plan.instances:
-        for drives in declared(base.type, base.config, Drives):
-            wire = next(candidate for candidate in base.wires if candidate.port == drives.commands)
-            if wire.type == Twist.TYPE and (first := next(_free(plan, wire.topic, ()), None)):
-                found[base.name] = first
-    return found
-
-
-def _free(plan: Plan, topic: str, passed: tuple[str, ...]) -> Iterator[str]:
-    """Yield the topics that nobody writes and that command what listens to `topic`, the best one first."""
-    writers = [instance for instance in plan.instances if topic in _written(instance)]
-    if topic in passed:
-        return
-    if not writers:
-        yield topic
-    for mux in writers:
-        for forwards in declared(mux.type, mux.config, Forwards):
-            if mux.topic(forwards.output) == topic:
-                for name in forwards.inputs:
-                    yield from _free(plan, mux.topic(name), (*passed, topic))
-
-
-def _written(instance: Instance) -> set[str]:
-    ports = component_type(instance.type).ports(instance.config)
-    return {instance.topic(name) for name, port in ports.items() if isinstance(port, Out)}
 
 
 _TAIL = 8000  # [B] of a process's printed output that go into the log

@@ -9,11 +9,11 @@ import yaml
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.compiler.plan.model import Plan
-from rbxcompose.sdk.capabilities import Capability, Drains, Drives, Forwards, WritesFrame
+from rbxcompose.compiler.plan.teleoperation import teleoperated
+from rbxcompose.sdk.capabilities import Capability, Drains, Drives, WritesFrame
 from rbxcompose.sdk.ports import In, Out, Qos
-from rbxcompose.sdk.registry import component_type
+from rbxcompose.sdk.registry import component_type, declared
 
-TWIST = "geometry_msgs/msg/Twist"
 DESCRIPTION = "/robot_description"
 _DISPLAYS = {
     "geometry_msgs/msg/PointStamped": "PointStamped",
@@ -106,29 +106,13 @@ def levels(plan: Plan) -> list[str]:
 
 
 def driven(plan: Plan) -> DrivenTopic | None:
-    """Return where a person may drive by velocities: a free input of the mux before the base, else the base's own."""
-    bases = [(topic_of(each.commands), each) for topic_of, each in _declared(plan) if isinstance(each, Drives)]
-    taken, known = sent(plan), heard(plan)
-    muxes = {
-        topic_of(each.output): [topic_of(port) for port in each.inputs]
-        for topic_of, each in _declared(plan)
-        if isinstance(each, Forwards)
-    }
-    for commands, base in bases:
-        for topic in _inputs(commands, muxes, ()):
-            if topic not in taken and topic in known and known[topic].type == TWIST:
-                speeds = (base.max_speed, base.max_turn_rate)
-                return DrivenTopic(topic, *(1.0 if most is None else most.value for most in speeds))
+    """Return where a person may drive by velocities: the first of the topics at which `rbxcompose drive` would."""
+    for name, topic in teleoperated(plan).items():
+        [base] = [instance for instance in plan.everywhere if instance.name == name]
+        for drives in declared(base.type, base.config, Drives):
+            speeds = (drives.max_speed, drives.max_turn_rate)
+            return DrivenTopic(topic, *(1.0 if most is None else most.value for most in speeds))
     return None
-
-
-def _inputs(topic: str, muxes: dict[str, list[str]], seen: tuple[str, ...]) -> Iterator[str]:
-    """Yield a topic, or the inputs of the mux that sends it, and of those before that one."""
-    if topic not in muxes:
-        yield topic
-    elif topic not in seen:
-        for other in muxes[topic]:
-            yield from _inputs(other, muxes, (*seen, topic))
 
 
 def _declared(plan: Plan) -> Iterator[tuple[Any, Capability]]:

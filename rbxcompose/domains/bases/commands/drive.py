@@ -1,8 +1,8 @@
 """Drive with the keyboard: arrows or w, a, s, d; space stops, q quits.
 
-It publishes on the open input of the base's mux that has the highest priority. The robot moves only while a key is
-pressed: 0.3 s after the last one it is sent a stop. Then nothing more is published, so that the mux lets other inputs
-through.
+It publishes on the input `teleop` of the base's mux, or else on its open input of the highest priority. The robot moves
+only while a key is pressed: 0.3 s after the last one it is sent a stop. Then nothing more is published, so that the mux
+lets other inputs through.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from rbxcompose.commands.options import add_timeout_option, positive
 from rbxcompose.commands.terminal import NO_TERMINAL, LiveScreen
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.poses import twist_message
+from rbxcompose.sdk.capabilities import TELEOP
 from rbxcompose.sdk.ports import Qos
 
 GROUP = "drive"
@@ -34,7 +35,7 @@ PERIOD = 0.1  # [s] between two commands
 _ENDS = ("q", "\x04", "\0")  # Ctrl-D arrives as a zero byte if it was typed before the terminal was raw
 _FORWARD, _BACK, _LEFT, _RIGHT = (1, 0), (-1, 0), (0, 1), (0, -1)
 _STILL = (0, 0)
-_USUAL = "/cmd_vel/teleop"  # where several inputs are free, and nothing is known of their priorities
+_USUAL = f"/cmd_vel/{TELEOP}"  # where several inputs are free, and nothing is known of their priorities
 _OPEN_ONE = "give the mux an input without 'from', such as 'teleop: {priority: 100, timeout: 0.5 s}'"
 
 

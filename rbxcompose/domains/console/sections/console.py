@@ -17,12 +17,11 @@ from rbxcompose.manifest.fields import TopicName
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Contents, Reading, WantedComponent, Wiring
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
-from rbxcompose.sdk.capabilities import Drives, Forwards, Setting
+from rbxcompose.sdk.capabilities import TELEOP, Drives, Forwards, Setting
 from rbxcompose.sdk.ports import Out
 
 GATEWAY = "gateway"
 FOXGLOVE_PORT = 8765
-_TELEOP = "teleop"  # the input of a mux that is for people
 _VELOCITIES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 
 
@@ -135,7 +134,7 @@ def _camera(written: str | None, components: Mapping[str, RobotComponent], names
 def _free(components: Mapping[str, RobotComponent], driven: PortEnd) -> str:
     """Return the topic of the input `teleop` of the mux that commands this end, else its own topic."""
     for mux, forwards in _muxes(components, driven):
-        if (teleop := mux.end(_TELEOP)) and _TELEOP in forwards.inputs:
+        if (teleop := mux.end(TELEOP)) and TELEOP in forwards.inputs:
             return teleop.topic
     return driven.topic
 
