@@ -138,6 +138,28 @@ def test_a_late_reply_costs_its_servo_and_spoils_nothing_after_it(connect: Conne
         assert found == {number: 500 + number for number in found}
 
 
+def test_a_late_reply_is_not_taken_for_that_of_another_item(connect: Connect) -> None:
+    bus, port = connect({1: "XM430-W350"}, timeout=BRISK, retries=0)
+    bus.write({1: {"bus_watchdog": 10}}, is_confirmed=True)
+    hear, late = port.line.receive, list[FakeReply]()
+
+    def delayed(data: bytes, baud: int | None = None) -> list[FakeReply]:
+        replies, late[:] = [*late, *hear(data, baud)], []
+        return replies
+
+    def lost(data: bytes, baud: int | None = None) -> list[FakeReply]:
+        late[:] = hear(data, baud)
+        return []
+
+    for item, other in (("bus_watchdog", "hardware_error"), ("hardware_error", "bus_watchdog")):
+        port.line.receive = lost  # type: ignore[method-assign]
+        assert bus.read([1], [item]) == {}
+        port.line.receive = delayed  # type: ignore[method-assign]
+        expected = {"hardware_error": 0, "bus_watchdog": 10}
+        assert bus.read([1], [other])[1].values == {other: expected[other]}
+        assert bus.read([1], [item])[1].values == {item: expected[item]}
+
+
 def test_one_bad_reply_is_made_good_within_the_same_read(connect: Connect) -> None:
     bus, port = connect(SIX, timeout=BRISK)
 

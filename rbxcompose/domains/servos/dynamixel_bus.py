@@ -222,6 +222,7 @@ class DynamixelBus:
         self._packets = packets_by_protocol()
         self._reader = ServoReader(self._packets, clock)
         self._plans: dict[tuple[str, tuple[str, ...]], ReadPlan] = {}
+        self._lengths: defaultdict[str, dict[int, int]] = defaultdict(dict)  # of stretches of a model, with their ends
         self._writes: dict[tuple[str, tuple[str, ...]], tuple[WritePlan, ...]] = {}
         self._port: BlockingPort | None = self._opened()
 
@@ -348,7 +349,7 @@ class DynamixelBus:
         model = self.servos[id]
         key = (model.name, names)
         if key not in self._plans:
-            self._plans[key] = read_plan(model, names)
+            self._plans[key] = read_plan(model, names, self._lengths[model.name])
         return self._plans[key]
 
     def _write_plans(self, id: int, names: tuple[str, ...]) -> tuple[WritePlan, ...]:

@@ -56,8 +56,11 @@ class ReadPlan(NamedTuple):
         return found
 
 
-def read_plan(model: ServoModel, names: Iterable[str]) -> ReadPlan:
+def read_plan(model: ServoModel, names: Iterable[str], lengths: dict[int, int] | None = None) -> ReadPlan:
     """Return how to read items of a model.
+
+    A reply does not say of which stretch it is. So that a late one is not taken for that of another, each stretch of a
+    servo has a length of its own, for which it may begin earlier: `lengths` has those in use, each with its end.
 
     Raises:
         KeyError: if the model has no such item.
@@ -67,6 +70,8 @@ def read_plan(model: ServoModel, names: Iterable[str]) -> ReadPlan:
     wanted = [model.item(name) for name in sorted(asked) if not (has_faults and name == HARDWARE_ERROR)]
     wanted.sort(key=lambda item: item.address)
     stretches = _stretches(wanted or [model.item("moving")])
+    if lengths is not None:
+        stretches = tuple(_of_own_length(stretch, lengths) for stretch in stretches)
     parts = (part for number, stretch in enumerate(stretches) for part in _parts(number, stretch, wanted))
     return ReadPlan(stretches, tuple(parts), has_faults)
 
@@ -102,6 +107,13 @@ def _stretches(items: Iterable[ControlItem]) -> tuple[Stretch, ...]:
         else:
             found.append(Stretch(item.address, item.size))
     return tuple(found)
+
+
+def _of_own_length(stretch: Stretch, lengths: dict[int, int]) -> Stretch:
+    for begin in range(stretch.address, -1, -1):
+        if lengths.setdefault(stretch.end - begin, stretch.end) == stretch.end:
+            return Stretch(begin, stretch.end - begin)
+    return stretch
 
 
 class WritePlan(NamedTuple):
