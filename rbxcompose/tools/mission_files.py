@@ -20,7 +20,7 @@ from rbxcompose.commands.options import unsaved_of
 from rbxcompose.commands.targets import put_robot_last, robot_path, without_errors
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.compiler.model.skills import python_skills
+from rbxcompose.compiler.model.skills import usable_skills
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.missions.engine.inputs import bind_texts
 from rbxcompose.missions.engine.logbook import (
@@ -38,7 +38,6 @@ from rbxcompose.missions.program.program import Skill
 from rbxcompose.missions.sources import SkillSource, SkillWay
 from rbxcompose.missions.view.picture import MissionPicture, picture_from_data, picture_of
 from rbxcompose.missions.view.replica import joined, status_list
-from rbxcompose.sdk.registry import skill_names
 from rbxcompose.tools.inspection.mission_text import mission_dot, mission_mermaid, mission_sentences, mission_text
 from rbxcompose.tools.inspection.pages import mission_html
 from rbxcompose.tools.mission_tests.explorer import ExplorationLimits, text_of
@@ -123,8 +122,7 @@ def mission_in(robot: Robot, name: str) -> Any:
 def skills(arguments: argparse.Namespace) -> int:
     """List all skills that a robot's missions may use."""
     robot = robot_of(arguments.path)
-    in_python = {source.skill.name: source for source in python_skills(skill_names())}
-    found = dict(sorted({**in_python, **robot.skills}.items()))
+    found = usable_skills(robot)
     if arguments.json:
         emit(json.dumps([_data(entry) for entry in found.values()]))
         return 0
@@ -133,7 +131,7 @@ def skills(arguments: argparse.Namespace) -> int:
         for name, entry in found.items()
     ]
     emit(table([("skill", "arguments", "ends", "claims", "is"), *rows]))
-    emit("\n" + "\n".join(f"- {_example(entry.skill)}" for entry in found.values()))
+    emit("\n" + "\n".join(f"- {example_step(entry.skill)}" for entry in found.values()))
     return 0
 
 
@@ -153,8 +151,8 @@ def _how(source: SkillSource) -> str:
     return ", ".join([*words, *(["can pause"] if source.skill.pausable else [])])
 
 
-def _example(skill: Skill) -> str:
-    """Return a line of a mission that uses the skill."""
+def example_step(skill: Skill) -> str:
+    """Return a step of a mission that uses the skill."""
     if skill.entries:
         name, measured = next(iter(skill.entries.each.items()))
         return f"{skill.name}: {{{name}: {example(measured)}}}"
@@ -182,7 +180,7 @@ def _data(source: SkillSource) -> dict[str, Any]:
         "pausable": skill.pausable,
         "way": str(source.way),
         "topic": source.topic,
-        "example": _example(skill),
+        "example": example_step(skill),
     }
 
 

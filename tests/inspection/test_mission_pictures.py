@@ -96,6 +96,11 @@ def test_a_line_for_the_log_is_shown_with_its_text_shortened_if_it_is_long(text:
     assert picture.main.title == f"log {shown}"
 
 
+def test_each_hook_is_shown_by_its_name() -> None:
+    program = program_of("do: {wait: 1 s, on_failure: {log: no}, on_halt: {log: halted}, timeout: 3 s}")
+    assert picture_of(program, RobotNames()).main.notes == ("on failure", "on halt", "timeout 3 s")
+
+
 def test_a_picture_passes_through_json() -> None:
     assert picture_from_data(json.loads(json.dumps(picture_to_data(tour())))) == tour()
 

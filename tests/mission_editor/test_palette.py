@@ -48,7 +48,8 @@ def fields(editor: MissionEditor, *path: str | int, text: str = TEXT) -> dict[st
 def test_all_kinds_and_the_skills_of_the_robot_can_be_added_each_as_itself(editor: MissionEditor) -> None:
     offered = ask(editor, "palette")
     assert {one["word"] for one in offered if one["sort"] == "kind"} == set(kinds())
-    assert {one["word"]: one["yaml"] for one in offered if one["sort"] == "skill"} == {"go_to": "go_to: dock"}
+    skills = {one["word"]: one["yaml"] for one in offered if one["sort"] == "skill"}
+    assert skills == {"go_to": "go_to: dock", "say": "say: hello"}
     for one in offered:
         node = placed(one["yaml"])
         assert node is not None
@@ -134,3 +135,4 @@ def test_what_there_is_to_choose_is_offered_places_joints_poses_topics_values_an
 def test_a_skill_is_told_by_the_component_of_this_robot(editor: MissionEditor) -> None:
     offered = {one["word"]: one["about"] for one in editor.answer({"do": "palette", "mission": "fetch"})}
     assert offered["go_to"].startswith("Skill of 'go_to': ")  # a navigator of another robot offers one, too
+    assert ask(editor, "form", text=TEXT, path=["do", 0])["about"].replace("`", "'") == offered["go_to"]

@@ -44,6 +44,12 @@ def names_of_skills(components: Mapping[str, RobotComponent], outside: Outside =
     return frozenset((*served, *skill_names()))
 
 
+def usable_skills(robot: Robot) -> dict[str, SkillSource]:
+    """Return all skills that a mission of the robot may use, by name; it need not use any of those in Python."""
+    in_python = {source.skill.name: source for source in python_skills(skill_names())}
+    return dict(sorted({**in_python, **robot.skills}.items()))
+
+
 def served_skills(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
     """Return the skills that components serve."""
     return (*_actions(components), *_services(components), *_topics(components))

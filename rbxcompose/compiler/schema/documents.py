@@ -12,14 +12,14 @@ from typing import Any
 
 from rbxcompose.base.config import Name, Time, field_docs
 from rbxcompose.base.files import replace_file
-from rbxcompose.compiler.schema.mission import mission_schema
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.compiler.schema.mission import mission_schema, skills_for
 from rbxcompose.compiler.schema.robot import document, or_empty, overlay_schema, part_schema, robot_schema
 from rbxcompose.compiler.schema.scalars import DEFINITIONS, SHARED, Schema, opened, schemas_of
 from rbxcompose.manifest import system_file, test_file
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT, SYSTEM, TEST
-from rbxcompose.missions.program.program import Skill
 from rbxcompose.sdk import registry
 
 STEP = "step"
@@ -103,9 +103,11 @@ def installed_schema(kind: str) -> Schema:
     return makers()[kind](registry.usable_names())
 
 
-def schema_for(kind: str, skills: Mapping[str, Skill]) -> Schema:
-    """Return the schema of a kind of manifest for a robot with these skills; it must not be modified."""
-    return mission_schema(registry.usable_names(), skills) if skills and kind == "Mission" else installed_schema(kind)
+def schema_for(kind: str, robot: Robot | None) -> Schema:
+    """Return the schema of a kind of manifest for a robot, if one is known; it must not be modified."""
+    if robot is None or kind != "Mission":
+        return installed_schema(kind)
+    return mission_schema(registry.usable_names(), skills_for(robot))
 
 
 def as_text(schema: Schema) -> str:

@@ -8,6 +8,8 @@ from typing import Any
 from rbxcompose.base.config import NAMES, Name
 from rbxcompose.base.expressions.types import COUNT, FLAG, PLACED, TYPES, Type, TypeKind, quantity_of
 from rbxcompose.base.units import TIME
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.compiler.model.skills import usable_skills
 from rbxcompose.compiler.schema.robot import document
 from rbxcompose.compiler.schema.scalars import DEFINITIONS, Schema, computed, schemas_of
 from rbxcompose.manifest.arguments import ArgumentModel
@@ -21,8 +23,9 @@ from rbxcompose.missions.program.goals import skill_of, topic_skill
 from rbxcompose.missions.program.parts import DEEDS, MACHINE_KEYS
 from rbxcompose.missions.program.program import AFTERWARDS, RESTART, Skill
 from rbxcompose.missions.program.registry import kinds, modifiers
+from rbxcompose.missions.sources import SkillSource, SkillWay
 from rbxcompose.sdk.ports import ServesAction, ServesTopic
-from rbxcompose.sdk.registry import component_type
+from rbxcompose.sdk.registry import component_type, skill_type
 
 NODE: Schema = {"$ref": f"{DEFINITIONS}node"}
 MACHINE: Schema = {"$ref": f"{DEFINITIONS}machine"}
@@ -93,7 +96,11 @@ class MissionFile(ManifestHeader):
     """A mission: what the robot does, as a tree of nodes."""
 
 
-def mission_schema(types: Iterable[str], skills: Mapping[str, Skill] = MappingProxyType({})) -> Schema:
+DescribedSkills = Mapping[str, tuple[Skill, str]]
+"""Skills by name, each with a description."""
+
+
+def mission_schema(types: Iterable[str], skills: DescribedSkills = MappingProxyType({})) -> Schema:
     """Return the schema of a mission's file for robots that may use these types of components.
 
     `skills` are those of a known robot: some depend on the configurations of its components.
@@ -138,12 +145,9 @@ def _interrupt() -> Schema:
     }
 
 
-def _nodes(types: Iterable[str], skills: Mapping[str, Skill]) -> dict[str, Schema]:
+def _nodes(types: Iterable[str], skills: DescribedSkills) -> dict[str, Schema]:
     """Return the definitions of a node and of a list of nodes."""
-    found = skills_of(types)
-    found |= {
-        name: (skill, found[name][1] if name in found else "Skill of this robot.") for name, skill in skills.items()
-    }
+    found = {**skills_of(types), **skills}
     of_nodes = (schemas_of_keys(modifier) for modifier in modifiers().values() if not modifier.only_states)
     anywhere = {"name": NODE_NAME, **{key: schema for entry in of_nodes for key, schema in entry.items()}}
     known = {name: _skill(skill, about) for name, (skill, about) in found.items()}
@@ -254,6 +258,19 @@ def _skill(skill: Skill, about: str) -> Schema:
     empty = [] if skill.required or skill.entries else [{"type": "null"}]
     word = {**single, "type": [name for name in single.get("type", ()) if name != "object"]}
     return {"anyOf": [*([word] if single else []), several, *empty], "description": about, **notes}
+
+
+def skills_for(robot: Robot) -> dict[str, tuple[Skill, str]]:
+    """Return the skills that missions of a robot may use, each with a description."""
+    offered = skills_of(component.type_name for component in robot.components.values())
+    return {name: (source.skill, _about(source, offered)) for name, source in usable_skills(robot).items()}
+
+
+def _about(source: SkillSource, offered: DescribedSkills) -> str:
+    name = source.skill.name
+    if source.way is SkillWay.PYTHON:
+        return f"Skill in Python: {first_line(skill_type(name).make.__doc__)}"
+    return offered[name][1] if name in offered else "Skill of this robot."
 
 
 def skills_of(types: Iterable[str]) -> dict[str, tuple[Skill, str]]:

@@ -174,7 +174,8 @@ def _roles(linked: Program, node: MissionNode) -> Sequence[str]:
 def _notes(node: MissionNode) -> Iterator[str]:
     """Yield the modifiers of a node, from the outside in, in words."""
     for key, modifier in node.modifiers.items():
-        yield _short(f"{key} {modifier.said}".strip().replace("_", " "))
+        for word in modifier.moments.deeds if modifier.moments else (key,):
+            yield _short(f"{word} {modifier.said}".strip().replace("_", " "))
 
 
 def _short(text: str) -> str:

@@ -15,6 +15,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Span
 from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.compiler.model.skills import usable_skills
 from rbxcompose.compiler.schema.documents import makers, schema_for
 from rbxcompose.compiler.schema.guide import Guide
 from rbxcompose.compiler.sections.composition import PART_ARGUMENT, args, include, profiles
@@ -314,8 +315,8 @@ class KnownNames:
 
     @property
     def skills(self) -> Mapping[str, Skill]:
-        """Return the skills of the robot."""
-        return self.robot.names.skills if self.robot else {}
+        """Return the skills that a mission of the robot may use."""
+        return {name: source.skill for name, source in usable_skills(self.robot).items()} if self.robot else {}
 
     def _in_text(self, kind: str) -> dict[str, str]:
         found: dict[str, str] = {}
@@ -346,7 +347,8 @@ class KnownNames:
             yield end.name, f"{end.port.kind}: {end.type_name} on {end.topic}"
 
     def _skills(self) -> dict[str, str]:
-        return {name: f"skill: {skill.action}" for name, skill in self.robot.skills.items()} if self.robot else {}
+        found = usable_skills(self.robot) if self.robot else {}
+        return {name: f"skill: {source.action or 'in Python'}" for name, source in found.items()}
 
     def _inputs(self, mission: str) -> dict[str, str]:
         found = self.robot.missions.get(mission) if self.robot else None
@@ -398,7 +400,7 @@ class Document:
         if cursor is None:
             return None
         known = KnownNames(self.path, cursor.root, self.robot)
-        return Spot(self, cursor, known, Guide(schema_for(self.kind, known.skills), cursor.root, known.types))
+        return Spot(self, cursor, known, Guide(schema_for(self.kind, known.robot), cursor.root, known.types))
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from rbxcompose.base.units import Dimension, units_of
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.schema.documents import schema_for
 from rbxcompose.compiler.schema.guide import Guide, GuidedValue
-from rbxcompose.compiler.schema.mission import ITEM_NAME, skills_of
+from rbxcompose.compiler.schema.mission import ITEM_NAME
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions.language.fields import first_line
 from rbxcompose.missions.program.registry import anywhere, kinds
@@ -30,6 +30,7 @@ from rbxcompose.tools.lsp.project import MISSION
 from rbxcompose.tools.mission_editor.outline import INTERRUPT, STATE, MissionOutline, kind_of, slots_of
 from rbxcompose.tools.mission_editor.patches import FIXED, LINE, LINES, TEXT, change, shifted
 from rbxcompose.tools.mission_editor.yaml_places import BLOCK_MARK, Path, PlacedNode, TextLines, placed
+from rbxcompose.tools.mission_files import example_step
 
 _VALUES = frozenset(("string", "number", "integer", "boolean", "null"))
 _MOST = 200  # names to choose from
@@ -39,7 +40,7 @@ _UNKNOWN = Type(TypeKind.UNKNOWN)
 def guide_of(robot: Robot, file: FilePath, root: MappingNode) -> tuple[Guide, KnownNames]:
     """Return what can be at each place of a mission, and the names that it can use."""
     known = KnownNames(file, root, robot)
-    return Guide(schema_for(MISSION, known.skills), root, known.types), known
+    return Guide(schema_for(MISSION, robot), root, known.types), known
 
 
 def form(robot: Robot, file: FilePath, text: str, path: Path) -> dict[str, Any]:
@@ -191,10 +192,8 @@ def _takes_value(schema: Mapping[str, Any]) -> bool:
 def palette(robot: Robot, file: FilePath) -> list[dict[str, str]]:
     """Return what a step can be: first this robot's skills, then the kinds, each with a line of help and its YAML."""
     guide, known = guide_of(robot, file, MappingNode({"do": _entry("do", MappingNode({}))}))
-    about = {name: str(schema.get("description", "")) for name, schema in guide.keys(("do",)).items()}
-    # The guide knows all types that offer a skill; here it is one of those that this robot has.
-    own = skills_of({component.type_name for component in robot.components.values()})
-    about |= {name: text.replace("`", "'") for name, (_, text) in own.items()}
+    keys = guide.keys(("do",))
+    about = {name: str(schema.get("description", "")).replace("`", "'") for name, schema in keys.items()}
     skills = [
         {"word": name, "sort": "skill", "about": about.get(name, ""), "yaml": _skill(robot, file, name)}
         for name in sorted(known.of(SKILL))
@@ -211,13 +210,13 @@ def _entry(key: str, value: TreeNode) -> Entry:
 
 
 def _skill(robot: Robot, file: FilePath, name: str) -> str:
-    """Return a step that uses a skill, with the first value that its main argument may have."""
+    """Return a step that uses a skill, with the first value that its main argument may have, or an example."""
     empty = ScalarNode("", MappingNode().span)
     root = MappingNode({"do": _entry("do", MappingNode({name: _entry(name, empty)}))})
     guide, known = guide_of(robot, file, root)
     value = guide.value(("do", name))
     found = [*(known.of(value.names) if value.names else ()), *value.words, *value.examples]
-    return f"{name}: {found[0]}" if found else f"{name}:"
+    return f"{name}: {found[0]}" if found else example_step(known.skills[name])
 
 
 @cache

@@ -45,6 +45,7 @@ from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.plain import from_plain
+from rbxcompose.sdk.registry import skill_names
 from rbxcompose.tools.mission_tests import codes
 from rbxcompose.tools.mission_tests.judge import ON_TIME
 from rbxcompose.tools.mission_tests.model import (
@@ -194,7 +195,7 @@ def read_mocks(context: TrialContext, node: TreeNode | None, models: Mapping[str
 
 def _mock(context: TrialContext, name: str, entry: Entry, model: trials.MockModel) -> Mock:
     names, value = context.names, entry.value
-    message, there = f"the robot has no skill or service '{name}'", {**names.skills, **names.services}
+    message, there = f"the robot has no skill or service '{name}'", {*names.skills, *skill_names(), *names.services}
     is_there = context.knows(entry.key.span, name, there, message, "skills of this robot")
     if is_there and name not in context.facts.skills and name not in context.facts.services:
         message = f"the mission '{context.program.name}' does not use '{name}'"
