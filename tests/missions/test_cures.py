@@ -49,6 +49,9 @@ CURES = [
     ),
     ("do: {go_to: {x: 1 m, y: 20 cm, heading: 90 deg}}", [PLACE]),
     ("do: {go_to: {pose: {x: 1 m, y: 20 cm, heading: 90 deg}}}", [PLACE]),
+    ("do: {go_to: {x: 1, y: 20cm, heading: 90}}", [PLACE]),  # no heading is 90 rad
+    ("do: {go_to: {x: 1 metre, y: 20 cm, heading: 90°}}", [PLACE]),
+    ("do: {go_to: {x: 1, y: 2, heading: 1.5}}", ["declare 'NAME: {x: 1 m, y: 2 m, heading: 1.5 rad}' under 'places'"]),
     ("do: {go_to: [1, 2]}", ["declare 'NAME: {x: 1 m, y: 2 m}' under 'places' of the robot, and write its name"]),
     ("do: {go_to: {pose: {frame: map}}}", ["declare a place under 'places' of the robot, and write its name"]),
     ("do: {go_to: {plce: dock}}", ["its arguments: pose, behavior_tree"]),
@@ -74,6 +77,8 @@ CURES = [
     ("do: {go_to: [dock]}", ["write 'go_to: dock', without brackets"]),
     ("do: {recharge: dock}", ["it has no arguments: write 'recharge:' with nothing behind it"]),
     ("do: {sequence: [recharge, recharge], history: always}", ["it can be: none, last, deep"]),
+    ("do: {wait: 5 metres}", ["units of a time: s, "]),
+    ("do: {wait: 5 mins}", ["did you mean 'min'?"]),
     ("do: {wait: 5 m}", ["if these are minutes, write '5 min'"]),
     ("data: {least: 30}\ndo: {wait_for: $battery > $least}", ["give 'least' a unit where it is declared, such as"]),
     ("do: {use: tour}", ["list it under 'missions' of the robot, 'tour: FILE', or use one of them: work"]),

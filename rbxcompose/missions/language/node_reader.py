@@ -12,7 +12,7 @@ from rbxcompose.base.expressions.text import Template, TextSlot, parse_template,
 from rbxcompose.base.expressions.tree import Expression, ExpressionError, Number
 from rbxcompose.base.expressions.types import COUNT, FLAG, TEXT, UNKNOWN, Type, quantity_of
 from rbxcompose.base.findings import Finding, Fix, Span, surely_meant
-from rbxcompose.base.units import NUMBER, TIME
+from rbxcompose.base.units import NUMBER, TIME, UnitError, parse_quantity
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, plain_value
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import is_reported
@@ -69,9 +69,19 @@ def read_expression(scalar: ScalarNode, nodes: Nodes, wanted: Type = FLAG) -> Ex
     except ExpressionError as error:
         span = parts.inner_span(scalar, error.start, error.end) if scalar.text else scalar.span
         is_text = wanted in (TEXT, UNKNOWN) and _WORDS.fullmatch(scalar.text)
-        help_text = error.help or (quotes_needed(scalar.text) if is_text else "")
+        help_text = _unit_help(scalar.text, wanted, error) or (quotes_needed(scalar.text) if is_text else "")
         nodes.add(codes.NO_EXPRESSION.at(span, error.message, help=help_text))
         return None
+
+
+def _unit_help(text: str, wanted: Type, error: ExpressionError) -> str:
+    """Return the help of an error; where the whole text is one quantity, its unit must fit what is wanted."""
+    try:
+        parse_quantity(text, wanted.dimension)
+    except UnitError as wrong:
+        if wanted.dimension and wrong.message == error.message:
+            return wrong.help
+    return error.help
 
 
 _FLOW_HELP = "inside '{}', commas and colons separate: put quotes around the condition, or write it in block style"
