@@ -247,13 +247,33 @@ def _report(entry: Entry, known: Words) -> Finding | None:
         return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{meant}'", fix=tight)
     if len(words) < 2:
         return None
+    name, rest = _begun(words, known)
     if key.span.line != key.span.end_line:
         message = "a step with settings below it needs a colon"
-        return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{words[0]}:'")
-    message, meant = f"'{key.text}' is neither a step nor a skill", f"{words[0]}: {' '.join(words[1:])}"
-    is_alone = key.plain and entry.value.span == key.span  # there is no colon behind it
-    fix = _behind(_DASH, key, meant) if is_alone and _takes_value(words[0], known) and _VALUE.match(words[1]) else None
+        return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{name}:'")
+    text, is_alone = " ".join(rest), entry.value.span == key.span  # there is no colon behind it
+    if not is_alone and not known.is_step(name):
+        name, text = valid_name(key.text) or name, ""
+    if not is_alone and isinstance(entry.value, ScalarNode):
+        value = plain(entry.value.text, _LONGEST)
+        text = f'"{text}: {value}"' if text and value else text or value
+    meant, fix = f"{name}: {text}" if text else name if is_alone else f"{name}:", None
+    if key.plain and not rest:
+        fix = replacement(key.span, key.text, name)
+    elif key.plain and is_alone and _takes_value(name, known) and _VALUE.match(text):
+        fix = _behind(_DASH, key, meant)
+    message = f"'{key.text}' is neither a step nor a skill"
     return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{meant}'", fix=fix)
+
+
+def _begun(words: list[str], known: Words) -> tuple[str, list[str]]:
+    """Return the step that some words begin with, `go_to` for `Go to the table`, and what stands behind it."""
+    for count in range(len(words), 0, -1):
+        name = valid_name(" ".join(words[:count]))
+        if known.is_step(name):
+            is_article = count > 1 and name in known.skills and words[count:][:1] == ["the"]
+            return name, words[count + is_article :]
+    return words[0], words[1:]
 
 
 _DASH = "- "
