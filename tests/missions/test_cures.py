@@ -77,6 +77,8 @@ CURES = [
     ("do: {go_to: [dock]}", ["write 'go_to: dock', without brackets"]),
     ("do: {recharge: dock}", ["it has no arguments: write 'recharge:' with nothing behind it"]),
     ("do: {sequence: [recharge, recharge], history: always}", ["it can be: none, last, deep"]),
+    ("do: {go: to the dock}", ["write 'go_to: dock'"]),
+    ("do: {GO_TO: dock}", ["did you mean 'go_to'?"]),
     ("do: {wait: 5 metres}", ["units of a time: s, "]),
     ("do: {wait: 5 mins}", ["did you mean 'min'?"]),
     ("do: {wait: 5 m}", ["if these are minutes, write '5 min'"]),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Protocol
 
@@ -21,12 +21,23 @@ from rbxcompose.missions.program import parts
 NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
 NAME_HELP = "names start with a lower-case letter; lower-case letters, digits and underscores follow"
 _BETWEEN = re.compile(r"[\s-]+")
+_MOST_WORDS = 8  # of a name
 
 
 def valid_name(text: str) -> str:
     """Return the name that a text was meant to be, `go_home` for `Go home`; empty if that is not clear."""
     meant = _BETWEEN.sub("_", text.strip()).lower()
     return meant if NAME.fullmatch(meant) else ""
+
+
+def begun_step(words: list[str], kinds: Collection[str], skills: Collection[str]) -> tuple[str, list[str]]:
+    """Return the step that some words begin with, `go_to` for `Go to the table`, and what stands behind it."""
+    for count in range(min(len(words), _MOST_WORDS), 0, -1):
+        name = valid_name(" ".join(words[:count]))
+        if name in kinds or name in skills:
+            is_article = count > 1 and name in skills and words[count:][:1] == ["the"]
+            return name, words[count + is_article :]
+    return words[0], words[1:]
 
 
 def invalid_name(scalar: ScalarNode, fix: Fix | None = None) -> Finding:

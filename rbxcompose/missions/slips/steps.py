@@ -21,7 +21,7 @@ from rbxcompose.manifest.tree import (
 )
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import FOREIGN, GrammarPlace, Takes, Words, placeholder, without_word
-from rbxcompose.missions.language.node_reader import NAME, invalid_name, valid_name
+from rbxcompose.missions.language.node_reader import NAME, begun_step, invalid_name, valid_name
 from rbxcompose.missions.program.parts import CONDITIONAL, DEEDS, ENDS, MACHINE_KEYS, OPTIONS, inner_span
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.values import foreign_keys, unknown_in, unknown_settings
@@ -247,7 +247,7 @@ def _report(entry: Entry, known: Words) -> Finding | None:
         return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{meant}'", fix=tight)
     if len(words) < 2:
         return None
-    name, rest = _begun(words, known)
+    name, rest = begun_step(words, known.kinds, known.skills)
     if key.span.line != key.span.end_line:
         message = "a step with settings below it needs a colon"
         return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{name}:'")
@@ -264,16 +264,6 @@ def _report(entry: Entry, known: Words) -> Finding | None:
         fix = _behind(_DASH, key, meant)
     message = f"'{key.text}' is neither a step nor a skill"
     return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{meant}'", fix=fix)
-
-
-def _begun(words: list[str], known: Words) -> tuple[str, list[str]]:
-    """Return the step that some words begin with, `go_to` for `Go to the table`, and what stands behind it."""
-    for count in range(len(words), 0, -1):
-        name = valid_name(" ".join(words[:count]))
-        if known.is_step(name):
-            is_article = count > 1 and name in known.skills and words[count:][:1] == ["the"]
-            return name, words[count + is_article :]
-    return words[0], words[1:]
 
 
 _DASH = "- "
