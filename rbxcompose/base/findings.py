@@ -333,6 +333,8 @@ def clauses(*parts: str) -> str:
 
 def _is_chance(name: str, near: str) -> bool:
     """Return whether two names are only somewhat alike, in no word: `wheel_separation` and `acceleration`."""
+    if name.casefold() == near.casefold():
+        return False
     words, others = _words(name), _words(near)
     pairs = [(name, near), *product(words, others)]
     if not may_guess(2 * len(name) * len(near)):
@@ -390,6 +392,8 @@ def _words(name: str) -> set[str]:
 def nearest(name: str, valid: Iterable[str], *, most: int = 1, cutoff: float = SIMILAR) -> list[str]:
     """Return the valid names most similar to `name`, nearest first; among very many, only those one slip away.
 
+    Those that differ only in the case of letters are nearest, and alone.
+
     Comparing takes time, and a file may contain thousands of wrong names: after many, a compile finds nothing near.
     """
     if not may_guess():
@@ -399,7 +403,8 @@ def nearest(name: str, valid: Iterable[str], *, most: int = 1, cutoff: float = S
     if len(names) > MOST_COMPARED:
         slips = _slips(names)
         names = frozenset(near for short in _shortened(name) for near in slips.get(short, ()))
-    return _closest(name, sorted(names), most, cutoff)
+    same = sorted(other for other in names if other.casefold() == name.casefold())
+    return same[:most] if same and name not in same else _closest(name, sorted(names), most, cutoff)
 
 
 _LOOK_ALIKE = str.maketrans("1I0O", "lloo")

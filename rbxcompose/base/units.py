@@ -354,6 +354,20 @@ def written_unit(text: str) -> str | None:
     return match[2] if match and match[2] in UNITS else None
 
 
+def number_and_unit(text: str) -> tuple[str, str]:
+    """Return the number and the unit of a quantity, this by its name in the list: `deg` of `90°`, '' of `90`.
+
+    Raises:
+        UnitError: if the text is not a number with a unit that people write.
+    """
+    match = _QUANTITY.fullmatch(text.strip())
+    unit = unit_named(match[2]) if match else None
+    if not match or (match[2] and not unit):
+        raise UnitError("not a number with a unit")
+    quantity(match[1], unit)
+    return match[1], unit.name if unit else ""
+
+
 def _shortened(text: str) -> str:
     return text if len(text) <= 20 else f"{text[:20]}..."
 

@@ -75,7 +75,10 @@ def test_a_name_that_differs_in_more_than_a_slip_is_no_guess(name: str, other: s
 
 @pytest.mark.parametrize(
     ("name", "other"),
-    [("griper", "gripper"), ("haed", "head"), ("hands", "hand"), ("uper", "upper"), ("baudrate", "baud")],
+    [
+        *[("griper", "gripper"), ("haed", "head"), ("hands", "hand"), ("uper", "upper"), ("baudrate", "baud")],
+        *[("GO_TO", "go_to"), ("Wrist", "wrist")],
+    ],
 )
-def test_one_slip_or_a_common_word_is_one(name: str, other: str) -> None:
+def test_one_slip_a_common_word_or_letters_of_another_case_are_one(name: str, other: str) -> None:
     assert suggest(name, [other, "base"], "links") == f"did you mean '{other}'?"

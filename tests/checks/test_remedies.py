@@ -91,6 +91,29 @@ def test_a_place_that_nobody_removed_is_misspelt_as_ever(tmp_path: Path) -> None
     assert finding.help == "did you mean 'corner_3'?"
 
 
+ENOUGH = "a few times the time between two commands is enough, such as '0.5 s'"
+
+
+@pytest.mark.parametrize(
+    ("speed", "timeout", "line", "help_text"),
+    [
+        ("0.5 m/s", "5 s", 8, ENOUGH),
+        ("20 m/s", "5 s", 8, f"{ENOUGH}, and drive at 4 m/s at most"),
+        ("20 m/s", "0.5 s", 7, "drive at 4 m/s at most"),
+        ("20 m/s", "0.3 s", 7, "drive at 6.66 m/s at most"),
+        ("4 m/s", "0.5 s", None, ""),
+        ("6.66 m/s", "0.3 s", None, ""),
+    ],
+)
+def test_a_base_that_brakes_late_is_told_its_timeout_or_where_that_is_short_its_speed(
+    speed: str, timeout: str, line: int | None, help_text: str, tmp_path: Path
+) -> None:
+    base = f"    type: diff_drive_sim\n    max_speed: {speed}\n    command_timeout: {timeout}\n"
+    text = HEAD.replace("  base: {type: diff_drive_sim}\n", f"  base:\n{base}")
+    found = [each for each in check_text(text, tmp_path).compilation.report if each.code == "RBX3509"]
+    assert [(each.span and each.span.line, each.help) for each in found] == ([(line, help_text)] if line else [])
+
+
 SENSORS = """world: rbx:worlds/one_wall.yaml
 components:
   base: {type: diff_drive_sim}

@@ -15,6 +15,7 @@ from rbxcompose.commands import main as command
 from rbxcompose.missions.execution.requests import CancelMission, LookAtMission, ShowPicture
 from rbxcompose.missions.view.picture import picture_from_data
 from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.runtime.requests import ReleaseRobot
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.mission_view import lines_of
@@ -58,13 +59,15 @@ REST = "name: rest\nabout: Rests a while.\ndo:\n  wait: 1 s"
 
 @pytest.fixture
 def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Robot:
-    """A robot in the second round of a mission; `mission` commands reach it."""
+    """A robot in the second round of a mission; `mission` commands and `release` reach it."""
     made = Robot(ROUNDS, rest=REST)
     made.level(80.0)
     made.start()
     made.advance(3.0)
 
     def ask(folder: RobotFolder, request: Request[Any], *, timeout: float) -> Any:
+        if request == ReleaseRobot():
+            return "released"
         there = made.mission.requests().from_data(json.loads(json.dumps(as_data(request))))
         return from_data(request.answer_type(), json.loads(json.dumps(to_data(made.mission.handle(there)))))
 
@@ -111,6 +114,21 @@ def test_each_verb_tells_what_a_person_wants_to_know(
         robot.advance(0.0)
     golden.check("mission.txt", "\n".join(lines))
     assert told(capsys) == told(capsys, "ls")
+
+
+def test_a_release_names_the_resume_only_while_a_mission_is_paused(
+    robot: Robot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answers = []
+    for verb in "pause", "resume":
+        assert command.main(["release"]) == 0
+        answers.append(capsys.readouterr().out.strip())
+        told(capsys, verb, "test")
+        robot.advance(0.0)
+        assert command.main(["release"]) == 0
+        answers.append(capsys.readouterr().out.strip())
+    paused = "released; 'mission resume' continues"
+    assert answers == ["released", paused, paused, "released"]
 
 
 @pytest.mark.parametrize("ending", ["mermaid", "dot", "html"])

@@ -86,8 +86,8 @@ class ToySlow(Activity):
 PLACES = {"dock": Place("dock", 0.5, 0.5, 0.0), "corner": Place("corner", 1.0, 0.0, 0.0)}
 
 
-def program_of(text: str) -> Program:
-    root, findings = read_text(textwrap.dedent(text), "mission.yaml")
+def program_of(text: str, file: str = "mission.yaml") -> Program:
+    root, findings = read_text(textwrap.dedent(text), file)
     assert isinstance(root, MappingNode)
     assert not findings
     report = Report()

@@ -9,6 +9,8 @@ import pytest
 
 from rbxcompose.base.requests import Command, Refused
 from rbxcompose.missions.engine.logbook import INPUTS, OtherInterventionError, replay
+from rbxcompose.missions.execution.breakpoints import Breakpoints
+from rbxcompose.missions.execution.equipment import MissionConfig
 from rbxcompose.missions.execution.requests import (
     CancelMission,
     ClearBreakpoints,
@@ -28,7 +30,7 @@ from rbxcompose.missions.execution.requests import (
     StepMission,
 )
 from rbxcompose.sdk import Outcome
-from tests.executive.fake_robot import Robot
+from tests.executive.fake_robot import Robot, program_of
 from tests.loops import for_all
 
 PATROL = """
@@ -304,3 +306,20 @@ def test_data_keep_their_types_within_lists_and_maps_and_places_stay_places() ->
         with pytest.raises(Refused, match=reason):
             robot.mission.handle(SetMissionData({name: text}))
     robot.mission.handle(SetMissionData({"seen": "{bath: 1 cm}", "stops": "[corner]", "said": "[nowhere]"}))
+
+
+@pytest.mark.parametrize(
+    ("where", "reason"),
+    [
+        ("missions/rest.yaml:1", "nothing begins in line 1 of 'missions/rest.yaml'; lines near it are 3, 4, 5"),
+        ("missions/none.yaml:1", "no node of a mission in 'missions/none.yaml'; its files: missions/patrol.yaml, "),
+    ],
+)
+def test_a_line_in_which_nothing_begins_is_refused_by_the_mission_of_its_file_whatever_runs(
+    where: str, reason: str
+) -> None:
+    texts = {"patrol": PATROL, "rest": REST}
+    programs = {name: program_of(text, f"missions/{name}.yaml") for name, text in texts.items()}
+    for active in [], ["patrol"]:
+        with pytest.raises(Refused, match=reason):
+            Breakpoints(MissionConfig(programs=programs)).add(where, "", active)

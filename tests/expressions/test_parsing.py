@@ -151,6 +151,8 @@ def test_an_expression_tells_its_names_words_and_calls_with_places() -> None:
         ("$a ^ 2", "^", "there is no power"),
         ("$a // 2", "//", "round"),
         ("$a = 2", "=", "write '=='"),
+        ("$a => 2", "=>", "write '>='"),
+        ("$a =< 2", "=<", "write '<='"),
         ("$a && $b", "&&", "write 'and'"),
         ("!$a", "!", "write 'not'"),
         ("$a is red", "is", "write '=='"),

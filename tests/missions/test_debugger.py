@@ -358,7 +358,7 @@ def test_what_cannot_be_done_is_refused_and_the_mission_goes_on(intervention: In
     [
         ("go_hone", "there is no 'go_hone'; did you mean 'go_home'?"),
         ("mission.yaml:15", "nothing begins in line 15 of 'mission.yaml'; lines near it are 13, 14, 16"),
-        ("other.yaml:3", "the mission has no nodes in 'other.yaml'; it is in mission.yaml"),
+        ("other.yaml:3", "there is no node of a mission in 'other.yaml'; its files: mission.yaml"),
         (
             "away->nowhere",
             "there is no 'away->nowhere'; transitions: away->home, away->failed, home->away, home->finished",

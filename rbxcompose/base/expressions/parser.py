@@ -65,6 +65,8 @@ _FOREIGN = {
     "**": "there is no power operator; multiply",
     "^": "there is no power operator; multiply",
     "//": "write round(...) for whole numbers",
+    "=>": "write '>='",
+    "=<": "write '<='",
     "=": "write '==' to compare",
     "!": "write 'not'",
     "%": "a percentage is written with its number, such as '30 %'; there is no remainder operator",

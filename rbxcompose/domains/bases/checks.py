@@ -89,7 +89,8 @@ def _wheel(body: Body, setting: Setting[str], link: str) -> BodyWheel:
 
 
 LONGEST = 10.0  # [s]: commands come many times a second
-FARTHEST = 2.0  # [m] driven blind; the usual 0.5 s are that far at 4 m/s only
+FARTHEST = 2.0  # [m] driven blind
+USUAL = 0.5  # [s] until a base brakes: that far at 4 m/s only
 ROUNDING = 1e-3  # of a speed
 REACTION = 0.06  # [s] from an edge below a sensor to wheels that brake: two cycles of sensors and one of the base
 STEEPEST = 60  # [deg] between the way of a base and straight over an edge; beyond that it drives along the edge
@@ -161,12 +162,17 @@ def late_brake(robot: Robot) -> Iterator[Finding]:
             shown = "without end" if math.isinf(allowed.value) else f"for {format_quantity(allowed.value, TIME)}"
             if 0.0 < blind < math.inf:
                 shown += f", {format_quantity(blind, LENGTH)} at full speed,"
+            cause, cures = allowed, [f"a few times the time between two commands is enough, such as '{USUAL:g} s'"]
+            if drives.max_speed and blind > FARTHEST and drives.max_speed.value * USUAL > FARTHEST:
+                most = math.floor(100 * FARTHEST / min(allowed.value, USUAL)) / 100
+                slower = f"drive at {format_quantity(most, SPEED)} at most"
+                cause, cures = (drives.max_speed, [slower]) if allowed.value <= USUAL else (cause, [*cures, slower])
+            span, brakes = (setting_span(robot, (base, setting.field)) for setting in (cause, allowed))
             yield late_brake.at(
-                setting_span(robot, (base, allowed.field)),
+                span,
                 f"'{base.name}' goes on {shown} after its last command",
-                help="a few times the time between two commands is enough, such as '0.5 s'"
-                if allowed.field
-                else OTHER_TYPE,
+                help=", and ".join(cures) if cause.field else OTHER_TYPE,
+                related=[Related(brakes, "until it brakes")] if cause is not allowed else [],
             )
 
 

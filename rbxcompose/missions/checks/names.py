@@ -14,6 +14,7 @@ from rbxcompose.missions.analysis.facts import assignments, called, published
 from rbxcompose.missions.codes import NAME_CLASH, UNKNOWN_NAME
 from rbxcompose.missions.engine.world import POSE
 from rbxcompose.missions.language.grammar import FOREIGN
+from rbxcompose.missions.language.node_reader import begun_step, valid_name
 from rbxcompose.missions.program.parts import Form, MessageTemplate
 from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 from rbxcompose.missions.program.registry import kinds
@@ -173,6 +174,11 @@ def unknown_skill(mission: Examined) -> Iterator[findings.Finding]:
                 if (called := _called(node)) in skills:
                     is_plain = f"a step is the name of its skill: '- {called}: ...'"
                     help_text = f"{is_plain}, with its arguments after the colon"
+                    yield unknown_skill.at(node.span, message, help=help_text, about=[node.skill])
+                    continue
+                spoken, rest = begun_step([node.skill, *_called(node).split()], (), skills)
+                if spoken in skills and spoken != valid_name(node.skill):  # its name ends behind the colon
+                    help_text = f"write '{' '.join([f'{spoken}:', *rest])}'"
                     yield unknown_skill.at(node.span, message, help=help_text, about=[node.skill])
                     continue
                 if ours in kinds():

@@ -1,7 +1,7 @@
 """What a person may do to a mission that runs, as data, and how people name its nodes and transitions."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import PurePath
 from typing import Any, NamedTuple
 
@@ -14,6 +14,14 @@ from rbxcompose.missions.program.program import MissionNode, Program
 
 class NotPossible(ValueError):  # noqa: N818 - it is the answer to whoever intervenes
     """Raised with the reason why a mission cannot do what a person wants."""
+
+
+class OtherFileError(NotPossible):
+    """Raised if there is nothing of any of some missions, whose `files` these are, in the `file` of a line."""
+
+    def __init__(self, file: str, files: Iterable[str]) -> None:
+        self.file, self.files = file, tuple(dict.fromkeys(files))
+        super().__init__(f"there is no node of a mission in '{file}'; its files: {', '.join(self.files)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,8 +150,7 @@ def _leaving(node: MissionNode, outcome: str) -> NodeAddress:
 def _on_line(program: Program, file: str, line: int) -> tuple[NodeAddress, ...]:
     spots = [spot for spot in _spots(program) if _is_file(spot.span.file, file)]
     if not spots:
-        files = dict.fromkeys(str(node.span.file) for node in program.nodes)
-        raise NotPossible(f"the mission has no nodes in '{file}'; it is in {', '.join(files)}")
+        raise OtherFileError(file, (node.span.file for node in program.nodes))
     found = [spot for spot in spots if spot.span.line == line]
     starts = {spot.node for spot in found if spot.outcome is None}
     above = {spot.node: program.nodes[spot.node].parent for spot in found}

@@ -23,6 +23,7 @@ from rbxcompose.missions.engine.interventions import (
     JumpToState,
     NodeAddress,
     NotPossible,
+    OtherFileError,
     SetBreakpoints,
     find,
     is_line,
@@ -82,14 +83,14 @@ class Breakpoints:
                 raise Refused(f"node {where} of which mission? Add '--mission NAME'")
             mission = active[0]
         found: dict[str, tuple[NodeAddress, ...]] = {}
-        reasons: dict[str, str] = {}
+        reasons: dict[str, NotPossible] = {}
         for name in [mission] if mission else programs:
             try:
                 found[name] = find(self.linked(name), where)
             except NotPossible as error:
-                reasons[name] = str(error)
+                reasons[name] = error
         if not found:
-            raise Refused(next((reasons[name] for name in (*active, *reasons) if name in reasons), "no missions"))
+            raise Refused(_why([reasons[name] for name in (*active, *reasons) if name in reasons]))
         if len(found) > 1 and not is_line(where):
             found = {name: spots for name, spots in found.items() if name in active} or found
             if len({spots[0].span for spots in found.values()}) > 1:
@@ -147,6 +148,15 @@ class Breakpoints:
         node = self.linked(mission).nodes[spot.node]
         leads = node.step.leads_to
         return named(node) if spot.outcome is None or not leads else f"{node.name}{ARROW}{leads.to[spot.outcome]}"
+
+
+def _why(reasons: list[NotPossible]) -> str:
+    """Return why none of some missions has a place: the first reason of one that has nodes in its file, if one has."""
+    others = [reason for reason in reasons if isinstance(reason, OtherFileError)]
+    own = [str(reason) for reason in reasons if reason not in others]
+    if own or not others:
+        return own[0] if own else "no missions"
+    return str(OtherFileError(others[0].file, (file for other in others for file in other.files)))
 
 
 def forced(run: MissionRun, where: str, outcome: str) -> ForceResult:

@@ -1,5 +1,6 @@
 """Literal values in a manifest: of the type that is wanted, poses that are written out, nodes in the data."""
 
+import math
 from collections.abc import Collection, Iterator, Mapping
 
 from rbxcompose.base.dataclass import dataclass
@@ -8,7 +9,7 @@ from rbxcompose.base.expressions.tree import Expression, ExpressionNode, FieldAc
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import DID_YOU_MEAN, Finding, FindingKind, Span, surely_meant
 from rbxcompose.base.printable import plain
-from rbxcompose.base.units import NUMBER, Quantity, UnitError, parse_quantity, to_si
+from rbxcompose.base.units import NUMBER, Quantity, UnitError, number_and_unit, parse_quantity, to_si
 from rbxcompose.manifest.tree import (
     Key,
     MappingNode,
@@ -171,13 +172,14 @@ def _coordinates(nodes: Mapping[str, TreeNode]) -> Iterator[tuple[str, str]]:
     """Yield the coordinates with their units, as far as they are numbers."""
     for key, scalar in _scalars(nodes):
         if key in _COORDINATES:
-            name, unit = _COORDINATES[key]
+            name, usual = _COORDINATES[key]
             try:
-                parse_quantity(scalar.text)
+                number, unit = number_and_unit(scalar.text)
             except UnitError:
                 continue
-            is_bare = scalar.text.strip()[-1:].isdigit()
-            yield name, f"{scalar.text.strip()} {unit}" if is_bare else scalar.text.strip()
+            if usual == "rad" and abs(float(number)) > math.tau:
+                usual = "deg"  # nobody turns further than once
+            yield name, f"{number} {unit or usual}"
 
 
 ANY_ENTRY = None  # matches any entry of a list or a map

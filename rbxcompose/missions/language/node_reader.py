@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Protocol
 
@@ -12,7 +12,7 @@ from rbxcompose.base.expressions.text import Template, TextSlot, parse_template,
 from rbxcompose.base.expressions.tree import Expression, ExpressionError, Number
 from rbxcompose.base.expressions.types import COUNT, FLAG, TEXT, UNKNOWN, Type, quantity_of
 from rbxcompose.base.findings import Finding, Fix, Span, surely_meant
-from rbxcompose.base.units import NUMBER, TIME
+from rbxcompose.base.units import NUMBER, TIME, UnitError, parse_quantity
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, plain_value
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import is_reported
@@ -21,12 +21,23 @@ from rbxcompose.missions.program import parts
 NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
 NAME_HELP = "names start with a lower-case letter; lower-case letters, digits and underscores follow"
 _BETWEEN = re.compile(r"[\s-]+")
+_MOST_WORDS = 8  # of a name
 
 
 def valid_name(text: str) -> str:
     """Return the name that a text was meant to be, `go_home` for `Go home`; empty if that is not clear."""
     meant = _BETWEEN.sub("_", text.strip()).lower()
     return meant if NAME.fullmatch(meant) else ""
+
+
+def begun_step(words: list[str], kinds: Collection[str], skills: Collection[str]) -> tuple[str, list[str]]:
+    """Return the step that some words begin with, `go_to` for `Go to the table`, and what stands behind it."""
+    for count in range(min(len(words), _MOST_WORDS), 0, -1):
+        name = valid_name(" ".join(words[:count]))
+        if name in kinds or name in skills:
+            is_article = count > 1 and name in skills and words[count:][:1] == ["the"]
+            return name, words[count + is_article :]
+    return words[0], words[1:]
 
 
 def invalid_name(scalar: ScalarNode, fix: Fix | None = None) -> Finding:
@@ -69,9 +80,19 @@ def read_expression(scalar: ScalarNode, nodes: Nodes, wanted: Type = FLAG) -> Ex
     except ExpressionError as error:
         span = parts.inner_span(scalar, error.start, error.end) if scalar.text else scalar.span
         is_text = wanted in (TEXT, UNKNOWN) and _WORDS.fullmatch(scalar.text)
-        help_text = error.help or (quotes_needed(scalar.text) if is_text else "")
+        help_text = _unit_help(scalar.text, wanted, error) or (quotes_needed(scalar.text) if is_text else "")
         nodes.add(codes.NO_EXPRESSION.at(span, error.message, help=help_text))
         return None
+
+
+def _unit_help(text: str, wanted: Type, error: ExpressionError) -> str:
+    """Return the help of an error; where the whole text is one quantity, its unit must fit what is wanted."""
+    try:
+        parse_quantity(text, wanted.dimension)
+    except UnitError as wrong:
+        if wanted.dimension and wrong.message == error.message:
+            return wrong.help
+    return error.help
 
 
 _FLOW_HELP = "inside '{}', commas and colons separate: put quotes around the condition, or write it in block style"

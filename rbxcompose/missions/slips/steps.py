@@ -21,7 +21,7 @@ from rbxcompose.manifest.tree import (
 )
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import FOREIGN, GrammarPlace, Takes, Words, placeholder, without_word
-from rbxcompose.missions.language.node_reader import NAME, invalid_name, valid_name
+from rbxcompose.missions.language.node_reader import NAME, begun_step, invalid_name, valid_name
 from rbxcompose.missions.program.parts import CONDITIONAL, DEEDS, ENDS, MACHINE_KEYS, OPTIONS, inner_span
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.values import foreign_keys, unknown_in, unknown_settings
@@ -247,12 +247,22 @@ def _report(entry: Entry, known: Words) -> Finding | None:
         return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{meant}'", fix=tight)
     if len(words) < 2:
         return None
+    name, rest = begun_step(words, known.kinds, known.skills)
     if key.span.line != key.span.end_line:
         message = "a step with settings below it needs a colon"
-        return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{words[0]}:'")
-    message, meant = f"'{key.text}' is neither a step nor a skill", f"{words[0]}: {' '.join(words[1:])}"
-    is_alone = key.plain and entry.value.span == key.span  # there is no colon behind it
-    fix = _behind(_DASH, key, meant) if is_alone and _takes_value(words[0], known) and _VALUE.match(words[1]) else None
+        return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{name}:'")
+    text, is_alone = " ".join(rest), entry.value.span == key.span  # there is no colon behind it
+    if not is_alone and not known.is_step(name):
+        name, text = valid_name(key.text) or name, ""
+    if not is_alone and isinstance(entry.value, ScalarNode):
+        value = plain(entry.value.text, _LONGEST)
+        text = f'"{text}: {value}"' if text and value else text or value
+    meant, fix = f"{name}: {text}" if text else name if is_alone else f"{name}:", None
+    if key.plain and not rest:
+        fix = replacement(key.span, key.text, name)
+    elif key.plain and is_alone and _takes_value(name, known) and _VALUE.match(text):
+        fix = _behind(_DASH, key, meant)
+    message = f"'{key.text}' is neither a step nor a skill"
     return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{meant}'", fix=fix)
 
 

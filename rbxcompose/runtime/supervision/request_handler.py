@@ -125,7 +125,7 @@ class RequestHandler:
             raise Refused(f"the robot must stand still: {'; '.join(reasons)}")
         self._log("release: motion is allowed again")
         self._supervisor.conductor.release()
-        return "released; 'mission resume' continues"
+        return "released"
 
     def _bring_down(self) -> str:
         if not self._supervisor.conductor.is_going_down:
