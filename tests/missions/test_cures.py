@@ -79,6 +79,8 @@ CURES = [
     ("do: {sequence: [recharge, recharge], history: always}", ["it can be: none, last, deep"]),
     ("do: {go: to the dock}", ["write 'go_to: dock'"]),
     ("do: {GO_TO: dock}", ["did you mean 'go_to'?"]),
+    ("do: [wait for 5 s]", ["write 'wait: 5 s'"]),
+    ("do: {sya: hello}", ["did you mean 'say'?"]),
     ("do: {wait: 5 metres}", ["units of a time: s, "]),
     ("do: {wait: 5 mins}", ["did you mean 'min'?"]),
     ("do: {wait: 5 m}", ["if these are minutes, write '5 min'"]),

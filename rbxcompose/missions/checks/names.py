@@ -18,6 +18,7 @@ from rbxcompose.missions.language.node_reader import begun_step, valid_name
 from rbxcompose.missions.program.parts import Form, MessageTemplate
 from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 from rbxcompose.missions.program.registry import kinds
+from rbxcompose.sdk.registry import skill_names
 
 
 @mission_check(NAME_CLASH)
@@ -156,7 +157,7 @@ def unknown_skill(mission: Examined) -> Iterator[findings.Finding]:
     skills = mission.robot.skills
     for node in mission.program.nodes:
         if node.skill and node.skill not in skills:
-            known = (*skills, *kinds())
+            known = (*skills, *skill_names(), *kinds())
             close = findings.nearest(node.skill, known)
             # Else it may belong to a component that could not be read.
             ours = FOREIGN.get(node.skill.casefold(), "")

@@ -35,6 +35,8 @@ def begun_step(words: list[str], kinds: Collection[str], skills: Collection[str]
     for count in range(min(len(words), _MOST_WORDS), 0, -1):
         name = valid_name(" ".join(words[:count]))
         if name in kinds or name in skills:
+            if name == "wait_for" and words[count : count + 1] and words[count][0].isdigit():
+                return "wait", words[count:]  # a time
             is_article = count > 1 and name in skills and words[count:][:1] == ["the"]
             return name, words[count + is_article :]
     return words[0], words[1:]
