@@ -236,6 +236,13 @@ def test_it_fits_the_window_and_the_finger(open_page: Callable[..., Page], proje
         expect_fit(page)
         if (shots := os.environ.get("SHOTS")) is not None:
             page.screenshot(path=f"{shots}/editor_{size['width']}.png", full_page=True)
+        close = page.get_by_role("button", name="Close")
+        close.evaluate("button => button.scrollIntoView()")
+        stop = page.get_by_role("button", name="STOP").bounding_box()
+        over = close.bounding_box()
+        assert stop
+        assert over
+        assert over["y"] >= stop["y"] + stop["height"] or over["y"] + over["height"] <= stop["y"]
 
 
 def block(page: Page, text: str) -> Any:
