@@ -94,9 +94,9 @@ export class LiveChanges {
   }
 }
 
-/** Says what happens to which components: `mission changed live`. */
+/** Says what would happen to which components: `mission would be changed live`. */
 export function fates(found: LiveDifference): string {
-  return found.components.map(({ name, fate }) => `${name} ${fate}`).join(", ");
+  return found.components.map(({ name, fate }) => `${name} would be ${fate}`).join(", ");
 }
 
 function dialogOf(found: LiveDifference): HTMLDialogElement {

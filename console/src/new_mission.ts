@@ -18,7 +18,7 @@ export async function newMission(robot: Robot, host: HTMLElement): Promise<strin
     robot.notify((error as Error).message);
     return "";
   }
-  const name = h("input", { id: "new-name", required: "", pattern: "[a-z][a-z0-9_]*", autocomplete: "off", title: "Small letters, digits, underscores" });
+  const name = h("input", { id: "new-name", required: "", autocomplete: "off" });
   const list = h("select", { id: "new-template" }, ...templates.map((one) => h("option", { value: one.name }, formatName(one.name))));
   const about = h("p", { class: "label" });
   const says = h("p", { role: "alert" });
@@ -27,7 +27,8 @@ export async function newMission(robot: Robot, host: HTMLElement): Promise<strin
   show();
   const make = h("button", {}, icon("check"), "Make it");
   const leave = h("button", { type: "button" }, icon("cross"), "Not now");
-  const fields = [h("label", { for: "new-name" }, "Name"), name, h("label", { for: "new-template" }, "What it does"), list];
+  const rule = h("span", { class: "label" }, " lower-case letters, digits and underscores");
+  const fields = [h("label", { for: "new-name" }, "Name", rule), name, h("label", { for: "new-template" }, "What it does"), list];
   const form = h("form", {}, h("h2", { id: "new-title" }, "New mission"), ...fields, about, says, h("div", { class: "row" }, make, leave));
   const dialog = h("dialog", { class: "save-dialog", "aria-labelledby": "new-title" }, form);
   leave.onclick = () => dialog.close("");

@@ -80,20 +80,30 @@ it("slides in the unit that is shown", () => {
 describe("what can be taken back", () => {
   const changes = () => {
     const one = { value: 0.5 as Value, isSending: false };
-    const kept = new Changes<typeof one>();
+    const known = new Map([["one", one]]);
+    const kept = new Changes((key) => known.get(key));
     const set = (value: Value) => {
-      kept.put(one, one.value);
+      kept.put("one", one.value);
       one.value = value;
     };
-    return { one, kept, set };
+    return { one, known, kept, set };
   };
+
+  it("is what was changed before the page was opened again, as long as the robot has it", () => {
+    const { known, kept, set } = changes();
+    set(0.4);
+    known.set("one", { value: 0.4, isSending: false });
+    expect(kept.isEmpty).toBe(false);
+    known.clear();
+    expect(kept.isEmpty).toBe(true);
+  });
 
   it("is what was taken, without what was refused", () => {
     const { one, kept, set } = changes();
     set(0.4);
     set(0);
     one.value = 0.4; // refused
-    expect(kept.takeBack()).toEqual({ of: one, before: 0.5 });
+    expect(kept.takeBack()).toEqual({ key: "one", before: 0.5 });
     expect(kept.isEmpty).toBe(true);
   });
 
@@ -102,7 +112,7 @@ describe("what can be taken back", () => {
     set(0.4);
     one.isSending = true;
     set(0.3);
-    expect(kept.takeBack()).toEqual({ of: one, before: 0.5 });
+    expect(kept.takeBack()).toEqual({ key: "one", before: 0.5 });
     expect(kept.isEmpty).toBe(true);
   });
 

@@ -145,22 +145,30 @@ interface Changing {
   readonly isSending: boolean;
 }
 
-/** What can be taken back, the last change first. */
-export class Changes<T extends Changing> {
-  readonly #all: { of: T; before: Value }[] = [];
+/** What can be taken back, the last change first; `find` returns what has a key now. */
+export class Changes {
+  readonly #find: (key: string) => Changing | undefined;
+  readonly #all: { key: string; before: Value }[] = [];
+
+  constructor(find: (key: string) => Changing | undefined) {
+    this.#find = find;
+  }
 
   /** Keeps what a value was before a change; a slider that moves is one change. */
-  put(of: T, before: Value): void {
-    if (this.#all.at(-1)?.of !== of || !of.isSending) this.#all.push({ of, before });
+  put(key: string, before: Value): void {
+    if (this.#all.at(-1)?.key !== key || !this.#find(key)?.isSending) this.#all.push({ key, before });
   }
 
-  /** Whether nothing can be taken back; what was refused, or is as it was before, is forgotten. */
+  /** Whether nothing can be taken back; what was refused, is as it was before, or is gone, is forgotten. */
   get isEmpty(): boolean {
-    while (this.#all.length > 0 && this.#all.at(-1)!.of.value === this.#all.at(-1)!.before) this.#all.pop();
-    return this.#all.length === 0;
+    for (let last; (last = this.#all.at(-1)); this.#all.pop()) {
+      const present = this.#find(last.key)?.value ?? last.before;
+      if (present !== last.before) return false;
+    }
+    return true;
   }
 
-  takeBack(): { of: T; before: Value } | undefined {
+  takeBack(): { key: string; before: Value } | undefined {
     return this.isEmpty ? undefined : this.#all.pop();
   }
 }

@@ -67,9 +67,10 @@ class DescribeRobot(Query[tuple[ComponentDescription, ...]]):
 
 @dataclass(frozen=True, slots=True)
 class StopRobot(Command):
-    """Hold everything that moves until the release."""
+    """Hold everything that moves until the release; `by` says who wants that."""
 
     about = ROBOT
+    by: str = "the command 'stop'"
 
 
 @dataclass(frozen=True, slots=True)

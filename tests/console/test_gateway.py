@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.console.components.gateway import GatewayConfig, GatewayThread
+from rbxcompose.domains.console.components.gateway import GatewayConfig, GatewayThread, words_of
 from rbxcompose.testing import Bench, instance
 
 
@@ -69,3 +69,11 @@ def test_nothing_is_served_on_a_stepped_clock() -> None:
     bench.advance(2.0)
     assert "gateway" not in names()
     assert bench.host.states()["gateway"] == ("active", 0)
+
+
+def test_what_a_command_says_is_wrong_is_a_sentence_with_what_to_do() -> None:
+    warning = {"severity": "warning", "message": "slow", "help": "wait"}
+    error = {"severity": "error", "message": "it has errors", "help": "'rbxcompose check' shows them"}
+    wanted = "it has errors: 'rbxcompose check' shows them"
+    assert words_of({"error": "it has errors", "findings": [warning, error]}) == wanted
+    assert words_of({"error": "misused", "findings": []}) == "misused"

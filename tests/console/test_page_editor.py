@@ -236,6 +236,13 @@ def test_it_fits_the_window_and_the_finger(open_page: Callable[..., Page], proje
         expect_fit(page)
         if (shots := os.environ.get("SHOTS")) is not None:
             page.screenshot(path=f"{shots}/editor_{size['width']}.png", full_page=True)
+        close = page.get_by_role("button", name="Close")
+        close.evaluate("button => button.scrollIntoView()")
+        stop = page.get_by_role("button", name="STOP").bounding_box()
+        over = close.bounding_box()
+        assert stop
+        assert over
+        assert over["y"] >= stop["y"] + stop["height"] or over["y"] + over["height"] <= stop["y"]
 
 
 def block(page: Page, text: str) -> Any:
@@ -394,7 +401,9 @@ def test_a_robot_is_watched_paused_and_resumed_beside_the_editor_on_a_phone(
 
 
 @pytest.mark.soak  # what is made is tested without a browser
-def test_a_new_mission_is_made_from_a_template_and_opened(open_page: Callable[..., Page], project: Project) -> None:
+def test_a_new_mission_is_made_from_a_template_and_opened(
+    open_page: Callable[..., Page], project: Project, gateway: FakeGateway
+) -> None:
     page = open_page(page_name="mission")
     page.get_by_role("button", name="New mission").click()
     dialog = page.get_by_role("dialog")
@@ -408,5 +417,13 @@ def test_a_new_mission_is_made_from_a_template_and_opened(open_page: Callable[..
     dialog.get_by_label("Name").fill("bring")
     dialog.get_by_role("button", name="Make it").click()
     expect(page.get_by_text("bring in missions/bring.yaml")).to_be_visible()
+    control = page.get_by_label("Control")
+    expect(control.get_by_role("heading", name="Bring")).to_be_visible()
+    expect(control).to_contain_text("The running robot does not have this mission.")
+    expect(page.get_by_role("button", name="Start")).to_be_hidden()
+    (listed,) = gateway.windows["mission/ListMissions"]
+    gateway.show("mission/ListMissions", [listed, {**listed, "name": "bring"}])
+    expect(page.get_by_role("button", name="Start")).to_be_visible()
+    expect(control.get_by_role("heading", name="Bring")).to_be_visible()
     expect(block(page, "Delivered")).to_be_visible()
     expect(page.get_by_text("No mistakes")).to_be_visible()

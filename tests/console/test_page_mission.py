@@ -85,6 +85,19 @@ def test_a_person_pauses_cancels_and_starts_a_mission(open_page: Callable[..., P
     assert violations(page) == []
 
 
+def test_the_mission_that_was_chosen_is_shown_again_after_another_page(
+    open_page: Callable[..., Page], patrol: FakeGateway
+) -> None:
+    patrol.windows["mission/ListMissions"] = [*listed("idle"), {**listed("idle")[0], "name": "second"}]
+    page = open_page(page_name="mission")
+    expect(page.get_by_role("heading", name="Patrol")).to_be_visible()
+    page.get_by_label("Missions").get_by_role("button", name="Second").click()
+    for name in ("map", "mission"):
+        page.evaluate("name => { location.hash = name; }", name)
+    expect(page.get_by_role("heading", name="Second")).to_be_visible()
+    expect(page.get_by_role("button", name="Second")).to_have_attribute("aria-pressed", "true")
+
+
 def trigger(name: str, cause: str, **more: Any) -> dict[str, Any]:
     plain = {
         "priority": 0,

@@ -310,11 +310,11 @@ def test_rosapi_lists_the_interfaces_of_each_kind() -> None:
 def test_anyone_may_stop_and_release_the_robot() -> None:
     room = Room()
     client = room.client()
-    for what in ("stop", "release"):
+    for what, says in (("stop", {"by": "the console"}), ("release", {})):
         assert client.does("call_service", service=f"/console/{what}", id="x") == []
         (asked,) = room.asked()
         assert isinstance(asked, AskRobot)
-        assert asked.request == {"type": f"robot.{what.title()}Robot"}
+        assert asked.request == {"type": f"robot.{what.title()}Robot", **says}
         room.bridge.robot_answered(asked.number, "done")
         assert client.gets()[0]["values"] == {"success": True, "message": "done", "answer": "done"}
 
@@ -672,7 +672,7 @@ def test_what_a_role_may_not_is_refused_and_answered() -> None:
     assert (answer["result"], answer["id"]) == (False, "a")
     assert client.does("call_service", service="/console/stop") == []
     (asked,) = (request for request in room.asked() if isinstance(request, AskRobot))
-    assert asked.request == {"type": "robot.StopRobot"}
+    assert asked.request == {"type": "robot.StopRobot", "by": "the console"}
 
 
 def test_names_may_be_guarded_by_patterns() -> None:

@@ -54,7 +54,8 @@ def test_a_new_mission_gets_its_file_and_its_entry(editor: MissionEditor, projec
     ("name", "template", "why"),
     [
         ("fetch", "patrol", "it is taken"),
-        ("No Name", "patrol", "cannot be the name"),
+        ("No Name", "patrol", r"cannot be the name of a mission: did you mean 'no_name'\?"),
+        ("\u732b", "patrol", "a name has lower-case letters, digits and underscores"),
         ("../x", "patrol", "cannot be the name"),
         ("rounds", "../templates/patrol", "there is no template"),
         ("low", "dock_when_low", "this robot cannot do that"),

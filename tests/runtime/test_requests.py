@@ -129,11 +129,13 @@ class Desk:
 
 
 def test_stop_reaches_all_and_is_told() -> None:
-    desk = Desk()
-    assert desk.ask(StopRobot()) == ("stopped; 'release' allows motion again", False)
-    assert desk.sent == [("mission", say.Stop())]
-    assert desk.texts == ["stop: all motion is held until 'release'"]
-    assert desk.conductor.is_stopped
+    for request, by in ((StopRobot(), "the command 'stop'"), (StopRobot(by="the console"), "the console")):
+        desk = Desk()
+        assert desk.ask(request) == ("stopped; 'release' allows motion again", False)
+        assert desk.sent == [("mission", say.Stop())]
+        assert desk.texts == ["stop: all motion is held until 'release'"]
+        assert desk.conductor.latch.state is not None
+        assert desk.conductor.latch.state.by == by
 
 
 def test_release_opens_a_stop_and_nothing_else() -> None:

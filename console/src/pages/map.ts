@@ -54,6 +54,9 @@ const TOOLS: Record<Tool, readonly [words: string, hint: string]> = {
     "Drag a place, or the handle of the chosen one to turn it; press elsewhere to add one. Arrow keys, Page Up and Page Down move and turn the chosen place, with Shift by 1 cm.",
   ],
 };
+const KEYS =
+  "wheel, pinch, + and \u2212 zoom; 0 fits everything; Escape gives a drag up. " +
+  "x points right, y up. The dotted line is where the robot was in the last minute.";
 const ICONS: Record<Exclude<TripState["is"], "none">, Icon> = {
   driving: "play",
   arrived: "check",
@@ -139,6 +142,7 @@ class MapView {
   readonly #canvas = new MapCanvas();
   readonly #where = h("p", { class: "label" });
   readonly #hint = h("p", { class: "map-hint", role: "status" });
+  readonly #keys = h("p", { class: "label map-keys", id: "map-keys" });
   readonly #tools = new Map<Tool, HTMLButtonElement>();
   readonly #state = h("p", { class: "map-state", role: "status" });
   readonly #note = h("p", { class: "label" });
@@ -227,9 +231,6 @@ class MapView {
     ];
     const group = { class: "map-tools", role: "group", "aria-label": "What a drag does" };
     const tools = h("div", group, ...this.#tools.values());
-    const keys =
-      "Drag or arrow keys move the view; wheel, pinch, + and \u2212 zoom; 0 fits everything; Escape gives a drag up. " +
-      "x points right, y up. The dotted line is where the robot was in the last minute.";
     return h(
       "section",
       { class: "card map-chart", "aria-label": "View" },
@@ -237,7 +238,7 @@ class MapView {
       h("div", { class: "map-box" }, this.#canvas, h("div", { class: "map-zooms" }, ...zooms)),
       this.#hint,
       this.#where,
-      h("p", { class: "label map-keys", id: "map-keys" }, keys),
+      this.#keys,
     );
   }
 
@@ -525,6 +526,8 @@ class MapView {
     if (tool === "places") this.#edit();
     this.#measured = "";
     this.#canvas.tool = tool;
+    const ways = { move: "Drag or arrow keys move the view; ", places: "On the map, " }; // where arrow keys move a place
+    setText(this.#keys, ((ways as Partial<Record<Tool, string>>)[tool] ?? "Arrow keys move the view; ") + KEYS);
     for (const [name, each] of this.#tools) each.setAttribute("aria-pressed", String(name === tool));
     this.#showHint();
   }

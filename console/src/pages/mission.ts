@@ -18,6 +18,12 @@ const LOOK = 250; // [ms] between two looks at a mission, and at the breakpoints
 const SELDOM = 2_000; // [ms] between two looks at what changes seldom
 const STORY = 200; // lines that are kept
 
+/** What the page shows of a mission that the robot does not have, such as a new one. */
+const UNKNOWN = { about: "The running robot does not have this mission.", state: "idle", claims: [], inputs: [], starts: [] };
+
+/** The mission that a person chose: it stays while the page shows something else. */
+let chosenByHand = "";
+
 export const page: Page = {
   name: "mission",
   title: "Mission",
@@ -66,7 +72,6 @@ class MissionView {
   readonly #closers: (() => void)[] = [];
   #missions: Listed[] = [];
   #chosen = "";
-  #isChosenByHand = false;
   #look: () => void = () => undefined;
   #seen: Seen | null = null;
   #tested: Tested | null = null;
@@ -132,13 +137,13 @@ class MissionView {
   list(missions: Listed[]): void {
     this.#missions = missions;
     const active = missions.find(({ state }) => ACTIVE.has(state));
-    const wanted = this.#isChosenByHand ? this.#chosen : (active?.name ?? (this.#chosen || missions[0]?.name));
+    const wanted = chosenByHand || (active?.name ?? (this.#chosen || missions[0]?.name));
     this.#list.replaceChildren(
       ...missions.map(({ name, state }) => {
         const button = h("button", { type: "button", "data-state": state }, h("span", {}, formatName(name)), h("small", {}, state));
         button.setAttribute("aria-pressed", String(name === wanted));
         button.onclick = () => {
-          this.#isChosenByHand = true;
+          chosenByHand = name;
           this.#choose(name);
         };
         return button;
@@ -148,7 +153,9 @@ class MissionView {
       const make = h("button", { type: "button", class: "new-mission" }, icon("edit"), "New mission");
       make.onclick = async () => {
         const name = await newMission(this.#robot, this.element);
-        if (name) this.#edit(name);
+        if (!name) return;
+        this.#choose((chosenByHand = name));
+        this.#edit(name);
       };
       this.#list.append(make);
     }
@@ -209,10 +216,11 @@ class MissionView {
   // Control
 
   #showHead(): void {
-    const mission = this.#missions.find(({ name }) => name === this.#chosen);
-    if (!mission) return;
+    if (!this.#chosen) return;
+    const known = this.#missions.find(({ name }) => name === this.#chosen);
+    const mission = known ?? { ...UNKNOWN, name: this.#chosen };
     const isActive = ACTIVE.has(mission.state);
-    const key = `${mission.name} ${isActive}`;
+    const key = `${mission.name} ${isActive} ${known !== undefined}`;
     if (key !== this.#headOf) {
       this.#headOf = key;
       this.#controls = new Controls(this.#mayOperate, (request, button) => void this.#ask({ type: `mission.${request}`, mission: mission.name }, button));
@@ -224,7 +232,7 @@ class MissionView {
       const left = this.#leftOver.find((one) => one.mission === mission.name);
       if (left) this.#head.append(showLeftOver(left, isActive, this.#mayOperate, (request, button) => this.#ask(request, button)));
       if (isActive) this.#head.append(this.#controls.buttons);
-      else if (this.#mayOperate) this.#head.append(this.#startForm(mission));
+      else if (this.#mayOperate && known) this.#head.append(this.#startForm(mission));
     }
     this.#controls!.show(mission.state, this.#seen?.mission === mission.name ? this.#seen : null);
   }
@@ -235,7 +243,7 @@ class MissionView {
     this.#editor?.element.remove();
     this.#editor = name ? new MissionEditor(this.#robot, name, () => this.#edit("")) : null;
     if (this.#editor) this.element.append(this.#editor.element);
-    this.#isChosenByHand ||= this.#editor !== null; // another mission that starts does not take the text away
+    chosenByHand ||= name; // another mission that starts does not take the text away
     this.#side.hidden = this.#editor !== null;
     if (this.#tree) this.#tree.element.hidden = this.#editor !== null;
     this.element.classList.toggle("edits", this.#editor !== null);

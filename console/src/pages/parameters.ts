@@ -50,6 +50,11 @@ interface Unsaved {
   new: Json;
 }
 
+const rows = new Map<string, Row>();
+
+/** What can be taken back: it stays while the page shows something else. */
+const changes = new Changes((key) => rows.get(key));
+
 export const page: Page = {
   name: "parameters",
   title: "Parameters",
@@ -75,8 +80,6 @@ class ParametersView {
   readonly #save = h("button", { type: "button" }, icon("check"), "Save");
   readonly #says = h("p", { class: "says", role: "status" });
   readonly #cards = h("div", { class: "parameter-cards" });
-  readonly #rows = new Map<string, Row>();
-  readonly #changes = new Changes<Row>();
   readonly #whyNot: string; // it may not be changed by who looks at it
   readonly #close: () => void;
   #looking = false;
@@ -144,19 +147,20 @@ class ParametersView {
       this.element.replaceChildren(emptyCard("warning", "This robot has no parameters that may change while it runs.", help));
       return;
     }
-    this.#rows.clear();
+    rows.clear();
     const cards = told.map(({ node, settings, refused }) => {
-      const rows = settings.map(({ setting, value }) => {
+      const shown = settings.map(({ setting, value }) => {
         const row = new Row(setting, value, this.#whyNot, (before, after) => this.#set(row, before, after));
-        this.#rows.set(row.key, row);
+        rows.set(row.key, row);
         return row.element;
       });
-      if (refused) rows.push(h("p", { class: "parameter", "data-words": node }, `Its parameters are unknown: ${refused}.`));
-      return h("section", { class: "card", "aria-label": node.slice(1) }, h("h2", {}, formatName(node)), ...rows);
+      if (refused) shown.push(h("p", { class: "parameter", "data-words": node }, `Its parameters are unknown: ${refused}.`));
+      return h("section", { class: "card", "aria-label": node.slice(1) }, h("h2", {}, formatName(node)), ...shown);
     });
     this.#cards.replaceChildren(...cards);
     const bar = h("div", { class: "parameter-bar" }, this.#filter, this.#undo, this.#save);
     this.element.replaceChildren(bar, this.#says, this.#cards);
+    this.#undo.disabled = changes.isEmpty;
     this.#find();
   }
 
@@ -167,14 +171,14 @@ class ParametersView {
   }
 
   #set(row: Row, before: Value, after: Value): void {
-    this.#changes.put(row, before);
+    changes.put(row.key, before);
     this.#send(row, after);
   }
 
   #send(row: Row, value: Value): void {
     row.send(value, (next) => this.#tell(row.setting, next));
     this.#undo.disabled = false;
-    void row.settled.then(() => (this.#undo.disabled = this.#changes.isEmpty));
+    void row.settled.then(() => (this.#undo.disabled = changes.isEmpty));
   }
 
   async #tell(setting: Setting, value: Value): Promise<void> {
@@ -185,9 +189,9 @@ class ParametersView {
   }
 
   #takeBack(): void {
-    const last = this.#changes.takeBack();
-    if (last) this.#send(last.of, last.before);
-    this.#undo.disabled = this.#changes.isEmpty;
+    const last = changes.takeBack();
+    if (last) this.#send(rows.get(last.key)!, last.before);
+    this.#undo.disabled = changes.isEmpty;
   }
 
   /** Takes what others have changed, and what the robot made of what was sent. */
@@ -195,7 +199,7 @@ class ParametersView {
     const changed = [event.changed_parameters, event.new_parameters].flatMap((all) => (Array.isArray(all) ? all : []));
     for (const parameter of changed) {
       if (!isMessage(parameter)) continue;
-      const row = this.#rows.get(`${String(event.node)}:${String(parameter.name)}`);
+      const row = rows.get(`${String(event.node)}:${String(parameter.name)}`);
       const value = row ? valueOf(row.setting, parameter.value ?? null) : null;
       if (row && value !== null) row.arrived(value);
     }
@@ -235,7 +239,7 @@ class ParametersView {
   /** Marks what is not as in the manifest; null if that is not known. */
   #mark(unsaved: Unsaved[] | null): void {
     const old = new Map((unsaved ?? []).map((one) => [`/${one.component}:${one.name}`, one.old]));
-    for (const [key, row] of this.#rows) row.mark(old.get(key), unsaved !== null);
+    for (const [key, row] of rows) row.mark(old.get(key), unsaved !== null);
     const count = unsaved?.length ?? 0;
     this.#save.disabled = count === 0;
     this.#save.replaceChildren(icon("check"), unsaved === null ? "Save" : count === 0 ? "Saved" : `Save ${count}`);
@@ -246,7 +250,7 @@ class ParametersView {
     setText(this.#says, "Comparing with the manifest\u2026");
     this.#says.dataset.kind = "none";
     try {
-      await Promise.all([...this.#rows.values()].map((row) => row.settled));
+      await Promise.all([...rows.values()].map((row) => row.settled));
       const { difference: diff, hash } = await this.#saving(true);
       if (!(await confirmed(this.element, { diff, findings: [], errors: 0, count: 0 }))) {
         setText(this.#says, "Not saved.");
@@ -281,9 +285,8 @@ class Row {
     this.setting = setting;
     this.value = this.#arrived = value;
     this.#control = controlOf(setting, value, (next) => {
-      if ("why" in next) return this.#say(next.why, "bad");
-      this.#say("", "");
-      if (next.value !== this.value) changed(this.#arrived, next.value);
+      this.#say("why" in next ? next.why : "", "bad");
+      if ("value" in next && next.value !== this.value) changed(this.#arrived, next.value);
       else this.#control.show(this.value);
     });
     disable(whyNot, ...this.#control.element.querySelectorAll<HTMLInputElement | HTMLSelectElement>("input, select"));

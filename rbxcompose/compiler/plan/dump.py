@@ -2,12 +2,13 @@
 
 The text is JSON. It names no types: they are those of the plan's fields and of the components' configurations, so
 that loading a file creates nothing but plans. Configurations are validated again, missions are read again from their
-located tree. Maps are sorted by key, so that equal plans give equal texts, unless their order must be kept.
+located tree. Maps keep their order, which components see: that of missions and places is the one in which they are
+listed.
 """
 
 import json
 import types
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache
@@ -130,23 +131,17 @@ VERSION = 1
 VERSION_KEY = "rbxcompose_plan"
 
 
-EntryOrder = Callable[[Iterable[tuple[str, Any]]], list[tuple[str, Any]]]  # sorts the entries of a map
-
-
 class PlanTextError(ValueError):
     """Raised when a text is not a plan that this installation can read."""
 
 
-def dump(plan: Plan, *, reveals_secrets: bool = False, keeps_order: bool = False) -> str:
-    """Return a plan as JSON; a secret is written as `***`, unless it is for the robot's own processes.
-
-    Components see the order of maps: that of analyzers is the order of the groups that they report.
-    """
+def dump(plan: Plan, *, reveals_secrets: bool = False) -> str:
+    """Return a plan as JSON; a secret is written as `***`, unless it is for the robot's own processes."""
 
     def secret(value: Secret) -> str:
         return value.reveal() if reveals_secrets else HIDDEN
 
-    data = {VERSION_KEY: VERSION, **_encode(plan, Plan, list if keeps_order else sorted)}
+    data = {VERSION_KEY: VERSION, **_encode(plan, Plan)}
     return json.dumps(data, ensure_ascii=False, indent=1, default=secret) + "\n"
 
 
@@ -175,7 +170,7 @@ def load(text: str) -> Plan:
 
 def dump_configs(configs: Mapping[str, tuple[str, Config]]) -> str:
     """Return configurations by component, each with its type, as JSON with their secrets."""
-    data = {name: (type_name, _encode(config, type(config), list)) for name, (type_name, config) in configs.items()}
+    data = {name: (type_name, _encode(config, type(config))) for name, (type_name, config) in configs.items()}
     return json.dumps(data, default=Secret.reveal)
 
 
@@ -189,7 +184,7 @@ def load_configs(text: str) -> dict[str, Config]:
     return {name: _model(data, cls.config_type()) for name, (cls, data) in types.items()}
 
 
-def _encode(value: Any, hint: Any, order: EntryOrder) -> Any:
+def _encode(value: Any, hint: Any) -> Any:
     """Return a value of a field's type as data for JSON."""
     hint = _plain_hint(hint)
     if hint in (Any, object):
@@ -204,15 +199,15 @@ def _encode(value: Any, hint: Any, order: EntryOrder) -> Any:
         case Enum():
             return value.name
         case Mapping():
-            return {str(key): _encode(each, _item(hint), order) for key, each in order(value.items())}
+            return {str(key): _encode(each, _item(hint)) for key, each in value.items()}
         case frozenset() | set():
-            return sorted(_encode(each, _item(hint), order) for each in value)
+            return sorted(_encode(each, _item(hint)) for each in value)
         case tuple() | list():
-            return [_encode(each, _item(hint, index), order) for index, each in enumerate(value)]
+            return [_encode(each, _item(hint, index)) for index, each in enumerate(value)]
         case _ if isinstance(value, Config) or is_dataclass(value):
             cls: Any = type(value)
             hints = _hints(cls)
-            return {key: _encode(getattr(value, name), hints[key], order) for key, name in _names(cls).items()}
+            return {key: _encode(getattr(value, name), hints[key]) for key, name in _names(cls).items()}
         case _:
             return to_jsonable_python(value)
 
@@ -221,7 +216,7 @@ def _encode_free(value: Any) -> Any:
     """Return a value of an expression as data: one that is no plain JSON value is a map with one key, its kind."""
     match value:
         case Place():
-            return {"place": _encode(value, Place, sorted)}
+            return {"place": _encode(value, Place)}
         case Mapping():
             return {"map": {str(key): _encode_free(each) for key, each in value.items()}}
         case list():

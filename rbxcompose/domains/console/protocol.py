@@ -39,7 +39,7 @@ MOST_ACTIONS = 20  # that a client serves; each is eight ends on the bus
 MOST_FRAMES = 1000  # statuses and answers that wait for a client, which is then given up
 LONGEST_QUEUE = 1000  # messages of a topic that wait for a client
 DEPTH = 10  # messages of a topic that wait for a client that wants no queue, but reads slowly
-STOP: Mapping[str, str] = {"type": "robot.StopRobot"}
+STOP: Mapping[str, str] = {"type": "robot.StopRobot", "by": "the console"}
 RELEASE: Mapping[str, str] = {"type": "robot.ReleaseRobot"}
 LONGEST_NAME = 64  # characters of the name of who drives
 ROUNDING = 1e-9  # of a period
@@ -758,7 +758,8 @@ class Bridge:
         is_known = target.name in client.advertised
         do()
         is_new = not is_known and target.name in client.advertised
-        if least > Role.VIEW and (target.op != "publish" or is_new or target.old is not None):
+        is_quiet = target.op == "call_service" and target.name in _OWN and target.name != _DRIVES  # noted when done
+        if least > Role.VIEW and not is_quiet and (target.op != "publish" or is_new or target.old is not None):
             text = f"{target.op} {target.name}"
             if client.noted != text:
                 client.noted = text
@@ -1258,7 +1259,10 @@ class Bridge:
         seen = given.get("hash", "")
         if not isinstance(seen, str) or not _HASH.fullmatch(seen):
             raise WrongMessageError("'hash' is what a dry run told")
-        self._requests.append(SaveSettings(number, tuple(names), given.get("dry_run") is True, seen))
+        is_trial = given.get("dry_run") is True
+        if not is_trial:
+            self._note_when_done(client, number, f"saves {', '.join(names) or 'all changed parameters'}")
+        self._requests.append(SaveSettings(number, tuple(names), is_trial, seen))
 
     def _edit_service(self, client: _Client, given: Mapping[str, Any], number: int, name: str) -> None:
         """Pass on what the editor is asked about a mission, or about the robot."""

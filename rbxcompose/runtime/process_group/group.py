@@ -252,7 +252,7 @@ class Taping:
         from rbxcompose.runtime.recording.files import Recorder  # imports MCAP, which only a recorded run needs
 
         self._recorder = Recorder(self._path, self._real.now())
-        self._recorder.attach(PLAN, dump(plan, keeps_order=True).encode())
+        self._recorder.attach(PLAN, dump(plan).encode())
 
     def _declare(self, topic: RecordedTopic) -> None:
         self._do(lambda recorder: recorder.declare(topic))

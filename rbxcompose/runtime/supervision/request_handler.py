@@ -98,8 +98,8 @@ class RequestHandler:
                 return self._supervisor.state()
             case DescribeRobot():
                 return tuple(map(described, self._supervisor.conductor.plan.instances))
-            case StopRobot():
-                return self._stop()
+            case StopRobot(by):
+                return self._stop(plain(by))
             case ReleaseRobot():
                 return self._release()
             case NoteInLog(text):
@@ -113,9 +113,9 @@ class RequestHandler:
         if self._supervisor.conductor.is_going_down:
             raise Refused("the robot is going down")
 
-    def _stop(self) -> str:
+    def _stop(self, by: str) -> str:
         self._log("stop: all motion is held until 'release'")
-        self._supervisor.conductor.stop("the command 'stop'")
+        self._supervisor.conductor.stop(by)
         return "stopped; 'release' allows motion again"
 
     def _release(self) -> str:

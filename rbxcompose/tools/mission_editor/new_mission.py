@@ -9,11 +9,12 @@ from pathlib import Path, PurePosixPath
 from rbxcompose.base.files import read_regular, replace_file
 from rbxcompose.base.findings import Severity
 from rbxcompose.base.requests import Refused
-from rbxcompose.commands.new_files import AnswerError, read_name, write_new
+from rbxcompose.commands.new_files import write_new
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.tree import FILE_BYTES, MappingNode, at
 from rbxcompose.tools.mission_editor.yaml_places import placed
+from rbxcompose.tools.robot_editor.subjects import valid_name
 from rbxcompose.tools.scaffold import MissionAnswers, with_entry
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -85,10 +86,7 @@ def make_mission(
     """
     if not file.is_relative_to(project):
         raise Refused("the robot belongs to the library: make one of your own with 'rbxcompose new robot NAME'")
-    try:
-        read_name(name, "the mission", robot.manifest.missions)
-    except AnswerError as error:
-        raise Refused(error.finding.message) from error
+    valid_name(name, "a mission", robot.manifest.missions)
     answers = MissionAnswers(name, PurePosixPath(file.relative_to(project)))
     try:
         before = read_regular(file, FILE_BYTES)

@@ -357,7 +357,8 @@ class LiveRobot:
         made = self._compiled({})
         if made.plan is None or made.robot is None:
             found = [one for one in made.report if one.severity is Severity.ERROR]
-            raise Refused(f"its files have {len(found)} errors, the first: {found[0].message}")
+            errors = "1 error" if len(found) == 1 else f"{len(found)} errors, the first"
+            raise Refused(f"its files have {errors}: {found[0].message}")
         return Proposal.of(made.plan, made.robot, self._layers)
 
 

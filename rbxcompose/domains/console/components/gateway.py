@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from rbxcompose.base.clock import SteppedClock
 from rbxcompose.base.config import AngularSpeed, Config, Speed
+from rbxcompose.base.findings import Severity
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Refused
 from rbxcompose.bus.actions import ActionServer, ServedGoal
@@ -406,6 +407,12 @@ def _places(addresses: Iterable[str]) -> Iterator[str]:
     """Yield the hosts with ports of pages; one without a host is on this machine, by each of its names."""
     for address in addresses:
         yield from (f"{name}{address}" for name in LOCAL_NAMES) if address.startswith(":") else (address,)
+
+
+def words_of(failure: Mapping[str, Any]) -> str:
+    """Return what a command says is wrong in JSON, with the help of what it has found first."""
+    helps = (found["help"] for found in failure["findings"] if found["severity"] == Severity.ERROR)
+    return ": ".join(filter(None, (failure["error"], next(helps, ""))))
 
 
 def _address(request: HTTPConnection) -> str:
@@ -1123,8 +1130,8 @@ class GatewaySession:
             run = partial(subprocess.run, command, capture_output=True, text=True, timeout=_SAVING, check=False)
             try:
                 done = await asyncio.to_thread(run)
-                answer = json.loads(done.stdout) if done.returncode == 0 else None
-                return answer, "" if answer is not None else done.stderr.strip() or done.stdout.strip()
+                answer = json.loads(done.stdout)
+                return (answer, "") if done.returncode == 0 else (None, words_of(answer))
             except (subprocess.TimeoutExpired, ValueError) as error:
                 return None, f"it was not saved: {type(error).__name__}"
 
