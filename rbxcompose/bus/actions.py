@@ -379,7 +379,7 @@ class SentGoal(Generic[R]):
             self._client.ask_to_cancel(self.id)  # the answer may only be late, and the goal accepted
             self._end(Ended(Outcome.LOST, message=reply.error))
         elif not reply.response.accepted:
-            self._end(Ended(Outcome.REJECTED, message="the server refused it"))
+            self._end(Ended(Outcome.REJECTED, message="the server refused it; its log has the reason"))
         else:
             self._is_accepted = True
             self._client.ask_for_result(self)

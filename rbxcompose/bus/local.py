@@ -264,6 +264,7 @@ class Participant:
         self._token = NodeToken(process.domain, process.transport.session, next(process.ids), owner, process.namespace)
         self._declared: list[Closable] = [process.transport.announce(self._token.key)]
         self._closed_doors: list[Callable[[], None]] = []  # the callbacks that open them
+        self._is_open = False
 
     def endpoint(self, kind: EntityKind, name: str, interface: type[Interface], qos: RosQos) -> Endpoint:
         """Return the identity of a new end of this node."""
@@ -296,11 +297,14 @@ class Participant:
         end.close()
 
     def when_open(self, callback: Callable[[], None]) -> None:
-        """Let `open` call `callback`."""
+        """Call `callback` at `open`; now if the node is open."""
         self._closed_doors.append(callback)
+        if self._is_open:
+            self.open()
 
     def open(self) -> None:
-        """Admit the requests that have waited, and new ones."""
+        """Admit what has waited, and all that comes."""
+        self._is_open = True
         while self._closed_doors:
             self._closed_doors.pop(0)()
 

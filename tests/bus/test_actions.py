@@ -73,7 +73,7 @@ def test_a_refused_goal_never_starts_and_the_reason_is_logged(alone: Alone, ends
     alone.bus.action_client("mission", "go_to", NavigateToPose)(TO_DOCK, ends.append)
     alone.settle()
     assert server.current is None
-    assert ends == [Ended(Outcome.REJECTED, message="the server refused it")]
+    assert ends == [Ended(Outcome.REJECTED, message="the server refused it; its log has the reason")]
     assert alone.log == [("base", "go_to: a goal was refused: not at the dock")]
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from rbxcompose.base.levels import Level
 from rbxcompose.msgs.rbxcompose_msgs import LocateArm, MoveArm
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing import Bench
@@ -72,3 +73,14 @@ def test_what_cannot_be_told_remembered_or_returned_to_is_refused_with_the_reaso
     assert located(bench, remember="7").success
     arm.measured.pop("right_arm_elbow_flex_joint")
     assert arm.on_locate(LocateArm.Request()).message == "nothing has reported where 'right_arm_elbow_flex_joint' is"
+
+
+def test_an_arm_that_knows_no_scene_says_so_in_diagnostics_until_one_has_come(bench: Bench) -> None:
+    told = bench.statuses("right_arm: scene")
+    bench.advance(1.0)
+    assert told[-1].level == Level.OK
+    (arm,) = (one for one in bench.plan.instances if one.type == "arm")
+    alone = Bench(arm)
+    told = alone.statuses("right_arm: scene")
+    alone.advance(1.0)
+    assert (told[-1].level, told[-1].message) == (Level.WARN, "nothing is planned: no planning scene has been received")

@@ -206,6 +206,7 @@ SCAN = LaserScan(Header(frame_id="base_link"), 0.0, 0.0, 0.1, 0.0, 0.1, 0.1, 9.0
 )
 def test_a_robot_whose_laser_tells_nothing_does_not_drive_blindly(tmp_path: Path, scan: LaserScan, said: str) -> None:
     room = Room(tmp_path, SCANNED)
+    start = room.base.core.pose
     room.bench.bus.action_client("me", "/go_to", NavigateToPose)(
         NavigateToPose.Goal(pose=PoseStamped(Header(frame_id="map"), Pose(Point(2.0, 0.3)))), room.ends.append
     )
@@ -218,9 +219,33 @@ def test_a_robot_whose_laser_tells_nothing_does_not_drive_blindly(tmp_path: Path
     if said:
         assert "the laser on 'scan' is of no use" in room.reason()
         assert said in room.reason()
-        assert math.hypot(room.base.core.pose.x + 2.0, room.base.core.pose.y) < 0.4
+        assert room.base.core.pose == start
     else:
         assert room.ends[0].outcome is Outcome.SUCCEEDED
+
+
+def test_a_manoeuvre_waits_for_the_first_scan_and_without_any_fails_at_once_where_the_robot_stands(
+    tmp_path: Path,
+) -> None:
+    room = Room(tmp_path, SCANNED)
+
+    def back_up() -> None:
+        room.ends.clear()
+        room.bench.bus.action_client("me", "/back_up", BackUp)(BackUp.Goal(distance=0.2), room.ends.append)
+        room.bench.advance(0.2)
+
+    back_up()
+    assert not room.ends
+    room.bench.advance(1.0)
+    for _ in range(2):
+        assert room.ends[0].outcome is Outcome.ABORTED
+        back_up()
+    assert room.bench.texts()[-1].endswith("the laser on 'scan' is silent")
+    assert room.base.core.distance == 0.0
+    room.bench.publish("/scan", SCAN)
+    back_up()
+    room.bench.advance(0.5)
+    assert room.base.core.distance > 0.0
 
 
 def test_a_scan_that_comes_before_the_transform_of_its_time_is_taken_with_it(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.runtime.channel import Failed
 from rbxcompose.sdk import Component, Config, In, Out, Refused, component
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
 
@@ -46,6 +47,7 @@ class Toy(Component[ToyConfig]):
     rate = 10.0
     count = Out(Float32, "count")
     add = In(Float32, "add")
+    offset = In(Float32, "offset", qos="latched")
 
     def configure(self) -> None:
         self.steps = 0
@@ -71,6 +73,9 @@ class Toy(Component[ToyConfig]):
 
     def on_add(self, message: Float32) -> None:
         self.break_in("on_add")
+        self.steps += int(message.data)
+
+    def on_offset(self, message: Float32) -> None:
         self.steps += int(message.data)
 
     @answers(ToyLevel)
@@ -201,6 +206,17 @@ def test_a_component_that_raises_on_the_way_down_does_not_keep_the_others() -> N
     assert {state for state, _ in robot.host.states().values()} == {"unconfigured"}
 
 
+def test_a_latched_message_that_comes_before_a_component_is_active_is_handled_then() -> None:
+    robot = bench("")
+    robot.publish("offset", Float32(data=100.0), Qos.LATCHED)
+    robot.host.prepare([instance("late", "toy_for_host")])
+    robot.advance(0.0)
+    assert robot.component("late").steps == 0  # type: ignore[attr-defined]
+    robot.host.activate(["late"])
+    robot.advance(0.0)
+    assert robot.component("late").steps == 100  # type: ignore[attr-defined]
+
+
 def test_a_request_that_a_component_does_not_take_is_refused() -> None:
     robot = bench("")
     pause = PauseMission()
@@ -223,5 +239,5 @@ def test_nothing_of_a_component_is_left_on_the_bus_after_shutdown() -> None:
     robot = bench("")
     ends = len(robot.bus)
     robot.host.shutdown()
-    of_each = 2 + 6  # its ports, and the services of its parameters
+    of_each = 3 + 6  # its ports, and the services of its parameters
     assert len(robot.bus) == ends - 2 * of_each

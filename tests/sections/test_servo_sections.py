@@ -60,6 +60,8 @@ WRONG = {
     "an unknown model": SERVOS.replace("AX-12", "AX-21"),
     "one id twice": SERVOS.replace("id: 2", "id: 1"),
     "a range the wrong way round": SERVOS.replace("[-50 deg, 30 deg]", "[30 deg, -50 deg]"),
+    "a range of no length": SERVOS.replace("[-50 deg, 30 deg]", "[0 deg, 0 deg]"),
+    "a range that only touches the body's": SERVOS.replace("[-50 deg, 30 deg]", "[1 rad, 120 deg]"),
     "a range outside of the body's": SERVOS.replace("[-50 deg, 30 deg]", "[90 deg, 120 deg]"),
     "a speed of nothing": SERVOS.replace("velocity: 60 deg/s", "velocity: 0 deg/s"),
     "an acceleration below 0": SERVOS.replace("velocity: 60 deg/s", "acceleration: -60 deg/s^2"),

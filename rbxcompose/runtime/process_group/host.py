@@ -854,7 +854,8 @@ def subscribe(hosted: Hosted, component: Component[Any], topic: str, port: ports
         _on_message(hosted, component, port.name, port),
         max_rate=port.max_rate,
         limits=port.limits,
-        waits=isinstance(port, ServesTopic),  # like goals: a sender that waits for a listener relies on it
+        # Like goals: a sender that waits for a listener relies on it, and a latched message does not come again.
+        waits=isinstance(port, ServesTopic) or port.qos is Qos.LATCHED,
         is_light=hosted.worker is None,
         may_be_silent=port.may_be_silent,
     )

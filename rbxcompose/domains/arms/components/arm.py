@@ -146,6 +146,7 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
             words = pairs_shown(self.works.always, len(self.works.always))
             self.info(f"links that always collide are not watched: {words}")
         self.problem = "no planning scene has been received"  # with the scene, or nothing
+        self.add_diagnostic("scene", self.scene_status)
         self.way: tuple[Vector3, ...] = ()  # of the tip, as last planned [m]
         self.measured: dict[str, tuple[float, float]] = {}  # position and velocity of all joints of the body
         self.picked = {}
@@ -199,6 +200,12 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
         if self.task is not None:
             self.task.look_again()
         self.wake()
+
+    def scene_status(self, now: float) -> sdk.TaskStatus:
+        """Return whether it can plan in the scene."""
+        if problem := self.problem:
+            return sdk.TaskStatus(sdk.Level.WARN, f"nothing is planned: {problem}")
+        return sdk.TaskStatus(sdk.Level.OK, "the scene is known")
 
     def received(self, port: str, message: TwistStamped | PoseStamped) -> None:
         """Lead the tip as somebody commands it now."""

@@ -194,6 +194,7 @@ class Navigator(BaseDriver[NavigatorConfig]):
         self.scan = NewestMessage[LaserScan](self.config.scan_frame, wrong)
         self.unusable = ""  # why the newest scan cannot be used
         self.began = self.seen = self.looked = self.waits = self.shown = self.turned = -math.inf  # [s]
+        self.started = -math.inf  # when the whole robot was active [s]
         self.recoveries = self.attempts = 0  # for this goal, and since it got on last
         self.recovery: sdk.SentGoal | None = None  # that runs
         self.manoeuvre: Manoeuvre | None = None
@@ -205,6 +206,10 @@ class Navigator(BaseDriver[NavigatorConfig]):
         if self.config.zones:
             zones = [CostZone(*zone) for zone in self.config.zones]
             self.bound["zones"](zone_markers(zones, Header(stamp=to_time(self.stamp), frame_id=MAP_FRAME)))
+
+    def start(self) -> None:
+        """Let the first scan take a moment."""
+        self.started = self.now
 
     def reconfigure(self, old: NavigatorConfig) -> None:
         """Drive on with the new settings; another radius does not fit to corners, and recoveries are missions."""
@@ -352,9 +357,8 @@ class Navigator(BaseDriver[NavigatorConfig]):
         return "there is no map" if self.costs is None else self.silence()
 
     def silence(self) -> str:
-        """Return which laser is silent or of no use, also since a goal or manoeuvre has begun; nothing if none is."""
-        is_silent = self.now - max(self.seen, self.began - self.config.silence / 2) > self.config.silence
-        if not (self.config.scan and is_silent):
+        """Return which laser is silent or of no use, also if it has never told anything; nothing if none is."""
+        if not self.config.scan or self.now - self.seen <= self.config.silence:
             return ""
         laser = f"the laser on '{self.config.scan}'"
         return f"{laser} is of no use: {self.unusable}" if self.unusable else f"{laser} is silent"
@@ -446,8 +450,6 @@ class Navigator(BaseDriver[NavigatorConfig]):
             wanted = None
         if wanted is not self.manoeuvred:
             self.manoeuvred, self.turned = wanted, self.now
-            if goal is None:
-                self.began = self.now
             if wanted is None:
                 self.rest()
             else:
@@ -459,8 +461,10 @@ class Navigator(BaseDriver[NavigatorConfig]):
         if wanted.cancel_requested:
             self.rest()
             wanted.canceled()
-        elif (pose := self.pose.now()) is None or self.silence():
-            why = self.silence() or f"it is not known where the robot is in '{MAP_FRAME}'"
+        elif (why := self.silence()) and self.now - self.started <= self.config.silence:
+            self.rest()  # the first scan may be on its way
+        elif (pose := self.pose.now()) is None or why:
+            why = why or f"it is not known where the robot is in '{MAP_FRAME}'"
             self.end_manoeuvre(wanted, why, Spin.Result.TF_ERROR)
         elif 0 < (allowed := seconds_of(wanted.request)) < self.now - self.turned:
             self.end_manoeuvre(wanted, f"it took longer than the allowed {allowed:g} s", Spin.Result.TIMEOUT)

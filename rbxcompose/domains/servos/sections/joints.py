@@ -238,7 +238,9 @@ def _no_motion(model: JointModel, joint: BodyJoint | None) -> Iterator[tuple[str
     if least.value > greatest.value:
         words = f"has its limits the wrong way round: {_shown(least)}, {_shown(greatest)}"
         yield "position", words, f"write '[{_shown(greatest)}, {_shown(least)}]'"
-    elif greatest.value < outer.least or least.value > outer.greatest:
+    elif least.value == greatest.value:
+        yield "position", f"may only be at {_shown(least)}", "give it a range that has a length"
+    elif greatest.value <= outer.least or least.value >= outer.greatest:
         dimension = least.dimension
         bounds = " to ".join(units.format_quantity(bound, dimension) for bound in (outer.least, outer.greatest))
         words = f"may go from {_shown(least)} to {_shown(greatest)}, but in the body from {bounds}"
