@@ -169,6 +169,7 @@ class Gateway(Component[GatewayConfig]):
 
     made_by = "The section `console` runs it."
     process = "gateway"
+    rate = 10.0
 
     @classmethod
     def capabilities(cls, config: GatewayConfig) -> tuple[Capability, ...]:
@@ -211,13 +212,16 @@ class Gateway(Component[GatewayConfig]):
             self.server.close()
             self.server = None
 
+    def step(self, dt: float) -> None:
+        """Write what visitors did into the log, soon, so that it stands near its effects."""
+        while self.server is not None and not self.server.said.empty():
+            self.warn(self.server.said.get())
+        while self.server is not None and not self.server.done.empty():
+            self.info(self.server.done.get())
+
     def _report(self, now: float) -> TaskStatus:
         if self.server is None:
             return TaskStatus(Level.OK, "serves nobody on a stepped clock")
-        while not self.server.said.empty():
-            self.warn(self.server.said.get())
-        while not self.server.done.empty():
-            self.info(self.server.done.get())
         if self.server.status[0] is Level.OK and (trouble := self.server.trouble):
             return TaskStatus(Level.WARN, trouble)
         return TaskStatus(*self.server.status)
