@@ -1,8 +1,9 @@
 """Types of fields that several sections have."""
 
+import math
 from typing import Annotated
 
-from pydantic import StringConstraints
+from pydantic import AfterValidator, StringConstraints, ValidationInfo
 
 from rbxcompose.base.config import COMPONENT, FILE, LINK, PORT, TOPIC, Angle, Config, Length, Name, Refers
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
@@ -15,6 +16,16 @@ FieldPath = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][
 PortName = Annotated[DottedName, Refers(PORT, is_reported=True)]
 ComponentName = Annotated[Name, Refers(COMPONENT, is_reported=True)]
 FileName = Annotated[str, Refers(FILE, is_reported=True)]
+
+
+def _beyond_nearest(farthest: float, info: ValidationInfo) -> float:
+    if farthest <= info.data.get("nearest", -math.inf):
+        raise ValueError("'farthest' must be more than 'nearest', or nothing is seen")
+    return farthest
+
+
+Farthest = Annotated[Length, AfterValidator(_beyond_nearest)]
+"""How far a sensor sees; its configuration has `nearest` before it. With a default, it needs `validate_default`."""
 
 
 class FramePose(Config):

@@ -53,8 +53,11 @@ def _project_around(folder: Path) -> Path:
     return next(above, folder)
 
 
-def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
-    """Return the file that a manifest names, or the finding that says why it must not or cannot be used."""
+def resolve(written: str, writer: Path, span: Span, *, may_be_robot: bool = False) -> Path | Finding:
+    """Return the file that a manifest names, or the finding that says why it must not or cannot be used.
+
+    With `may_be_robot`, a folder with a robot names that one.
+    """
     path = _absolute(written, _real(writer).parent)
     is_inside = path and any(path.is_relative_to(root) for root in (project_of(writer), library_root()))
     if path is not None and not is_inside and _is_named_inside(written, writer):
@@ -68,9 +71,11 @@ def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
         return OUTSIDE.at(span, message, help=f"the project is {where}: move the file there, or use what 'rbx:' has")
     if not is_there(path):
         return _missing(written, path, span, writer)
-    folder = str(_real(writer).parent)
-    is_folder = path.name == ROBOT_FILE and os.path.isdir(os.path.join(folder, written))
-    need(folder, os.path.join(written, ROBOT_FILE) if is_folder else written)
+    home = _real(writer).parent
+    named = library_root() / written.removeprefix(PREFIX) if written.startswith(PREFIX) else home / written
+    if (is_folder := named.is_dir()) and not may_be_robot:
+        return _no_robot(written, path.parent, span, writer)
+    need(str(home), os.path.join(written, ROBOT_FILE) if is_folder else written)
     return path
 
 
@@ -163,11 +168,12 @@ def _missing(written: str, path: Path, span: Span | None, writer: Path | None = 
 
 
 def _no_robot(written: str, folder: Path, span: Span | None, writer: Path | None) -> Finding:
-    """Return the finding for a folder that was named like a robot, and is none."""
+    """Return the finding for a folder that was named like a robot, and is none, or where a file is meant."""
     where = "this folder" if folder == Path.cwd() and writer is None else f"the folder '{plain(written)}'"
     names = sorted(_names_in(folder) or ())
     if writer is not None:
-        files = [f"'{plain(written.rstrip('/'))}/{plain(name)}'" for name in names if name.endswith(_ENDINGS)]
+        names = [name for name in names if name.endswith(_ENDINGS) and name != ROBOT_FILE]
+        files = [f"'{plain(written.rstrip('/'))}/{plain(name)}'" for name in names]
         help_text = f"name a file in it: {', '.join(files[:_MOST_NAMESAKES])}" if files else "name a file"
         return UNREADABLE.at(span, f"{where} is no file", help=help_text)
     robots = _robots_in(folder) or [f"{_ROBOTS}/{robot}" for robot in _robots_in(folder / _ROBOTS)]

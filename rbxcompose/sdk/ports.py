@@ -181,10 +181,12 @@ class In(Port[Latest[M]]):
         max_rate: float | None = None,
         limits: MessageLimits | None = None,
         may_be_silent: bool = False,
+        remedy: str = "",
     ) -> None:
         """Take `is_open` for an input that may also be fed from outside the robot.
 
-        `may_be_silent` is for one whose publishers speak only now and then: nobody misses them.
+        `may_be_silent` is for one whose publishers speak only now and then: nobody misses them. The `remedy` tells
+        people what to do without a publisher, if no other topic of the same type can stand in.
 
         At most `max_rate` messages per second are taken from each publisher of another process [Hz]; commands are
         always limited. Their messages beyond the `limits` are refused before they are decoded; by default, these are
@@ -193,7 +195,7 @@ class In(Port[Latest[M]]):
         super().__init__(topic)
         self.interface, self.qos, self.unit, self.is_open, self.max_rate = message, Qos(qos), unit, is_open, max_rate
         self.limits = limits or limits_of(self.qos)
-        self.may_be_silent = may_be_silent
+        self.may_be_silent, self.remedy = may_be_silent, remedy
 
 
 class ServesTopic(In[M]):

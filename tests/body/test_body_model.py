@@ -141,6 +141,16 @@ MISTAKES = {
         "RBX2003",
         "above its upper",
     ),
+    "a negative speed": (
+        TWO + JOINT.replace("fixed", "continuous") + '<limit effort="1" velocity="-3"/></joint>',
+        "RBX2003",
+        "velocity limit of joint 'neck'",
+    ),
+    "a negative effort": (
+        TWO + JOINT.replace("fixed", "continuous") + '<limit effort="-1" velocity="3"/></joint>',
+        "RBX2003",
+        "effort limit of joint 'neck'",
+    ),
     "no name": ("<link/>", "RBX2003", "needs the attribute 'name'"),
     "no child": (TWO + '<joint name="neck" type="fixed"><parent link="a"/></joint>', "RBX2003", "needs '<child>'"),
     "a shape of no size": (

@@ -54,7 +54,10 @@ def test_a_file_outside_any_project_sees_its_own_folder_only(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     (tmp_path / "m.obj").write_text(TETRAHEDRON)
-    assert "RBX2012" in told(capsys, "show", urdf(tmp_path / "a/r.urdf", "../m.obj"), code=1)
+    for mesh in ("../m.obj", f"file://{tmp_path}/m.obj"):
+        assert f"the mesh '{mesh}' is outside the project" in told(
+            capsys, "show", urdf(tmp_path / "a/r.urdf", mesh), code=1
+        )
     outside = f'<robot xmlns:xacro="http://x"><xacro:include filename="{tmp_path}/s.xacro"/></robot>'
     (tmp_path / "s.xacro").write_text('<robot><link name="stolen"/></robot>')
     (tmp_path / "a/r.xacro").write_text(outside)

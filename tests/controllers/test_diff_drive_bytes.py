@@ -33,6 +33,7 @@ class Site:
 
     stamp = 0
     refusal = ""
+    start = Pose2()
 
     def __init__(self, joints: Any) -> None:
         self.joints, self.told = joints, list[str]()

@@ -8,6 +8,7 @@ import pytest
 
 from rbxcompose.base.findings import Span
 from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.domains.worlds.sensors import TRUTH_REMEDY
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.sdk.component import MissionOver
 from rbxcompose.testing import Bench
@@ -102,6 +103,18 @@ def test_a_base_that_nobody_commands_is_told(tmp_path: Path) -> None:
     text = alone.replace("    max_speed: 0.2 m/s\n", "    max_speed: 0.2 m/s\n    commands: wheels_vel\n")
     [finding] = check(tmp_path, text).compilation.report
     assert (finding.code, line(text, finding.span)) == ("RBX3010", "    commands: wheels_vel")
+
+
+SEEING = "components:\n  laser: {type: laser_sim, frame: base_footprint}\n"
+HOUSE = "world: rbx:worlds/house.yaml\n"
+
+
+@for_all("world, remedies", [("", [TRUTH_REMEDY]), (HOUSE, [TRUTH_REMEDY]), (HOUSE + "simulator: physics\n", [])])
+def test_a_sensor_of_the_world_on_a_base_of_servos_needs_physics(
+    world: str, remedies: list[str], tmp_path: Path
+) -> None:
+    found = check(tmp_path, NO_MISSION + world + SEEING).compilation.report
+    assert [each.help for each in found if each.code == "RBX3010"] == remedies
 
 
 def test_an_alternative_to_a_base_is_fine(tmp_path: Path) -> None:

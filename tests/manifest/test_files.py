@@ -41,8 +41,11 @@ def test_a_path_is_relative_to_the_file_that_writes_it(project: Path) -> None:
     assert resolved("../../missions/patrol.yaml", project) == project / "missions/patrol.yaml"
 
 
-def test_a_folder_means_its_robot(project: Path) -> None:
-    assert resolved("../one", project) == project / "robots/one/robot.yaml"
+def test_a_folder_means_its_robot_where_one_may_be_meant(project: Path) -> None:
+    robot = project / "robots/one/robot.yaml"
+    for folder in ("../one", "."):
+        assert resolve(folder, robot, HERE, may_be_robot=True) == robot
+        assert refused(folder, project).message == f"the folder '{folder}' is no file"
 
 
 def test_the_library_is_named_rbx() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.sensor_msgs import JointState
@@ -100,17 +101,23 @@ def test_only_physics_has_ports_between_servos_and_the_engine(tmp_path: Path) ->
     assert ports["ideal"] <= ports["physics"]
 
 
-def test_servos_that_turn_wheels_drive_the_base(repository: Path) -> None:
-    sets = ("world=rbx:worlds/blank.yaml", "simulator=physics", "start=")
-    plan = compiled(str(repository / "robots/rover"), sets=sets, environment={}).plan
-    assert plan is not None
-    bench = Bench(plan=plan)
+@pytest.mark.parametrize("simulator", ["physics", "ideal"])
+def test_servos_that_turn_wheels_drive_the_base_from_where_its_world_puts_it(repository: Path, simulator: str) -> None:
+    sets = ("world=rbx:worlds/house.yaml", f"simulator={simulator}", "start=")
+    compilation = compiled(str(repository / "robots/rover"), sets=sets, environment={})
+    assert not list(compilation.report)
+    assert compilation.plan is not None
+    bench = Bench(plan=compilation.plan)
     told, truth = bench.collect("/odom", Odometry), bench.collect("/ground_truth", Odometry)
     for _ in range(20):
         bench.publish("/cmd_vel", Twist(linear=Vector3(x=0.2)), Qos.COMMAND)
         bench.advance(0.1)
-    assert truth[-1].pose.pose.position.x == pytest.approx(0.35, abs=0.05)
-    assert told[-1].pose.pose.position.x == pytest.approx(truth[-1].pose.pose.position.x, abs=0.02)
+    pose = pose_in(told[-1].pose.pose)
+    assert (pose.x, pose.y, pose.heading) == pytest.approx((1.0, 0.7 + 0.35, math.pi / 2), abs=0.05)
+    if truth:
+        true = pose_in(truth[-1].pose.pose)
+        assert (pose.x, pose.y) == pytest.approx((true.x, true.y), abs=0.02)
+    assert bool(truth) == (simulator == "physics")
 
 
 @pytest.mark.parametrize("robot", rare("pi_robot", "porter"))

@@ -535,6 +535,7 @@ def test_a_spawn_without_ground_concerns_only_robots_that_start_there(tmp_path: 
         (ROBOT.replace("world: ../../room.yaml\n", ""), WORLD, "navigation needs a map"),
         (ROBOT.replace("../../room.yaml", "{file: ../../room.yaml, spawn: wset}"), WORLD, "did you mean 'west'?"),
         (ROBOT, WORLD.replace("-2 m", "-2.8 m"), "the robot starts 0.07 m deep in a wall of 'room'"),
+        (ROBOT, WORLD.replace("-2 m", "50 m"), "the robot starts outside of the map of 'room': at (50 m, 0 m)"),
         (ROBOT, WORLD + "objects: {chair: {shape: person, at: {x: -1.9 m}}}\n", "deep in 'chair'"),
         (ROBOT + "  costs: {zones: {stairs: {keep_out: [[0 m, 0 m], [1 m, 0 m]]}}}\n", WORLD, "three corners"),
     ],

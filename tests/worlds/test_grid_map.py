@@ -50,6 +50,8 @@ def test_points_and_cells_are_the_same_places(grid: GridMap, places: list[tuple[
     columns = np.arange(grid.cells.shape[1])
     middles = grid.to_points(np.stack((columns + 0.5, np.full(columns.shape, 0.5)), -1))
     assert grid.occupied_at(middles).tolist() == (grid.cells[0] == 100).tolist()
+    assert grid.contains(middles).all()
+    assert not grid.contains(grid.to_points(np.stack((columns + 0.5, np.full(columns.shape, -0.5)), -1))).any()
 
 
 def test_nothing_is_occupied_beside_a_map_or_nowhere() -> None:

@@ -139,6 +139,14 @@ def test_a_lens_that_cannot_be_is_refused() -> None:
             instance("camera", "camera_sim", {"pinhole": pinhole})
 
 
+@pytest.mark.parametrize("sensor", ["laser_sim", "camera_sim", "lidar"])
+def test_a_sensor_that_sees_nothing_is_refused_also_with_what_it_has_by_default(sensor: str) -> None:
+    given = {"port": "/dev/ttyUSB0"} if sensor == "lidar" else {}
+    for ranges in ({"nearest": "9 m", "farthest": "8 m"}, {"nearest": "20 m"}, {"farthest": "1 cm"}):
+        with pytest.raises(ValueError, match="'farthest' must be more than 'nearest'"):
+            instance("eye", sensor, {**given, **ranges})
+
+
 class Seeing:
     """A camera on a base that stands before a box, and far from a tower."""
 

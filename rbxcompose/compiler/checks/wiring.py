@@ -69,12 +69,14 @@ def _is_command(end: PortEnd) -> bool:
 
 def _finding(robot: Robot, component: RobotComponent, ends: list[PortEnd]) -> Finding:
     names = " and ".join(f"'{end.topic}'" for end in ends)
+    remedy = next(filter(None, (getattr(end.port, "remedy", "") for end in ends)), "")
     near = [(end, other) for end in ends for other in robot.ends if _fits(end, other)]
+    near = [(end, other) for end, other in near if not remedy or end.port.topic == other.port.topic]
     topics = [text for end in ends for text in (end.topic, end.topic.strip("/"), end.topic.rpartition("/")[-1])]
     return needed_port.at(
         robot.value_span_of(component.name, *topics) or robot.end_span(ends[0]),
         f"'{component.name}' needs {names}, which nothing in the robot provides",
-        help=_connected(robot, near) or f"add the component that provides it{_such_as(ends)}",
+        help=_connected(robot, near) or remedy or f"add the component that provides it{_such_as(ends)}",
         related=[Related(robot.end_span(other), f"'{other.topic}' is of this type") for _, other in near],
         about=(component.name, *(end.topic for end in ends)),
     )

@@ -12,7 +12,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Related, Span, kind, once
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.printable import plain
-from rbxcompose.domains.body.files import PACKAGE, BodyFile, ReadFile, mesh_mistakes, read_files
+from rbxcompose.domains.body.files import PACKAGE, BodyFile, MeshFault, ReadFile, mesh_mistakes, read_files
 from rbxcompose.domains.body.lint import lint, orientations
 from rbxcompose.domains.body.model import Body, BodyJoint, BodyLink
 from rbxcompose.domains.body.urdf import read_body
@@ -263,11 +263,9 @@ def _described(
     """Return what `describe` does, of the files of its parts as they were read."""
     notes = [note for one in files for note in one.notes]
     meshes = [part.file.meshes(one.root) for part, one in zip(parts, files, strict=True)]
-    respelt = {
-        k: v for part, one in zip(parts, files, strict=True) for k, v in part.file.respelt_meshes(one.root).items()
-    }
+    faults = {k: v for part, one in zip(parts, files, strict=True) for k, v in part.file.mesh_faults(one.root).items()}
     if len(parts) == 1 and not parts[0].name:
-        return _checked(files[0].root, files[0].text, (meshes[0], respelt), notes, covers_visuals=covers_visuals)
+        return _checked(files[0].root, files[0].text, (meshes[0], faults), notes, covers_visuals=covers_visuals)
     pieces: list[Piece] = []
     there: dict[str, Path] = {}
     for part, file, found in zip(parts, files, meshes, strict=True):
@@ -277,22 +275,22 @@ def _described(
     joined = assembled(name, pieces)
     if isinstance(joined, list):
         return None, [*notes, *joined]
-    return _checked(joined, to_xml(joined), (there, respelt), notes, covers_visuals=covers_visuals)
+    return _checked(joined, to_xml(joined), (there, faults), notes, covers_visuals=covers_visuals)
 
 
 def _checked(
     root: XmlElement,
     text: str,
-    files: tuple[Mapping[str, Path], Mapping[str, str]],
+    files: tuple[Mapping[str, Path], Mapping[str, MeshFault]],
     notes: Sequence[Finding],
     *,
     covers_visuals: bool,
 ) -> tuple[Description | None, list[Finding]]:
     body, findings = read_body(root)
-    meshes, respelt = files
+    meshes, faults = files
     if findings:
         return None, [*notes, *findings]
-    mistakes = [*notes, *lint(body, meshes, respelt), *orientations(root), *mesh_mistakes(body, meshes)]
+    mistakes = [*notes, *lint(body, meshes, faults), *orientations(root), *mesh_mistakes(body, meshes)]
     if covers_visuals:
         covered = covering(root, body)
         text, (body, _) = to_xml(covered), read_body(covered)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import open_regular
-from rbxcompose.base.findings import Finding, Related, Span, kind, need
+from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Related, Span, kind, need
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
@@ -116,6 +116,10 @@ _FORMATS: Mapping[str, Callable[[bytes, int], str]] = {
 FORMATS = (*_FORMATS,)
 
 
+MeshFault = tuple[str, str]
+"""What is wrong with a mesh, as words that follow its name, and what to do."""
+
+
 @dataclass(frozen=True, slots=True)
 class BodyFile:
     """A file that describes a body. `span` is the place that names it; `arguments` are those of a xacro."""
@@ -145,10 +149,16 @@ class BodyFile:
             need(str(self.path.parent), str(mesh) if name.startswith(PACKAGE) else name.removeprefix("file://"))
         return ours
 
-    def respelt_meshes(self, root: XmlElement) -> dict[str, str]:
-        """Return, for each mesh that is not there, the name of a file that differs only in its capitals."""
+    def mesh_faults(self, root: XmlElement) -> dict[str, MeshFault]:
+        """Return why meshes cannot be used, by name, of those for which more is known than that they do not exist."""
         missing = set(mesh_names(root)) - self.meshes(root).keys()
-        return {name: near for name in missing if (near := self._in_other_letters(name))}
+        return {name: fault for name in missing if (fault := self._fault(name))}
+
+    def _fault(self, name: str) -> MeshFault | None:
+        if (path := self._mesh(name)) is not None and not self._is_ours(path):
+            return "is outside the project", f"put a copy into '{plain(shown_name(project_of(self.path)))}'"
+        near = self._in_other_letters(name)
+        return ("does not exist", f"{DID_YOU_MEAN} '{near}'? Capitals count") if near else None
 
     def _in_other_letters(self, name: str) -> str:
         place, _, own = name.rpartition("/")

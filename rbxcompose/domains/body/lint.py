@@ -7,10 +7,10 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
-from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Related, Severity, kind
+from rbxcompose.base.findings import Finding, Related, Severity, kind
 from rbxcompose.base.geometry import Transform3, Vector3, rotate
 from rbxcompose.base.printable import plain
-from rbxcompose.domains.body.files import mesh_places, named_also
+from rbxcompose.domains.body.files import MeshFault, mesh_places, named_also
 from rbxcompose.domains.body.model import Body, BodyJoint, BodyLink, Geometry, Inertial, JointLimits, Shape
 from rbxcompose.domains.body.urdf import rpy_of
 from rbxcompose.domains.body.xml_reader import XmlElement
@@ -206,18 +206,18 @@ def _together(body: Body, links: Sequence[BodyLink]) -> tuple[float, Tensor]:
     return mass, added([about((x, y, z), at, inertial.mass, _tensor(inertial)) for at, inertial in places])
 
 
-def lint(body: Body, meshes: Collection[str], respelt: Mapping[str, str] = MappingProxyType({})) -> Iterator[Finding]:
-    """Yield what is wrong with a body; `meshes` are the names of the mesh files that exist.
+def lint(
+    body: Body, meshes: Collection[str], faults: Mapping[str, MeshFault] = MappingProxyType({})
+) -> Iterator[Finding]:
+    """Yield what is wrong with a body; `meshes` are the names of the mesh files that it may use.
 
-    `respelt` has names of files that exist, for those that differ only in their capitals.
+    `faults` has what is known of others; of those without any, that they do not exist.
     """
     yield from mass_mistakes(body)
     for name, (first, *others) in mesh_places(body).items():
         if name not in meshes:
-            near = respelt.get(name, "")
-            help_text = f"{DID_YOU_MEAN} '{near}'? Capitals count" if near else _where_meshes_are(name)
-            message = f"the mesh '{plain(name)}' does not exist"
-            yield NO_MESH.at(first, message, help=help_text, related=named_also(others))
+            words, help_text = faults.get(name) or ("does not exist", _where_meshes_are(name))
+            yield NO_MESH.at(first, f"the mesh '{plain(name)}' {words}", help=help_text, related=named_also(others))
     for link in body.links.values():
         yield from _shapes(link)
     for joint in body.joints.values():

@@ -288,6 +288,11 @@ def _limits(element: XmlElement, joint: str) -> model.JointLimits:
     if lower is not None and upper is not None and lower > upper:
         message = f"the lower limit of joint '{plain(joint, _SHOWN)}' is above its upper one"
         raise _MistakeError(WRONG_VALUE.at(element.span, message))
+    for name, value in (("velocity", velocity), ("effort", effort)):
+        if value is not None and value < 0.0:
+            message = f"the {name} limit of joint '{plain(joint, _SHOWN)}' is negative: {value:g}"
+            help_text = "a limit holds for both directions: write it without a sign"
+            raise _MistakeError(WRONG_VALUE.at(element.span, message, help=help_text))
     return model.JointLimits(lower, upper, effort, velocity, element.span)
 
 

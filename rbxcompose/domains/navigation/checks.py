@@ -227,9 +227,7 @@ def _written(robot: Robot, name: str) -> Span:
 
 def _why_not(found: NavigationOfRobot, around: WorldOfRobot | None, place: Place) -> str:
     """Return why a robot cannot stand at a place; nothing if it can."""
-    column, row = found.grid.to_cells((place.x, place.y)).tolist()
-    rows, columns = found.grid.cells.shape
-    if not (0 <= column < columns and 0 <= row < rows):
+    if not found.grid.contains((place.x, place.y)):
         return "it is outside of the map"
     things, pose = around.standing if around else [], Pose2(place.x, place.y, place.heading)
     depth, what = overlap(found.grid, things, found.footprint, pose)

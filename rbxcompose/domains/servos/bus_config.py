@@ -145,6 +145,8 @@ class ServoBusConfig(Config):
     """Servos of which controllers use items, by the names of their actuators; they need not drive joints."""
     by_physics: bool = False
     """Whether a physics engine moves simulated servos; with `simulator: physics`, that is the default."""
+    put_at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where the odometry of a base begins: x, y [m] and heading [rad]. Default: where a simulated world puts it."""
 
     @property
     def models(self) -> dict[int, str]:

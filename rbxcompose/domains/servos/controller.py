@@ -19,6 +19,7 @@ from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.ports import Port
 
 if TYPE_CHECKING:  # `check` needs none of them
+    from rbxcompose.base.geometry import Pose2
     from rbxcompose.domains.servos.joint_drive import JointDrive
     from rbxcompose.domains.servos.servo_cycle import ServoItem
 
@@ -96,10 +97,10 @@ class ControllerHost(Protocol):
 
 
 class ControllerSite:
-    """What a controller uses of the component that runs it."""
+    """What a controller uses of the component that runs it; `start` is where the odometry of a base begins."""
 
-    def __init__(self, bus: ControllerHost, name: str, joints: Mapping[str, JointDrive]) -> None:
-        self._bus, self._name, self.joints = bus, name, joints
+    def __init__(self, bus: ControllerHost, name: str, joints: Mapping[str, JointDrive], start: Pose2) -> None:
+        self._bus, self._name, self.joints, self.start = bus, name, joints, start
 
     @property
     def now(self) -> float:

@@ -18,12 +18,19 @@ DEEP = 0.01  # [m] in which a robot may begin: places are not measured better
 
 @check("RBX3611")
 def start_in_something(robot: Robot) -> Iterator[Finding]:
-    """The robot starts in a wall or in a thing of its world, or above a hole."""
+    """The robot starts in a wall or in a thing of its world, above a hole, or outside of the map."""
     contents = robot.manifest.contents
     if "world" not in contents.root or not contents.is_simulated or (found := contents.of(world)) is None:
         return
     from rbxcompose.domains.worlds.shapes import CircleFootprint
 
+    if found.file.map is not None and not found.file.grid.contains((found.start.x, found.start.y)):
+        place = ", ".join(format_quantity(value, LENGTH) for value in (found.start.x, found.start.y))
+        yield start_in_something.at(
+            robot.value("world", "spawn"),
+            f"the robot starts outside of the map of '{found.file.name}': at ({place})",
+            help="move its 'spawn' onto the map, or choose another",
+        )
     depth, what = overlap(found.file.grid, found.solid_at(0.0), CircleFootprint(found.radius), found.start)
     if depth > DEEP:
         within = "a wall" if what == MAP else f"'{what}'"

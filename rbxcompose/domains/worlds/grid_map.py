@@ -80,6 +80,10 @@ class GridMap:
         u, v = np.moveaxis(np.asarray(cells, float) * self.resolution, -1, 0)
         return np.stack((self.origin.x + cos * u - sin * v, self.origin.y + sin * u + cos * v), -1)
 
+    def contains(self, points: ArrayLike) -> Bools:
+        """Return for points (..., 2) of `map` [m] whether each is on it."""
+        return np.asarray(self.look_up(np.broadcast_to(True, self.cells.shape), points, False))
+
     def occupied_at(self, points: ArrayLike) -> Bools:
         """Return for points (..., 2) of `map` [m] whether each is in an occupied cell; beside the map none is."""
         return np.asarray(self.look_up(self.cells, points, FREE) >= SOLID)

@@ -26,6 +26,9 @@ from rbxcompose.sdk.ports import BULK
 
 BASE = "base_footprint"
 OTHERS = "world/others"
+TRUTH_REMEDY = (
+    "it needs a 'world', and 'simulator: physics' or the base 'diff_drive_sim': these know where the robot is in truth"
+)
 
 
 class SensorConfig(sdk.Config):
@@ -47,7 +50,7 @@ class WorldSensor(sdk.Component[C]):
     process = "world"
     simulated = True
     world = sdk.In(World, "world", qos="latched", limits=BULK)
-    truth = sdk.In(Odometry, "ground_truth")
+    truth = sdk.In(Odometry, "ground_truth", remedy=TRUTH_REMEDY)
     moved = sdk.In(TFMessage, "world/moved", is_open=True, may_be_silent=True)
     others = sdk.In(WorldRobots, OTHERS, is_open=True, may_be_silent=True)
 

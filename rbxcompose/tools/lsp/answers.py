@@ -219,7 +219,7 @@ def _file(spot: Spot) -> Span | None:
     if spot.document.is_mission or spot.cursor.is_key or spot.guide.value(spot.cursor.path).names != FILE:
         return None
     place = Span("", 1, 1, 1, 1)
-    found = resolve(spot.cursor.text, spot.document.path, place)
+    found = resolve(spot.cursor.text, spot.document.path, place, may_be_robot=True)
     return Span(shown_name(found), 1, 1, 1, 1) if not hasattr(found, "code") else None
 
 

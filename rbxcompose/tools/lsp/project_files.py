@@ -208,7 +208,7 @@ class ProjectFiles:
     def _file(self, node: TreeNode, writer: Path) -> Path | None:
         if not isinstance(node, ScalarNode) or not node.text or "${" in node.text:
             return None
-        found = resolve(node.text, writer, NOWHERE)
+        found = resolve(node.text, writer, NOWHERE, may_be_robot=True)
         return found if isinstance(found, Path) else None
 
     def file_named(self, path: Path, key: str) -> Path | None:

@@ -540,7 +540,11 @@ class TrialReader:
         written = _text(root, "robot", "the robot's file", report)
         if written is None:
             return None
-        file = written.text if written.text.startswith(PREFIX) else resolve_file(written.text, path, written.span)
+        file = (
+            written.text
+            if written.text.startswith(PREFIX)
+            else resolve_file(written.text, path, written.span, may_be_robot=True)
+        )
         if isinstance(file, Finding):
             report.add(file)
             return None

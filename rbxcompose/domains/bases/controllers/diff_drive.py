@@ -163,7 +163,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
         )
         fastest = rolling.fastest(Velocity2(config.max_speed, config.max_turn_rate)) * radius
         policy = OdometryPolicy(config.odometry.variance_per_metre, JUMP * fastest, radius * tick, AVERAGED)
-        self.odometry = WheelOdometry(rolling, policy)
+        self.odometry = WheelOdometry(rolling, policy, self.site.start)
         self.seen = -math.inf  # when both wheels had been measured last [s]
         self.refused = self.trouble = ""
 

@@ -16,7 +16,7 @@ from rbxcompose.base.config import BitRate
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.devices.serial_sensor import SerialConfig, SerialSensor
-from rbxcompose.manifest.fields import TopicName
+from rbxcompose.manifest.fields import Farthest, TopicName
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
@@ -162,7 +162,7 @@ class LidarConfig(SerialConfig):
     """Rays of a scan; it measures some 450 times a turn."""
     nearest: sdk.Length = Field(0.02, ge=0)
     """What is nearer is not measured."""
-    farthest: sdk.Length = Field(12.0, gt=0, le=50)
+    farthest: Farthest = Field(12.0, gt=0, le=50, validate_default=True)
     """What is farther counts as no echo."""
     topic: TopicName = "scan"
     """Where scans are published."""

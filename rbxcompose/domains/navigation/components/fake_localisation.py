@@ -7,6 +7,7 @@ from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.navigation.localiser import BASE, ODOM, Localiser
 from rbxcompose.domains.worlds.poses import pose_in
+from rbxcompose.domains.worlds.sensors import TRUTH_REMEDY
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.stamps import to_nanoseconds
 
@@ -25,7 +26,7 @@ class FakeLocalisation(Localiser[FakeLocalisationConfig]):
 
     made_by = "The section `navigation` runs it."
     rate = 20.0
-    truth = sdk.In(Odometry, "ground_truth")
+    truth = sdk.In(Odometry, "ground_truth", remedy=TRUTH_REMEDY)
     odometry = sdk.Looks(source=BASE, target=ODOM)
 
     def configure(self) -> None:

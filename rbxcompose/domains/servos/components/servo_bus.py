@@ -14,6 +14,7 @@ from typing import Any, Literal
 from rbxcompose.base.arrays import np
 from rbxcompose.base.clock import MonotonicClock
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Refused, answers
 from rbxcompose.domains.devices.serial_ports import PortError
@@ -305,8 +306,9 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.keeps_torque = config.on_shutdown != "relax"
         self.at_end.callback(self.end_torque)
         self.reboots = Reboots(bus, self.prepare)
+        start = Pose2(*config.put_at)
         seats = {
-            name: ControllerSite(self, name, {joint: drives[joint] for joint in item.config.claimed})
+            name: ControllerSite(self, name, {joint: drives[joint] for joint in item.config.claimed}, start)
             for name, item in config.controllers.items()
         }
         self.controllers = controller_manager.ControllerManager(

@@ -23,7 +23,7 @@ from rbxcompose.domains.worlds.optics import (
 )
 from rbxcompose.domains.worlds.sensors import SensorConfig, WorldSensor
 from rbxcompose.domains.worlds.shapes import WorldShape
-from rbxcompose.manifest.fields import TopicName
+from rbxcompose.manifest.fields import Farthest, TopicName
 from rbxcompose.msgs.images import pixels
 from rbxcompose.msgs.sensor_msgs import CameraInfo, Image, PointCloud2
 from rbxcompose.msgs.stamps import to_time
@@ -61,7 +61,7 @@ class CameraSimConfig(SensorConfig):
     """Whether one that measures depth also publishes it as a cloud of points."""
     nearest: sdk.Length = Field(0.3, ge=0)
     """What is nearer has no depth."""
-    farthest: sdk.Length = Field(10.0, gt=0, le=200)
+    farthest: Farthest = Field(10.0, gt=0, le=200, validate_default=True)
     """What is farther has no depth; a physics engine draws nothing beyond 50 m."""
     noise: sdk.Length = Field(0.0, ge=0, le=1)
     """Standard deviation of a depth at 1 m; it grows with the square of the depth, as with stereo."""

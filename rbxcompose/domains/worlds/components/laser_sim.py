@@ -10,7 +10,7 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.arrays import Array, np
 from rbxcompose.domains.worlds.sensors import SensorConfig, WorldSensor
-from rbxcompose.manifest.fields import TopicName
+from rbxcompose.manifest.fields import Farthest, TopicName
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
@@ -27,7 +27,7 @@ class LaserSimConfig(SensorConfig):
     """Between the first and the last ray; 360 deg is all around."""
     nearest: sdk.Length = Field(0.1, ge=0)
     """What is nearer is not seen."""
-    farthest: sdk.Length = Field(10.0, gt=0, le=200)
+    farthest: Farthest = Field(10.0, gt=0, le=200, validate_default=True)
     """What is farther is not seen."""
     rate: sdk.Frequency = Field(10.0, gt=0, le=100)
     """Scans a second."""

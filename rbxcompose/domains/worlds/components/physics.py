@@ -34,6 +34,9 @@ from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.sdk.ports import BULK
 
 ODOM, BASE = "odom", "base_footprint"
+COMMANDED: dict[str, sdk.Port[Any]] = {
+    "command": sdk.In(geometry.Twist, "physics/cmd_vel", qos="command").named("command")
+}
 FOR_SERVOS: dict[str, sdk.Port[Any]] = {
     "set_points": sdk.In(JointState, "physics/set_points").named("set_points"),
     "joints": sdk.Out(JointState, "physics/joint_states").named("joints"),
@@ -68,6 +71,8 @@ class PhysicsConfig(sdk.Config):
     """The mesh files that exist, by their names in the URDF."""
     drives: bool = True
     """Whether it drives; otherwise it is fixed to the ground."""
+    commanded: bool = True
+    """Whether a base commands its wheels as a whole; otherwise servos turn them, if it drives."""
     wheel_distance: float = 0.23
     """Between the wheels that are added to a body without any [m]."""
     servos: dict[str, float | None] = {}
@@ -90,7 +95,6 @@ class PhysicsSim(sdk.Component[PhysicsConfig]):
     process = "world"
     simulated = True
     world = sdk.In(World, "world", qos="latched", limits=BULK)
-    command = sdk.In(geometry.Twist, "physics/cmd_vel", qos="command")
     measured = sdk.Out(Odometry, "physics/odom")
     truth = sdk.Out(Odometry, "ground_truth")
     contact = sdk.Out(String, "contact", qos="event")
@@ -104,8 +108,8 @@ class PhysicsSim(sdk.Component[PhysicsConfig]):
 
     @classmethod
     def ports(cls, config: PhysicsConfig) -> dict[str, sdk.Port[Any]]:
-        """Return the ports, with those for servos if there are any, and for sensors."""
-        found = super().ports(config) | (FOR_SERVOS if config.servos else {})
+        """Return the ports, with those for a base, for servos and for sensors if there are any."""
+        found = super().ports(config) | (COMMANDED if config.commanded else {}) | (FOR_SERVOS if config.servos else {})
         for topic, sensor in config.sensors.items():
             below = f"physics/{topic}"
             if sensor.view is None:

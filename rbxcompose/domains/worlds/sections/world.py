@@ -74,7 +74,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         "objects": dict(found.file.objects),
         "holes": dict(found.file.holes),
         "lights": dict(found.file.lights),
-        "start": (found.start.x, found.start.y, found.start.heading),
+        "start": _put_at(found),
         "radius": found.radius,
         "height": found.height,
         "robot": found.robot,
@@ -89,7 +89,8 @@ def _engine(contents: Contents, wiring: Wiring) -> dict[str, object]:
     """Return what the physics engine moves."""
     bases = [made for made in wiring.components.values() if made.declared(Drives)]
     distances = (getattr(made.config, "wheel_distance", 0.0) for made in bases)
-    config: dict[str, object] = {"drives": bool(bases)}
+    commanded = any(not made.declared(TurnsJoints) for made in bases)
+    config: dict[str, object] = {"drives": bool(bases), "commanded": commanded}
     if distance := next(filter(None, distances), 0.0):
         config["wheel_distance"] = distance
     described = contents.of(body)
@@ -114,9 +115,13 @@ def _places(read: WorldOfRobot | None) -> Mapping[str, Mapping[str, object]]:
 
 
 def _defaults(contents: Contents) -> Mapping[str, object]:
-    if not contents.is_simulated or contents.of(world) is None:
+    if not contents.is_simulated or (found := contents.of(world)) is None:
         return {}
-    return {"in_world": True, "by_physics": contents.of(simulator) == PHYSICS}
+    return {"in_world": True, "by_physics": contents.of(simulator) == PHYSICS, "put_at": _put_at(found)}
+
+
+def _put_at(found: WorldOfRobot) -> tuple[float, float, float]:
+    return found.start.x, found.start.y, found.start.heading
 
 
 @section(
