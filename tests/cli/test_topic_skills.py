@@ -77,7 +77,7 @@ def test_they_are_listed_with_their_topic_arguments_and_an_example(
     folder: Path, capsys: pytest.CaptureFixture[str], golden: Golden, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert Gripper.type_name == "toy_gripper"
-    monkeypatch.setattr("rbxcompose.tools.mission_files.skill_names", lambda: ["say"])  # other tests have toys
+    monkeypatch.setattr("rbxcompose.compiler.model.skills.skill_names", lambda: ["say"])  # other tests have toys
     golden.check("mission_skills.txt", told(capsys, "mission", "skills", str(folder)))
     listed = json.loads(told(capsys, "mission", "skills", str(folder), "--json"))
     assert {item["name"]: item["way"] for item in listed if item["topic"]} == {
