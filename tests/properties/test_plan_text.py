@@ -90,6 +90,8 @@ diagnostics:
 missions:
   visit: visit.yaml
 start: visit
+triggers:
+  empty: {{when: "$battery < {share} % and $battery > 1 %", mission: visit}}
 """
 NUMBERS = st.floats(0.01, 1e6).map(lambda value: f"{value:.12f}")
 WORDS = st.text(alphabet=st.characters(codec="utf-8", categories=["L", "N", "P", "S", "Zs"]), max_size=20).map(

@@ -2,8 +2,8 @@
 
 The text is JSON. It names no types: they are those of the plan's fields and of the components' configurations, so
 that loading a file creates nothing but plans. Configurations are validated again, missions are read again from their
-located tree. Maps keep their order, which components see: that of missions and places is the one in which they are
-listed.
+located tree, and expressions from their text. Maps keep their order, which components see: that of missions and places
+is the one in which they are listed.
 """
 
 import json
@@ -18,6 +18,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import to_jsonable_python
 
 from rbxcompose.base.config import HIDDEN, Config, Dimensioned, Place, Secret
+from rbxcompose.base.expressions.parser import parse
+from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.base.findings import Report, Span
 from rbxcompose.base.plugins import BrokenPluginError
 from rbxcompose.base.units import DIMENSIONS, Dimension, Quantity
@@ -194,6 +196,8 @@ def _encode(value: Any, hint: Any) -> Any:
             return value  # the caller of `dump` decides whether it is shown
         case Program():
             return node_to_data(value.root)
+        case Expression():
+            return value.text
         case Dimension():
             return dimension_to_data(value)
         case Enum():
@@ -239,6 +243,8 @@ def _decode(data: Any, hint: Any) -> Any:
         return _decode_several(data, hint)
     if hint is Program:
         return _program(data)
+    if hint is Expression:
+        return parse(data)
     if hint is Dimension:
         return dimension_of_data(data)
     if hint is Instance:
