@@ -19,7 +19,7 @@ from rbxcompose.domains.programs.runnable import ask_for_real, program_findings
 from rbxcompose.runtime.folder import RobotFolder, RunOptions
 from rbxcompose.runtime.log import NAME, Follower, Record
 from rbxcompose.runtime.supervision import launch
-from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
+from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED
 from rbxcompose.sdk.capabilities import RunsContainer, RunsProgram, RunsRosNode, ServesPage
 from rbxcompose.sdk.registry import declared
 from rbxcompose.tools.live_rules import LiveRules
@@ -122,7 +122,7 @@ class _Watch:
                 first, *rest = summary(name, reason, time, facts).split("\n")
                 emit("\n".join([good(first) if exit_code == 0 else first, *rest]))
                 self._started.wait()
-                return exit_code
+                return exit_code or (INTERRUPTED if self._options.is_detached and not self._is_up else 0)
 
 
 def is_fit(robot: Robot, sources: Mapping[str, str]) -> bool:

@@ -5,8 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.runtime.folder import RunOptions
+from rbxcompose.runtime.supervision import launch
+from rbxcompose.runtime.supervision.conductor import INTERRUPTED
 from rbxcompose.tools.commands import up
+from rbxcompose.tools.run_view import run_plan
 
 
 def parse(*words: str) -> argparse.Namespace:
@@ -88,3 +92,18 @@ def test_files_are_watched_in_the_foreground_and_in_real_time_only(
 ) -> None:
     assert up.run(parse("--watch", *words)) == 2
     assert named in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("is_detached", "exit_code"), [(True, INTERRUPTED), (False, 0)])
+def test_who_waits_for_a_robot_to_be_up_learns_that_it_went_down_instead(
+    is_detached: bool, exit_code: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Ended:
+        def wait_for_report(self, seconds: float) -> launch.LaunchReport:
+            return launch.RunEnded(0, "asked to go down", 0.2)
+
+        def wait(self) -> int:
+            return 0
+
+    monkeypatch.setattr(launch, "start_supervisor", lambda *given: Ended())
+    assert run_plan(Plan("one", "one.yaml", ()), RunOptions(is_detached=is_detached)) == exit_code

@@ -42,7 +42,9 @@ elif words[1] == "scout_5":
 else:
     state = "failed" if host == "two" else "active"
     part = {"name": "battery", "state": state}
-    print(json.dumps({"mission": "running patrol", "batteries": {"battery": "80 %"}, "components": [part]}))
+    missions = [{"mission": "patrol", "state": "running", "running": []}]
+    seen = {"mission": "recover: success", "missions": missions, "batteries": {"battery": "80 %"}}
+    print(json.dumps({**seen, "components": [part]}))
 """
 
 

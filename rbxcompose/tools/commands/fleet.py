@@ -158,9 +158,15 @@ def _row(robot: str, shares: Sequence[ShareFacts]) -> dict[str, str]:
         "robot": robot,
         "host": ", ".join(host for _, host, _ in shares),
         "state": _UP if set(states) == {_UP} else ", ".join(text for text in wrong if not text.endswith(_UP)),
-        "mission": "; ".join(str(facts["mission"]) for facts in answers if facts.get("mission")),
+        "mission": "; ".join(filter(None, map(_mission, answers))),
         "battery": ", ".join(text for facts in answers for text in facts.get("batteries", {}).values()),
     }
+
+
+def _mission(facts: Mapping[str, Any]) -> str:
+    """Return the missions that run; without any, what the executive reported last."""
+    running = "; ".join(f"{one['state']} {one['mission']}" for one in facts.get("missions", ()))
+    return running or str(facts.get("mission", ""))
 
 
 def _state(facts: Mapping[str, Any]) -> str:
