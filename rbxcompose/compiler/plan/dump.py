@@ -315,8 +315,11 @@ def _instance(data: Any) -> Instance:
 
 
 def _model(data: Any, cls: type[BaseModel]) -> Any:
+    # A default is no user's value: an infinite one, for no limit, would be refused as such.
+    defaults = {field.alias or name: field.default for name, field in cls.model_fields.items()}
+    given = {key: value for key, value in data.items() if value != defaults.get(key, ...)}
     try:
-        return cls.model_validate(_members(data, cls))
+        return cls.model_validate(_members(given, cls))
     except ValidationError as error:
         raise PlanTextError(f"this is not a plan: {error.errors(include_url=False)[0]['msg']}") from error
 
