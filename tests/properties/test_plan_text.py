@@ -155,10 +155,9 @@ def test_a_map_comes_back_in_the_order_in_which_it_was_written() -> None:
 
 
 def test_what_has_no_limit_comes_back_without_one(tmp_path: Path) -> None:
-    plan = check_text(
-        "rbx: 1\nkind: Robot\nname: one\ncomponents: {cell: {type: battery_sim}}\nconsole: {}\n", tmp_path
-    ).plan
-    assert load(dump(plan)) == plan  # of a base, whose speeds the page limits, there is none
+    robot = "rbx: 1\nkind: Robot\nname: one\ncomponents: {cell: {type: battery_sim, runtime: 1 h}}\nconsole: {}\n"
+    plan = check_text(robot, tmp_path).plan
+    assert load(dump(plan)) == plan  # there is no base, whose speeds the page would keep
 
 
 def test_a_place_comes_back_as_the_place_itself() -> None:

@@ -12,9 +12,11 @@ from typing import Any
 import pytest
 from rosbags.highlevel import AnyReader
 
+from rbxcompose.base.config import Secret
 from rbxcompose.base.requests import as_data
 from rbxcompose.commands import main as command
-from rbxcompose.compiler.plan.dump import load
+from rbxcompose.commands.console import NotDoneError
+from rbxcompose.compiler.plan.dump import dump, load
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.missions.execution.requests import CancelMission
 from rbxcompose.msgs.cdr import encode
@@ -24,6 +26,8 @@ from rbxcompose.runtime.recording.reader import RecordingReader
 from rbxcompose.runtime.recording.tape import ORDERS, PLAN
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
 from rbxcompose.runtime.replay import ReplayResult, missing_topics, replayed
+from rbxcompose.testing import instance
+from rbxcompose.tools.commands.replay import instance_of
 from tests.forked import run_command
 from tests.soak import rare
 
@@ -109,6 +113,14 @@ def test_the_command_tells_that_nothing_differs(recording: Recording, capsys: py
     told = json.loads(capsys.readouterr().out)
     assert (told["component"], told["difference"], told["damage"]) == ("battery", None, "")
     assert told["equal"] > 0
+
+
+def test_only_a_recording_lacks_a_secret() -> None:
+    configuration = {"command": ["true"], "secrets": {"TOKEN": Secret("abc")}}
+    plan = Plan("one", "one.yaml", (instance("uploader", "program", configuration),))
+    assert instance_of(plan, "uploader") == plan.instances[0]
+    with pytest.raises(NotDoneError, match="'uploader' has a secret, which a recording does not hold"):
+        instance_of(load(dump(plan)), "uploader")
 
 
 def test_what_it_sends_now_can_be_kept(recording: Recording, tmp_path: Path) -> None:

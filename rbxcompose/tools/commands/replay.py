@@ -299,7 +299,7 @@ def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader
         NotDoneError: if the recording lacks something needed, or the outputs cannot be written.
     """
     plan = _plan(arguments, path, reader)
-    instance = _instance(plan, arguments.into)
+    instance = instance_of(plan, arguments.into)
     if missing := missing_topics(plan, instance, reader.topics):
         names = plain(", ".join(missing))
         raise NotDoneError(
@@ -330,13 +330,18 @@ def _plan(arguments: argparse.Namespace, path: Path, reader: RecordingReader) ->
         raise NotDoneError(codes.NOT_ENOUGH.at(None, f"'{plain(str(path))}': {plain(reason)}")) from error
 
 
-def _instance(plan: Plan, name: str) -> Instance:
+def instance_of(plan: Plan, name: str) -> Instance:
+    """Return a component of a plan.
+
+    Raises:
+        NotDoneError: if there is none, or the plan is that of a recording and it has a secret.
+    """
     instance = next((candidate for candidate in plan.instances if candidate.name == name), None)
     if instance is None:
         names = [one.name for one in plan.instances]
         message = f"the robot '{plain(plan.robot)}' has no component '{plain(name, 60)}'"
         raise NotDoneError(codes.NOT_ENOUGH.at(None, message, help=suggest(name, names, "components")))
-    if json.dumps(HIDDEN) in dump(Plan(plan.robot, plan.file, (instance,))):
+    if json.dumps(HIDDEN) in dump(Plan(plan.robot, plan.file, (instance,)), reveals_secrets=True):
         message = f"'{name}' has a secret, which a recording does not hold"
         raise NotDoneError(codes.NOT_ENOUGH.at(None, message, help="'--robot PATH' takes it from the robot's file"))
     return instance
