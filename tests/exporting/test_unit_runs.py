@@ -43,9 +43,11 @@ def test_a_unit_is_ready_and_alive_and_ends_in_time(tmp_path: Path, monkeypatch:
     options = dict(re.findall(r"^(\w+)=(.*)$", text, re.MULTILINE))
     given = dict(word.split("=", 1) for word in options["Environment"].split())
     assert given["XDG_RUNTIME_DIR"] == f"/run/{options['RuntimeDirectory']}"
+    assert given["XDG_STATE_HOME"] == f"/var/lib/{options['StateDirectory']}"
     (runtime := tmp_path / "run").mkdir(mode=int(options["RuntimeDirectoryMode"], 8))
     told = str(tmp_path / "notify")
     environment = {"NOTIFY_SOCKET": told, "WATCHDOG_USEC": f"{WATCHDOG}000000", "XDG_RUNTIME_DIR": str(runtime)}
+    environment["XDG_STATE_HOME"] = str(tmp_path / "state")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(told)
         manager.settimeout(LONGEST)

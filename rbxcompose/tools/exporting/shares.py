@@ -25,6 +25,7 @@ from rbxcompose.sdk.registry import component_type
 GRACE = 5.0  # [s] to go down beside the time to come to rest
 MEMORY, PROCESSES = "1G", 500  # of a share at most; a robot with an arm needs a fifth of it
 CERTIFICATES = (AUTHORITY, CERTIFICATE, KEY)
+STATE = "/state"  # in a container: where snapshots of missions are, which outlive it
 CONFIGURATION = "/run/config"  # in a container: where `CERTIFICATES` are, as in `~/.config`
 FILE = "{file}"
 LONGEST = 63  # characters of a label in Kubernetes, or of a name there
@@ -52,11 +53,11 @@ DevicePolicy=closed
 """
 PROJECT = "/robot"  # the folder of the manifests in the image
 _DOCKERFILE = """FROM python:3.11-slim
-RUN pip install --no-cache-dir {requirements} && useradd --create-home robot
+RUN pip install --no-cache-dir {requirements} && useradd --create-home robot && install -d -o robot -m 700 {state}
 COPY project {project}
 USER robot
 WORKDIR {project}
-ENV XDG_RUNTIME_DIR=/run/robot XDG_CONFIG_HOME={configuration} NO_COLOR=1
+ENV XDG_RUNTIME_DIR=/run/robot XDG_CONFIG_HOME={configuration} XDG_STATE_HOME={state} NO_COLOR=1
 ENTRYPOINT ["rbxcompose"]
 """
 MOST_BYTES = 1_000_000  # of a ConfigMap, which etcd limits
@@ -179,7 +180,10 @@ def _lines(share: ExportedShare, program: str, file: str, user: str) -> Iterator
     yield f"RuntimeDirectory=rbxcompose-{share.name}"
     yield "RuntimeDirectoryMode=0700"
     yield "RuntimeDirectoryPreserve=yes"  # its log stays
-    yield f"Environment=XDG_RUNTIME_DIR=/run/rbxcompose-{share.name} NO_COLOR=1"
+    yield f"StateDirectory=rbxcompose-{share.name}"  # for snapshots of missions
+    yield "StateDirectoryMode=0700"
+    folders = f"XDG_RUNTIME_DIR=/run/rbxcompose-{share.name} XDG_STATE_HOME=/var/lib/rbxcompose-{share.name}"
+    yield f"Environment={folders} NO_COLOR=1"
     yield f"ExecStart={_quoted(program)} {words}"
     yield "Restart=on-failure"
     yield "RestartSec=1"
@@ -206,7 +210,7 @@ def _quoted(word: str) -> str:
 def dockerfile(requirements: Iterable[str]) -> str:
     """Return the Dockerfile; pip installs the requirements, the folder `project` beside it has the system's files."""
     words = " ".join(f'"{requirement}"' for requirement in requirements)  # a shell reads it
-    return _DOCKERFILE.format(requirements=words, project=PROJECT, configuration=CONFIGURATION)
+    return _DOCKERFILE.format(requirements=words, project=PROJECT, configuration=CONFIGURATION, state=STATE)
 
 
 def compose_file(given: Sequence[ExportedShare], *, system: str, file: str) -> str:
@@ -214,6 +218,7 @@ def compose_file(given: Sequence[ExportedShare], *, system: str, file: str) -> s
     made: dict[str, Any] = {
         "name": joined_name(system),
         "services": {share.name: _service(share, f"{PROJECT}/{file}") for share in given},
+        "volumes": {f"{share.name}-state": {} for share in given},
     }
     if secrets := {name: {"file": path} for share in given for name, path, _ in _certificates(share)}:
         made["secrets"] = secrets
@@ -237,6 +242,7 @@ def _service(share: ExportedShare, file: str) -> dict[str, Any]:
         "init": True,
         "read_only": True,
         "tmpfs": ["/run/robot:mode=0700,uid=1000", "/tmp"],  # noqa: S108 - of the container
+        "volumes": [f"{share.name}-state:{STATE}"],
         "shm_size": "256mb",
         "mem_limit": MEMORY.lower(),
         "pids_limit": PROCESSES,
@@ -352,6 +358,7 @@ def _pod(share: ExportedShare, system: str, file: str, files: Mapping[str, Bundl
         {"name": "files", "configMap": {"name": f"{system}-files", "items": items}},
         {"name": "run", "emptyDir": {"medium": "Memory"}},
         {"name": "tmp", "emptyDir": {}},
+        {"name": "state", "emptyDir": {}},  # kept while the pod is on its node, also when its container restarts
         {"name": "shm", "emptyDir": {"medium": "Memory", "sizeLimit": "256Mi"}},
     ]
     if share.has_certificates:
@@ -379,6 +386,7 @@ def _pod(share: ExportedShare, system: str, file: str, files: Mapping[str, Bundl
 def _container(share: ExportedShare, file: str, image: str) -> dict[str, Any]:
     probe = {"exec": {"command": ["rbxcompose", "ps", share.robot]}, "timeoutSeconds": 5}
     mounts = [("files", PROJECT), ("run", "/run/robot"), ("tmp", "/tmp"), ("shm", "/dev/shm")]  # noqa: S108 - of the pod
+    mounts.append(("state", STATE))
     if share.has_certificates:
         mounts.append(("certificates", f"{CONFIGURATION}/{share.certificates}"))
     mounts += [(f"device-{n}", path) for n, path in enumerate(share.devices)]
@@ -389,6 +397,7 @@ def _container(share: ExportedShare, file: str, image: str) -> dict[str, Any]:
         "env": [
             {"name": "XDG_RUNTIME_DIR", "value": "/run/robot"},
             {"name": "XDG_CONFIG_HOME", "value": CONFIGURATION},
+            {"name": "XDG_STATE_HOME", "value": STATE},
             *(_variable(share, name) for name in share.secrets),
         ],
         "startupProbe": {**probe, "periodSeconds": 2, "failureThreshold": 60},
