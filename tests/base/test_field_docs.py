@@ -31,7 +31,7 @@ class RedLamp(Lamp):
 
 
 def test_a_docstring_below_a_field_is_its_own() -> None:
-    assert field_docs(Lamp) == {"colour": "What it shines in,\nby name.", "bright": "How bright."}
+    assert field_docs(Lamp) == {"colour": "What it shines in, by name.", "bright": "How bright."}
     assert field_docs(Lamp.Inner) == {"colour": "Of what is inside."}
 
 
@@ -58,7 +58,7 @@ def test_a_class_without_source_has_none() -> None:
 def test_schemas_tell_the_docstrings() -> None:
     properties = Lamp.model_json_schema()["properties"]
     assert [property_.get("description") for property_ in properties.values()] == [
-        "What it shines in,\nby name.",
+        "What it shines in, by name.",
         None,
         "How bright.",
     ]
