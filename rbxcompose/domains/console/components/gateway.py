@@ -171,6 +171,7 @@ class Gateway(Component[GatewayConfig]):
             Setting(config.drive_topic, "drive_topic"),
             Setting(config.fleet, "fleet"),
             Setting(config.camera, "camera"),
+            Setting(config.foxglove, "foxglove"),
         )
         foxglove = (NeedsExtra(Setting("foxglove"), Setting("foxglove")),) if config.foxglove else ()
         return (page, *needed, *foxglove)
