@@ -33,7 +33,7 @@ export interface Transition {
   outcome: string;
 }
 
-/** What a look at a mission shows; statuses are by node number. `by_hand` is what people changed while it ran. */
+/** What a look at a mission shows; statuses are by node number, `shown` are its data for people. `by_hand` is what people changed while it ran. */
 export interface Seen {
   mission: string;
   state: string;
@@ -41,7 +41,7 @@ export interface Seen {
   stopped_at?: Stop[];
   by_hand?: number;
   statuses: Record<string, number>;
-  data: Record<string, Json>;
+  shown: Record<string, string>;
   transitions: Transition[];
   picture: Picture;
 }
@@ -100,35 +100,13 @@ export function activeNode(picture: Picture, statuses: Record<string, number>): 
   return null;
 }
 
-/** Returns a value of a mission's data for people: places by their names, numbers with few digits. */
-export function shownValue(value: Json): string {
-  if (value === null) return "nothing yet";
-  if (typeof value === "number") return String(Number(value.toPrecision(4)));
-  if (typeof value === "boolean") return value ? "true" : "false";
-  if (typeof value === "string") return value || "(empty)";
-  if (Array.isArray(value)) return value.map(shownValue).join(", ") || "(empty)";
-  const keys = Object.keys(value);
-  const inner = value[keys[0] ?? ""];
-  if (keys.length === 1 && /^[A-Z]/.test(keys[0]!)) {
-    if (isMessage(inner)) return typeof inner.name === "string" && inner.name ? inner.name : fields(inner);
-    return inner === undefined || inner === null ? "nothing yet" : shownValue(inner);
-  }
-  return keys.length === 1 && keys[0] === "map" && isMessage(inner) ? fields(inner) : fields(value);
-}
-
-function fields(value: Message): string {
-  return Object.entries(value)
-    .map(([name, one]) => `${name} ${shownValue(one)}`)
-    .join(", ");
-}
-
 export function isSeen(answer: Json): answer is Message & Seen {
   return isMessage(answer) && isMessage(answer.picture) && isMessage(answer.statuses);
 }
 
 /** Returns what is seen of a mission that has not run: its picture alone. */
 export function unseen(picture: Message): Seen {
-  const nothing = { began: null, statuses: {}, data: {}, transitions: [] };
+  const nothing = { began: null, statuses: {}, shown: {}, transitions: [] };
   return { mission: String(picture.name), state: "idle", ...nothing, picture: picture as unknown as Picture };
 }
 

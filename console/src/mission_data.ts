@@ -1,8 +1,6 @@
 /** The data of a mission as a table; who may operate the robot sets them while it runs. */
 import type { Datum } from "./debugging";
 import { h, setText } from "./dom";
-import { shownValue } from "./mission";
-import type { Json } from "./rosbridge";
 
 /** What the table asks the robot for; both fail with the reason if they are refused. */
 export interface DataAccess {
@@ -39,7 +37,7 @@ export class MissionData {
   }
 
   /** Shows data; what is being typed stays. */
-  show(data: Record<string, Json>, maySet: boolean): void {
+  show(data: Record<string, string>, maySet: boolean): void {
     const names = Object.keys(data);
     if (names.length === 0) {
       this.forget("This mission keeps no data.");
@@ -52,7 +50,7 @@ export class MissionData {
       this.#empty.hidden = true;
     }
     for (const [name, { value, set }] of this.#rows) {
-      setText(value, shownValue(data[name] ?? null));
+      setText(value, data[name] || "(empty)");
       set.hidden = !maySet;
     }
   }

@@ -308,6 +308,8 @@ class ServesPage(Capability):
     """Where the pages of a system's robots are, by robot: `ADDRESS:PORT`, without an address on the same host."""
     camera: Setting[str] = Setting("")
     """The topic of the pictures that it shows, by its full name; empty if there is none."""
+    foxglove: Setting[int] = Setting(0)
+    """TCP port for Foxglove on this machine; 0 for none."""
 
 
 @dataclass(frozen=True, slots=True)

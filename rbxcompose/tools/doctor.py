@@ -27,6 +27,7 @@ NAME = "rbxcompose"
 _PROC, _SHARED = Path("/proc"), Path("/dev/shm")  # noqa: S108
 _LISTENS = "0A"  # the state of a socket in /proc/net/tcp
 _ADDRESS, _STATE, _INODE = 1, 3, 9  # fields of its lines
+_LOOPBACK = re.compile("(0{16}FFFF0000)?[0-9A-F]{6}7F|0{24}01000000")  # there, words of IPv4 and IPv6
 _SOCKET = re.compile(r"socket:\[(\d+)\]")
 _LOCKED = re.compile(r"^([A-Za-z0-9_.-]+)==([^\s;\\]+)", re.MULTILINE)
 _REQUIRED = re.compile(r"[A-Za-z0-9_.-]+")
@@ -93,6 +94,7 @@ class Listener:
 
     pid: int | None
     title: str
+    is_open: bool = False  # to other machines
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,13 +186,15 @@ def has_errors(answers: Sequence[ExaminationResult]) -> bool:
 
 def listeners() -> dict[int, Listener]:
     """Return the listeners at TCP ports."""
-    inodes = dict(_listening())
-    owners = {inode: pid for inode, pid in _sockets() if inode in inodes.values()}
-    found = {port: owners.get(inode) for port, inode in inodes.items()}
-    return {port: Listener(pid, "" if pid is None else _title(pid)) for port, pid in found.items()}
+    sockets = sorted(_listening())  # of several at a port, the one that is open to other machines
+    inodes = {inode for _, _, inode in sockets}
+    owners = {inode: pid for inode, pid in _sockets() if inode in inodes}
+    found = {port: (owners.get(inode), is_open) for port, is_open, inode in sockets}
+    return {port: Listener(pid, "" if pid is None else _title(pid), is_open) for port, (pid, is_open) in found.items()}
 
 
-def _listening() -> Iterator[tuple[int, str]]:
+def _listening() -> Iterator[tuple[int, bool, str]]:
+    """Yield the port of each socket that listens, whether other machines reach it, and its inode."""
     for name in ("net/tcp", "net/tcp6"):
         try:
             lines = (_PROC / name).read_text(encoding="ascii").splitlines()[1:]
@@ -198,7 +202,8 @@ def _listening() -> Iterator[tuple[int, str]]:
             continue  # a kernel without this address family
         for fields in map(str.split, lines):
             if fields[_STATE] == _LISTENS:
-                yield int(fields[_ADDRESS].rpartition(":")[2], 16), fields[_INODE]
+                address, _, port = fields[_ADDRESS].partition(":")
+                yield int(port, 16), not _LOOPBACK.fullmatch(address), fields[_INODE]
 
 
 def _sockets() -> Iterator[tuple[str, int]]:

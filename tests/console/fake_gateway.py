@@ -169,6 +169,9 @@ class FakeGateway:
 
     def _handle(self, connection: ServerConnection, frame: dict[str, Any]) -> None:
         match frame["op"]:
+            case _ if self.is_locked:
+                words = "this needs the role 'view'; yours is 'nobody'"
+                connection.send(json.dumps({"op": "status", "level": "error", "id": frame["id"], "msg": words}))
             case "subscribe":
                 topic = frame["topic"]
                 self.subscribed[connection].add(topic)

@@ -115,13 +115,27 @@ def test_a_secret_that_could_be_guessed_is_not_used(tmp_path: Path, monkeypatch:
         ("127.0.0.1:8080", "null", False, False),
         ("127.0.0.1:9999", "", False, False),
         ("127.0.0.1:8080", "http://old.page:8181", True, True),
+        ("192.168.1.7:8080", "http://192.168.1.7:8190", True, False),
+        ("192.168.1.7:8080", "http://192.168.1.7:8191", False, False),
+        ("192.168.1.7:8080", "http://192.168.1.9:8190", False, False),
+        ("192.168.1.7:8080", "http://192.168.1.9", True, False),
+        ("localhost:8080", "http://127.0.0.1:8190", True, True),
+        ("127.0.0.1:8080", "http://evil.example:8190", False, False),
         ("", "", False, False),
     ],
 )
 def test_only_own_pages_and_named_ones_pass(host: str, origin: str, *, on_lan: bool, on_machine: bool) -> None:
-    more = {"names": ("robot.local",), "origins": frozenset({"http://old.page:8181"})}
+    fleet = (":8080", ":8190", "192.168.1.9:80")
+    more = {"names": ("robot.local",), "origins": frozenset({"http://old.page:8181"}), "fleet": fleet}
     assert Door(8080, is_lan=True, **more).lets_in(host, origin) is on_lan  # type: ignore[arg-type]
     assert Door(8080, is_lan=False, **more).lets_in(host, origin) is on_machine  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["192.168.1.7", "robot.local", "localhost", "evil.example", "[::1]", "fe80::1%; *"])
+def test_a_page_reaches_its_system_by_the_name_by_which_it_was_opened(name: str) -> None:
+    door = Door(8080, is_lan=True, names=("robot.local",), fleet=("192.168.1.9:80", ":8190"))
+    reached = {f"ws://{name}:8190"} if name in ("192.168.1.7", "robot.local", "localhost") else set()
+    assert {*door.sources(f"{name}:8080").split()} - {"ws://192.168.1.9:80"} == {"'self'"} | reached
 
 
 def test_at_the_port_of_the_web_a_browser_names_no_port() -> None:

@@ -34,7 +34,7 @@ def picture() -> dict[str, Any]:
 def seen(state: str = "running", *stops: dict[str, Any], by_hand: int = 0) -> dict[str, Any]:
     more = {"stopped_at": list(stops), "by_hand": by_hand, "transitions": [], "began": 1.0, "version": 1}
     statuses = {"0": 1, "1": 1, "2": 1, "3": 0, "4": 0}
-    return {"mission": "patrol", "state": state, "statuses": statuses, "data": {"rounds": 2.0}, **more} | {
+    return {"mission": "patrol", "state": state, "statuses": statuses, "shown": {"rounds": "2"}, **more} | {
         "picture": picture()
     }
 
@@ -183,7 +183,7 @@ def test_data_are_set_in_their_table_with_their_type(open_page: Callable[..., Pa
     page.keyboard.press("Enter")
     form = page.get_by_role("form", name="New value of rounds")
     expect(form.get_by_role("alert")).to_have_text("'rounds' must be a whole number")
-    patrol.show(LOOK_AT, seen() | {"data": {"rounds": 3.0}})
+    patrol.show(LOOK_AT, seen() | {"shown": {"rounds": "3"}})
     expect(page.get_by_label("Data", exact=True).get_by_text("3", exact=True)).to_be_visible()
     expect(field).to_have_value("many")
     assert violations(page) == []

@@ -70,6 +70,13 @@ def test_robots_of_a_system_are_seen_at_once_and_one_opens_each(
     expect(places).to_contain_text("Digger at 3.00, \u22121.00 m")
     expect(places).to_contain_text("Turtlebot at 0.00, 1.00 m in odom")
     assert violations(page) == []
+    fleet.is_locked = True
+    fleet.drop()
+    expect(cards["Digger"]).to_contain_text("Nothing is known of it. Open its link")
+    expect(cards["Digger"]).not_to_contain_text("mission")
+    fleet.is_locked = False
+    fleet.drop()
+    expect(cards["Digger"]).to_contain_text("Dig is running")
 
 
 def test_the_map_is_empty_when_all_robots_are_gone(

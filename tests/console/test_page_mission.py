@@ -28,9 +28,9 @@ def seen(state: str, statuses: dict[str, int]) -> dict[str, Any]:
     main = node(0, "repeat", "$rounds", node(1, "go_to", "$corner", notes=["timeout 10 s"]))
     interrupt = node(None, "interrupt", "when $battery < 50 %", node(2, "recharge"), name="battery_low")
     picture = {"name": "patrol", "about": "", "main": main, "interrupts": [interrupt], "count": 3}
-    data = {"corner": {"Place": {"name": "corner_2", "x": 1.0, "y": 1.0, "heading": 0.0}}}
+    shown = {"corner": "corner 2", "chores": ", ".join(f"room {turn}: vacuum 5 s" for turn in range(9))}
     look = {"mission": "patrol", "version": 1, "began": 1.0, "transitions": []}
-    return {**look, "state": state, "statuses": statuses, "data": data, "picture": picture}
+    return {**look, "state": state, "statuses": statuses, "shown": shown, "picture": picture}
 
 
 def listed(state: str) -> list[dict[str, Any]]:
@@ -54,7 +54,10 @@ def test_a_mission_is_seen_live_and_every_status_has_a_word(
     page = open_page(page_name="mission")
     step = page.get_by_role("treeitem").filter(has_text="go_to $corner").last
     expect(step).to_contain_text("running")
-    expect(page.get_by_label("Data")).to_contain_text("corner_2")
+    rows = page.get_by_label("Data").get_by_role("row")
+    expect(rows).to_contain_text(["cornercorner 2Set", "choresroom 0: vacuum 5 s, room 1"])
+    lines = "cell => { const all = new Range(); all.selectNodeContents(cell); return all.getClientRects().length; }"
+    assert rows.get_by_role("rowheader", name="chores").evaluate(lines) == 1  # a long value does not break the name
     interrupt = page.get_by_role("treeitem").filter(has_text="battery_low")
     expect(interrupt).to_contain_text("not yet")
     patrol.show(LOOK_AT, seen("running", {"0": 1, "1": 2, "2": 1}))

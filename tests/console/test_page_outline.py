@@ -370,7 +370,7 @@ def test_the_state_in_which_the_robot_is_stands_out_in_the_graph(
     robot = project.compiled({}).robot
     picture = picture_of(robot.missions["fetch"].program, robot.names)
     numbers = {one.name or one.role: one.number for one in picture.main.all()}
-    seen = {"mission": "fetch", "state": "running", "began": 0.0, "data": {}, "transitions": []}
+    seen = {"mission": "fetch", "state": "running", "began": 0.0, "shown": {}, "transitions": []}
     statuses = {str(numbers["home"]): RUNNING}
     look = {**seen, "statuses": statuses, "picture": picture_to_data(picture)}
     gateway.windows["mission/LookAtAll/mission/fetch"] = look

@@ -182,6 +182,10 @@ def test_a_router_listens_at_its_port_or_somebody_else_does() -> None:
     assert told("ports", replace(up, listeners={7447: Listener(HERE.pid, "")})) == [
         ("ok", "port 7447: router of cart, open to every user of this machine")
     ]
+    more = {7447: Listener(HERE.pid, ""), 8080: Listener(HERE.pid, "", is_open=True), 9: Listener(1, "", is_open=True)}
+    assert told("ports", replace(up, listeners=more))[1:] == [
+        ("ok", "port 8080: process router of cart, open to the network")
+    ]
     private = running(replace(state(processes={"router": HERE}), router="unixsock-stream//run/user/7/bus/router"))
     assert told("ports", replace(FINE, running=(private,))) == [
         ("ok", "the bus of cart takes programs of this user only")
@@ -339,11 +343,13 @@ def test_a_name_belongs_to_one_examination() -> None:
 
 
 def test_the_machine_tells_who_listens_what_it_may_and_what_is_installed() -> None:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        listener.listen()
-        found = machine.listeners()[listener.getsockname()[1]]
+    with socket.socket() as listener, socket.socket() as open_one:
+        for each, address in ((listener, "127.0.0.1"), (open_one, "")):
+            each.bind((address, 0))
+            each.listen()
+        found, others = (machine.listeners()[each.getsockname()[1]] for each in (listener, open_one))
     assert found.pid == os.getpid()
+    assert (found.is_open, others.is_open) == (False, True)
     assert "python" in found.title or "pytest" in found.title
     assert machine.limits().shared_memory is not None
     versions = {version.name: version for version in machine.versions()}

@@ -48,7 +48,7 @@ def test_news_are_what_changed_and_add_up_to_what_is_there() -> None:
         known = joined(known, entry)
     whole = robot.mission.handle(LookAtAll("test"))
     assert known["state"] == "success"
-    own = ("picture", "whole", "version")
+    own = ("picture", "shown", "whole", "version")
     seen, there = ({key: one for key, one in each.items() if key not in own} for each in (known, whole))
     assert seen == there
     assert [one["data"] for one in window.news[1:4]] == [{"round": 2}, {"round": 3}, {}]

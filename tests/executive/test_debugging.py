@@ -20,6 +20,7 @@ from rbxcompose.missions.execution.requests import (
     ListData,
     ListMissions,
     ListOutcomes,
+    LookAtAll,
     LookAtMission,
     PauseMission,
     ResumeMission,
@@ -287,8 +288,9 @@ def test_what_is_listed_of_the_data_can_be_written_back() -> None:
     }
     robot.mission.handle(SetMissionData(given))
     assert robot.mission.missions.runs["test"].engine.data == before
-    shown = robot.mission.handle(LookAtMission("test"))["shown"]
-    assert (shown["left"], shown["seen"]) == ("25 %", "hall: 2 m, kitchen: 0.3 m")
+    for look in (LookAtMission("test"), LookAtAll("test")):
+        shown = robot.mission.handle(look)["shown"]
+        assert (shown["left"], shown["seen"]) == ("25 %", "hall: 2 m, kitchen: 0.3 m")
 
 
 def test_data_keep_their_types_within_lists_and_maps_and_places_stay_places() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rbxcompose.base.config import Place
 from rbxcompose.base.expressions.types import TYPES
-from rbxcompose.base.expressions.values import Value
+from rbxcompose.base.expressions.values import NOT_ARRIVED, Value
 from rbxcompose.missions.engine.world import show, show_briefly
 from tests.loops import for_all
 
@@ -21,6 +21,7 @@ from tests.loops import for_all
         ("flag", True, "true", "true"),
         ("ratio", -1e308, "-inf %", "-inf %"),
         ("place", None, "None", "None"),  # nothing that a mission knows
+        ("place", NOT_ARRIVED, "nothing yet", "nothing yet"),
     ],
 )
 def test_values_have_the_unit_of_their_type(type_name: str, value: Value, whole: str, brief: str) -> None:

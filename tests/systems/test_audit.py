@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,11 @@ import pytest
 from rbxcompose.commands.main import main
 from rbxcompose.compiler.plan.model import LinkTls
 from rbxcompose.compiler.systems.certificates import common_name, make_authority, make_certificate, tls_of
+from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.compiler.systems.share import NETWORK, ReachableKey, listeners, reachable_keys
+from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
+from rbxcompose.runtime.processes import Process, boot_id
+from rbxcompose.runtime.supervision.request_handler import described
 from rbxcompose.tools.commands.security import certificate_findings
 from tests.systems.test_shares import SYSTEM
 
@@ -31,6 +36,48 @@ def test_with_certificates_a_key_is_for_the_hosts_that_declare_it_and_else_for_e
     assert {key.written_by for key in open_.values()} == {(NETWORK,)}
     assert not any(key.is_open for key in closed.values())
     assert not any(listener.is_open for listener in listeners(replace(SYSTEM, security="mtls")))
+
+
+FLEET = """
+rbx: 1
+kind: System
+name: fleet
+hosts: {here: {}}
+robots: {cart: {robot: robot.yaml, instances: 2}}
+"""
+CART = "rbx: 1\nkind: Robot\nname: cart\nconsole: {port: 8190, listen: lan, foxglove: true}\n"
+
+
+def test_consoles_are_listed_and_of_a_robot_that_is_up_the_ports_that_it_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    (tmp_path / "robot.yaml").write_text(CART, encoding="utf-8")
+    path = tmp_path / "system.yaml"
+    path.write_text(FLEET, encoding="utf-8")
+
+    def audited() -> list[str]:
+        assert main(["security", "audit", str(path)]) == 0
+        return [line for line in capsys.readouterr().out.splitlines() if line.startswith("here  cart_2  ")]
+
+    router, control, page, foxglove = audited()
+    assert router.endswith("  tcp/127.0.0.1:7448  programs of here, no proof asked")
+    assert "  http://*:8191  machines of the network, for the console and rosbridge, the token of a role" in page
+    assert foxglove.endswith("  ws://127.0.0.1:8765  programs of here, for Foxglove, no proof asked")
+    folder, plan = RobotFolder.of("cart_2"), compile_system(str(path), environment={}).robots["cart_2"].plan
+    (gateway,) = [one for one in plan.instances if one.type == "gateway"]
+    local = replace(gateway, config=gateway.config.model_copy(update={"listen": "local", "foxglove": 0}))
+    up = [ComponentState("gateway", "gateway", "active", "gateway", None, 0)]
+    folder.make()
+    supervisor = Process.of(os.getpid())
+    folder.write_state(RobotState("cart_2", "robot.yaml", supervisor, {}, up, "tcp/127.0.0.1:7449", boot_id()))
+    monkeypatch.setattr(Process, "is_titled", lambda self, prefix: True)
+    monkeypatch.setattr("rbxcompose.tools.commands.security.ask", lambda folder, request: (described(local),))
+    assert audited() == [
+        router.replace("7448", "7449"),
+        control,
+        "here  cart_2  http://127.0.0.1:8191  programs of here, for the console and rosbridge, no proof asked",
+    ]
 
 
 def certified(folder: Path, host: str = "desk", days: int = 100) -> LinkTls:

@@ -45,7 +45,7 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
   const isOwn = name === robot.config.robot;
   const link = isOwn ? robot.link : new Rosbridge(`${url.replace(/^http/, "ws")}rosbridge`);
   const state = h("p", { class: "fleet-state", role: "status" });
-  const mission = h("p", { class: "fleet-mission" }, runningText(null));
+  const mission = h("p", { class: "fleet-mission" });
   const health = h("p", { class: "fleet-health" });
   const charges = h("div", { class: "fleet-charges" });
   const open = isOwn ? h("span", { class: "label" }, "This page") : h("a", { href: url, class: "button" }, "Open");
@@ -59,21 +59,29 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
     charges,
   );
   let stoppedBy = "";
+  let isKnown = false; // it has said how it is since the connection was opened
+  let isRefused = false; // it tells nothing to who has not opened its link
   const showState = () => {
-    const is = link.state.value.is;
-    const lost = is !== "open";
-    element.classList.toggle("lost", lost);
-    if (lost) place.pose = null;
-    const [picture, words]: [Icon, string] = lost
-      ? ["unlink", is === "connecting" ? "Connecting\u2026" : "Does not answer"]
-      : stoppedBy
+    element.classList.toggle("unknown", !isKnown);
+    if (!isKnown) {
+      place.pose = null;
+      setText(mission, "");
+      health.replaceChildren();
+    }
+    const [picture, words]: [Icon, string] = isKnown
+      ? stoppedBy
         ? ["stop", `Stopped by ${stoppedBy}`]
-        : ["link", "Up"];
+        : ["link", "Up"]
+      : isRefused
+        ? ["unlink", "Nothing is known of it. Open its link, which `rbxcompose up` printed, in this browser."]
+        : ["unlink", link.state.value.is === "lost" ? "Does not answer" : "Connecting\u2026"];
     state.replaceChildren(icon(picture), words);
   };
   const gauges = new Map<string, () => void>();
   const showStatus = (status: Json) => {
     if (!isMessage(status)) return;
+    isKnown = true;
+    isRefused = false;
     stoppedBy = isMessage(status.stop) ? String(status.stop.by) : "";
     showState();
     for (const [battery, gauge] of Object.entries(isMessage(status.batteries) ? status.batteries : {})) {
@@ -100,10 +108,20 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
   };
   const timer = setInterval(() => void follow(), LOOK);
   let isClosed = false;
-  const closers = [
-    link.state.watch((state) => {
+  let wasOpen = false;
+  if (!isOwn) {
+    link.onStatus = ({ level }) => {
+      isRefused ||= level === "error" && !isKnown;
       showState();
-      if (state.is === "open") void follow();
+    };
+  }
+  const closers = [
+    link.state.watch(({ is }) => {
+      isKnown &&= is === "open";
+      isRefused &&= is !== "lost" || wasOpen; // it lets strangers go after a while
+      wasOpen = is === "open";
+      showState();
+      if (is === "open") void follow();
     }),
     link.watch("robot/RobotStatus", showStatus, SLOW),
     link.watch("mission/ListMissions", (missions) => setText(mission, runningText(missions)), SLOW),

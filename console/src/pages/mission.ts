@@ -286,7 +286,7 @@ class MissionView {
     if (!isSeen(answer)) return;
     const seen = (this.#seen = answer as unknown as Seen);
     this.#tree?.show(seen, this.#tested);
-    this.#data.show(seen.data, this.#mayOperate && ACTIVE.has(seen.state) && seen.state !== "waiting");
+    this.#data.show(seen.shown, this.#mayOperate && ACTIVE.has(seen.state) && seen.state !== "waiting");
     const moves = seen.transitions.slice(-5).map(({ state, to, outcome }) => h("li", {}, `${state} \u2192 ${to} (${outcome})`));
     this.#moves.replaceChildren(...(moves.length > 0 ? [h("h2", {}, "Last transitions"), h("ol", { class: "lines" }, ...moves)] : []));
     this.#showHead();

@@ -8,10 +8,11 @@ fetches it from there, and gives it to the bus of its robot.
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.bus.endpoints import tcp_endpoint
+from rbxcompose.bus.endpoints import LOOPBACK, is_private, tcp_endpoint
 from rbxcompose.compiler.model.robot import resolve
 from rbxcompose.compiler.plan.model import Exchange, HostAccess, OtherHost, Plan, Share, SharedWire
 from rbxcompose.compiler.systems.certificates import MUTUAL, NO_SECURITY, common_name
@@ -19,7 +20,7 @@ from rbxcompose.compiler.systems.cut_link import lease_of
 from rbxcompose.compiler.systems.model import Crossing, PlacedRobot, System, TopicEnd
 from rbxcompose.compiler.systems.neighbours import with_fleet
 from rbxcompose.manifest.system_file import PRIORITIES, LinkModel
-from rbxcompose.sdk.capabilities import RunsMissions
+from rbxcompose.sdk.capabilities import RunsMissions, ServesPage
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Qos, Serves, ServesAction
 from rbxcompose.sdk.registry import declared
 
@@ -351,16 +352,41 @@ class ReachableKey:
     is_open: bool  # to strangers
 
 
-def listeners(system: System) -> Iterator[ListeningEndpoint]:
-    """Yield what listens on each host of a system."""
+@dataclass(frozen=True, slots=True)
+class OpenedEndpoints:
+    """What a robot that is up has opened on a host: its ports may be others than planned, if those were taken."""
+
+    router: str
+    pages: tuple[ServesPage, ...]
+
+
+def _planned(robot: PlacedRobot, host: str) -> OpenedEndpoints:
+    bus, mine = robot.plan.bus, (one for one in robot.plan.instances if robot.hosts[one.name] == host)
+    pages = (page for one in mine for page in declared(one.type, one.config, ServesPage))
+    return OpenedEndpoints(tcp_endpoint(bus.port) if bus.access == "machine" else "", tuple(pages))
+
+
+def listeners(
+    system: System, opened: Mapping[tuple[str, str], OpenedEndpoints] = MappingProxyType({})
+) -> Iterator[ListeningEndpoint]:
+    """Yield what listens on each host of a system: what is `opened` there, by robot and host, else what is planned."""
     for robot in system.robots.values():
         for host in hosts_of(system, robot):
-            bus, here = robot.plan.bus, f"programs of {host}"
-            if bus.router is None and bus.access == "machine":
-                yield ListeningEndpoint(host, robot.name, f"tcp/127.0.0.1:{bus.port}", here, "no proof asked", False)
-            elif bus.router is None:
+            here, there = f"programs of {host}", opened.get((robot.name, host)) or _planned(robot, host)
+            if robot.plan.bus.router is None and there.router and not is_private(there.router):
+                yield ListeningEndpoint(host, robot.name, there.router, here, "no proof asked", False)
+            elif robot.plan.bus.router is None:
                 yield ListeningEndpoint(host, robot.name, "sockets in its folder", here, "the same user", False)
             yield ListeningEndpoint(host, robot.name, "control socket in its folder", here, "the same user", False)
+            for page in there.pages:
+                is_lan, what = page.listen.value == "lan", "for the console and rosbridge"
+                whom = f"machines of the network, {what}" if is_lan else f"{here}, {what}"
+                proof = "the token of a role, not encrypted" if is_lan else "no proof asked"
+                at = f"http://{'*' if is_lan else LOOPBACK}:{page.port.value}"
+                yield ListeningEndpoint(host, robot.name, at, whom, proof, False)
+                if page.foxglove.value:
+                    at, whom = f"ws://{LOOPBACK}:{page.foxglove.value}", f"{here}, for Foxglove"
+                    yield ListeningEndpoint(host, robot.name, at, whom, "no proof asked", False)
             for endpoint in listens(system, robot, host):
                 yield ListeningEndpoint(
                     host, robot.name, endpoint, "machines of the network", *_PROOFS[system.security]

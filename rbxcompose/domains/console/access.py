@@ -13,7 +13,7 @@ import ipaddress
 import os
 import secrets
 import socket
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from enum import IntEnum
 from fnmatch import fnmatchcase
@@ -205,24 +205,34 @@ class Door:
     """Of this machine in the network."""
     origins: frozenset[str] = frozenset()
     """Of other pages: `http://localhost:8181`."""
+    fleet: Collection[str] = ()
+    """Where pages of its system are: `ADDRESS:PORT`, without an address on this machine."""
 
     def lets_in(self, host: str, origin: str) -> bool:
         """Return whether a request with these headers comes from a page that may, or from no page."""
-        host, origin = host.lower(), origin.lower()
-        name, _, port = host.rpartition(":") if host.rpartition(":")[2].isdecimal() else (host, "", str(self.port))
+        (name, port), origin = self._place(host), origin.lower()
         if port != str(self.port) or not self._is_own(name):
             return False
         if not origin or origin in self.origins:
             return True
-        shown = origin.removeprefix("http://")
-        shown = shown if self.port != 80 or ":" in shown else f"{shown}:80"
-        return origin.startswith("http://") and self._is_page(shown, f"{name}:{port}")
+        scheme, _, shown = origin.partition("://")
+        page, port = _split(shown, "80")
+        is_same = page == name or {page, name} <= {*LOCAL_NAMES}
+        is_near = is_same and (port == str(self.port) or f":{port}" in self.fleet)
+        return scheme == "http" and (is_near or f"{page}:{port}" in self.fleet)
 
-    def _is_page(self, shown: str, asked: str) -> bool:
-        if shown == asked:
-            return True
-        own = {f"{name}:{self.port}" for name in LOCAL_NAMES}
-        return shown in own and asked in own
+    def sources(self, host: str) -> str:
+        """Return what a page that was opened by this header may connect to, as a policy has it.
+
+        A policy cannot name addresses of IPv6.
+        """
+        name = self._place(host)[0]
+        places = (f"{name}{place}" if place.startswith(":") else place for place in self.fleet)
+        shown = sorted(place for place in places if place.count(":") == 1) if self._is_own(name) else ()
+        return " ".join(("'self'", *(f"ws://{place}" for place in shown)))
+
+    def _place(self, host: str) -> tuple[str, str]:
+        return _split(host.lower(), str(self.port))
 
     def _is_own(self, name: str) -> bool:
         if name in LOCAL_NAMES:
@@ -234,6 +244,12 @@ class Door:
         except ValueError:
             return name in self.names
         return True
+
+
+def _split(place: str, port: str) -> tuple[str, str]:
+    """Return the name and the port of a place: this one if it has none."""
+    name, _, number = place.rpartition(":")
+    return (name, number) if number.isdecimal() else (place, port)
 
 
 def network_names() -> tuple[str, ...]:

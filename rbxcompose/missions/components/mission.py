@@ -525,8 +525,9 @@ class Mission(Component[MissionConfig]):
 
     @answers(requests.LookAtAll)
     def look_at_all(self, request: requests.LookAtAll) -> requests.Seen:
-        """Return the state of a mission, with its picture."""
-        return {**self.missions.seen(request.mission), "picture": self.missions.picture(request.mission)}
+        """Return the state of a mission, with its picture, and all of its data as text under `shown`."""
+        missions, name = self.missions, request.mission
+        return {**missions.seen(name), "picture": missions.picture(name), "shown": missions.shown(name)}
 
     @answers(requests.ReadLog)
     def log_part(self, request: requests.ReadLog) -> requests.LogPart:

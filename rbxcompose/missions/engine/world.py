@@ -45,7 +45,7 @@ def show(type: Type | None, value: Value, *, briefly: bool = False, places: Coll
         return value.name.replace("_", " ")
     if is_located(value):
         return f"({format_number(value.x)} m, {format_number(value.y)} m)"
-    return str(value)
+    return "nothing yet" if isinstance(value, NotArrived) else str(value)
 
 
 def show_briefly(type: Type | None, value: Value) -> str:

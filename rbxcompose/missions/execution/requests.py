@@ -303,7 +303,7 @@ class LookAtMission(_Query[Seen]):
 
 @dataclass(frozen=True, slots=True)
 class LookAtAll(_Query[Seen]):
-    """Query the full state of a mission, with its picture under `picture`."""
+    """Query the full state of a mission, with its picture under `picture`, and its data for people under `shown`."""
 
     mission: str
 

@@ -1,7 +1,8 @@
 """Make the certificates of a system's hosts, or list what listens where and who may reach it.
 
 `init` makes an authority, once, and new certificates for all hosts, and brings them to those with `ssh`; repeat it
-before they expire. `audit` exits with 1 if anything off loopback takes strangers, or if other hosts will refuse a
+before they expire. Of robots that are up on this machine, `audit` lists the ports that they have, else those of the
+plan. It exits with 1 if anything off loopback takes strangers, who need no proof, or if other hosts will refuse a
 certificate that is on this machine.
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
@@ -11,19 +12,24 @@ import json
 import os
 import subprocess
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import groupby
 from pathlib import Path
 
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import Finding, Report, Severity, kind
-from rbxcompose.base.requests import to_data
+from rbxcompose.base.requests import Refused, to_data
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
+from rbxcompose.commands.lookup import known_state, robots_up
 from rbxcompose.commands.options import Subcommand, add_actions, add_system_options, argument, is_system, run_action
 from rbxcompose.commands.targets import system_without_errors
 from rbxcompose.compiler.plan.model import LinkTls
 from rbxcompose.compiler.systems import certificates
 from rbxcompose.compiler.systems.model import System
-from rbxcompose.compiler.systems.share import listeners, reachable_keys
+from rbxcompose.compiler.systems.share import OpenedEndpoints, listeners, reachable_keys
+from rbxcompose.runtime.control import NoAnswerError, ask
+from rbxcompose.runtime.requests import DescribeRobot
+from rbxcompose.sdk.capabilities import ServesPage, Setting
 
 GROUP = "system"
 NOT_MADE = kind("RBX6116")
@@ -90,7 +96,7 @@ def _bring(system: System, host: str, folder: Path, arguments: argparse.Namespac
 
 
 def _audit(system: System, arguments: argparse.Namespace) -> int:
-    endpoints, keys = list(listeners(system)), list(reachable_keys(system))
+    endpoints, keys = list(listeners(system, dict(_opened(system)))), list(reachable_keys(system))
     report = Report([*_certificates(system, arguments.path)])
     if arguments.json:
         emit(json.dumps({"listeners": to_data(endpoints), "keys": to_data(keys)}))
@@ -103,6 +109,19 @@ def _audit(system: System, arguments: argparse.Namespace) -> int:
             emit(f"{host}  {robot}  written, called or answered by {who}: {', '.join(item.name for item in same)}")
     write_report(report, {})
     return FINDINGS if report.has_errors or any(endpoint.is_open for endpoint in endpoints) else 0
+
+
+def _opened(system: System) -> Iterator[tuple[tuple[str, str], OpenedEndpoints]]:
+    """Yield what robots of the system that are up on this machine have opened, by robot and host."""
+    for folder in robots_up():
+        robot, state = system.robots.get(folder.path.name), known_state(folder)
+        if robot is None or state is None or state.router is None or not state.is_supervised:
+            continue
+        with suppress(NoAnswerError, Refused):  # it has just begun, or ends
+            pages = (page for one in ask(folder, DescribeRobot()) for page in one.capabilities.get("ServesPage", ()))
+            found = tuple(ServesPage(**{name: Setting(value) for name, value in page.items()}) for page in pages)
+            for host in {robot.hosts[one.name] for one in state.components if one.name in robot.hosts}:
+                yield (robot.name, host), OpenedEndpoints(state.router, found)
 
 
 def _certificates(system: System, path: str) -> Iterator[Finding]:

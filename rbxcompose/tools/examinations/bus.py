@@ -25,9 +25,10 @@ _MOST_NAMES = 8  # names
 
 @examination
 def ports(facts: HostFacts) -> Iterator[str | Finding]:
-    """Check the routers of robots that are up, and the port that the named robot needs."""
+    """Check the routers of robots that are up and what else of them is open, and the port that the named one needs."""
     for robot in facts.running:
         yield from _router(robot, facts)
+        yield from _open_to_network(robot, facts)
     names = {running_robot.name for running_robot in facts.running}
     if facts.file is None:
         wanted = [] if facts.running else [BusModel().port]
@@ -60,6 +61,13 @@ def _router(robot: RunningRobot, facts: HostFacts) -> Iterator[str | Finding]:
     words = "nothing listens there" if taken is None else f"{_who(taken)} listens there"
     message = f"the router of '{robot.name}' should listen at port {port}, but {words}"
     yield NO_LISTENER.at(None, message, help=f"rbxcompose down {robot.name}")
+
+
+def _open_to_network(robot: RunningRobot, facts: HostFacts) -> Iterator[str]:
+    names = {process.pid: name for name, process in robot.state.processes.items()} if robot.state else {}
+    for port, listener in sorted(facts.listeners.items()):
+        if listener.is_open and listener.pid in names:
+            yield f"port {port}: process {names[listener.pid]} of {robot.name}, open to the network"
 
 
 def _who(taken: Listener) -> str:

@@ -10,17 +10,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import (
-    AsyncIterator,
-    Awaitable,
-    Callable,
-    Coroutine,
-    Iterable,
-    Iterator,
-    Mapping,
-    MutableMapping,
-    Sequence,
-)
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterable, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import suppress
 from functools import cached_property, partial
@@ -181,6 +171,7 @@ class Gateway(Component[GatewayConfig]):
             Setting(config.drive_topic, "drive_topic"),
             Setting(config.fleet, "fleet"),
             Setting(config.camera, "camera"),
+            Setting(config.foxglove, "foxglove"),
         )
         foxglove = (NeedsExtra(Setting("foxglove"), Setting("foxglove")),) if config.foxglove else ()
         return (page, *needed, *foxglove)
@@ -405,12 +396,6 @@ class _Unsent:
     def cancel(self) -> None:
         """Do not send it."""
         self.is_cancelled = True
-
-
-def _places(addresses: Iterable[str]) -> Iterator[str]:
-    """Yield the hosts with ports of pages; one without a host is on this machine, by each of its names."""
-    for address in addresses:
-        yield from (f"{name}{address}" for name in LOCAL_NAMES) if address.startswith(":") else (address,)
 
 
 def words_of(failure: Mapping[str, Any]) -> str:
@@ -722,15 +707,9 @@ class GatewaySession:
 
     def _guarded(self, application: Any) -> Callable[..., Awaitable[None]]:
         """Return the application behind a door that pages of others do not pass."""
-        fleet = sorted(_places(self.config.fleet.values()))  # a page shows all robots of its system
-        origins = frozenset((*self.config.origins, *(f"http://{place}" for place in fleet)))
-        is_lan = self._secret is not None
-        door = Door(self.config.port, is_lan, network_names() if is_lan else (), origins)
-        # A policy cannot name addresses of IPv6.
-        policy = "; connect-src ".join(
-            (_POLICY, " ".join(("'self'", *(f"ws://{place}" for place in fleet if "[" not in place))))
-        )
-        hardening = ((b"content-security-policy", policy.encode()), *_HEADERS)
+        is_lan, fleet = self._secret is not None, tuple(self.config.fleet.values())
+        names = network_names() if is_lan else ()
+        door = Door(self.config.port, is_lan, names, frozenset(self.config.origins), fleet)
 
         async def guarded(scope: MutableMapping[str, Any], receive: Any, send: Any) -> None:
             headers = dict(scope["headers"])
@@ -746,6 +725,8 @@ class GatewaySession:
 
             async def hardened(message: MutableMapping[str, Any]) -> None:
                 if message["type"] == "http.response.start":
+                    policy = f"{_POLICY}; connect-src {door.sources(host)}"
+                    hardening = ((b"content-security-policy", policy.encode()), *_HEADERS)
                     message["headers"] = [*message.get("headers", ()), *hardening]
                 await send(message)
 
