@@ -197,7 +197,8 @@ class Guest:
 
         def note(number: int, frame: FrameType | None) -> None:
             self.is_interrupted = True
-            signal.signal(number, before[signal.Signals(number)])
+            for each, handler in before.items():  # whichever of them the second one is
+                signal.signal(each, handler)
             self._inbox.put(NAME, interrupted)
 
         with handling(note):

@@ -262,7 +262,10 @@ def send(guest: Guest, arguments: argparse.Namespace) -> int:
     ends: list[Ended[Any]] = []
     sent = client(goal, ends.append, lambda feedback: _tell("feedback", feedback, arguments.json))
     with guest.interruptible(sent.cancel):
-        guest.run(lambda: bool(ends))
+        guest.run(lambda: bool(ends) or guest.is_interrupted)
+        if not guest.run(lambda: bool(ends), arguments.timeout):
+            words = f"'{found.name}': the goal has not ended within {arguments.timeout:g} s of the request to cancel it"
+            return refuse(NOBODY.at(None, f"{words}; its server may still carry it out"))
     return _end(ends[0], found.name, guest.is_interrupted, arguments.json)
 
 

@@ -306,6 +306,7 @@ class Failed:
 
     instance: str
     message: str
+    time: float = 0.0  # [s] of robot time
 
 
 @dataclass(frozen=True, slots=True)

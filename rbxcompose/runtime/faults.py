@@ -37,19 +37,22 @@ class RestartPolicy:
             self._tried += now - self._began
             self._began = None
 
-    def after_failure(self, now: float) -> float | None:
+    def after_failure(self, now: float, *, stands: bool = False) -> float | None:
         """Return the pause before the next try [s], or None if there is none.
 
         The pause stays short enough for `max` failures to fit into `within`: otherwise none would be the last.
+        While time `stands` still, no pause would end: the next try comes at once, and even `always` has a last one.
         """
         limits = self._restart
         self.ready(now)
         now -= self._tried
         self._failures.append(now)
         recent = sum(1 for time in self._failures if now - time <= limits.within)
-        if not self.is_allowed or (limits.when == "on_failure" and recent >= limits.max):
+        if not self.is_allowed or ((stands or limits.when == "on_failure") and recent >= limits.max):
             return None
         self.restarts += 1
+        if stands:
+            return 0.0
         return float(min(limits.backoff * 2.0 ** (recent - 1), limits.within / limits.max))
 
 

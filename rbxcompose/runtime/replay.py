@@ -485,7 +485,7 @@ def replayed(
     stage = ReplayStage(scheduler, services.is_served)
     tape = Tape(clock, lambda topic: None, sent)
     bus = StageBus(scheduler, clock, alone, only.name, stage, tape)
-    host = Host(alone, [only], scheduler, clock, bus, log, lambda notice: None)
+    host = Host(alone, [only], scheduler, clock, bus, log, lambda notice: None, stands_until_start=True)
     feed = ReplayFeed(iter(records), only.name, alone.bus.domain, stage, services, aliases, comparison.expect)
     host.configure()
     feed.begin(scheduler, host)

@@ -2,18 +2,75 @@
 
 from __future__ import annotations
 
+import argparse
+import selectors
+import signal
 from contextlib import ExitStack
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
+from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.zenoh_session import open_router
+from rbxcompose.commands import messages
+from rbxcompose.commands.console import ENDINGS
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
+from rbxcompose.msgs import registry
+from rbxcompose.runtime.process_group.connection import CallbackInbox
 from tests.programs.test_child import eventually
 from tests.systems.test_links import free_port
 
 MANY = 1000  # tokens, more than Zenoh's channels take
+
+
+class Alone(Guest):
+    """A guest with a loop but no session; the server of its only action takes each goal, and never ends it."""
+
+    def __init__(self) -> None:
+        self.clock, self.scheduler, self.is_interrupted = MonotonicClock(), Scheduler(), False
+        self._inbox, self._selector, self._bus = CallbackInbox(), selectors.SelectSelector(), None
+        self.transport: Any = SimpleNamespace(close=lambda: None)
+        self._selector.register(self._inbox, selectors.EVENT_READ, lambda: None)
+        self.cancels = 0
+
+    def graph(self) -> Any:
+        return SimpleNamespace(actions=())
+
+    def bus(self, kind: object = None) -> Any:
+        return SimpleNamespace(action_client=lambda owner, name, action: self)
+
+    is_available = True
+
+    def __call__(self, *_: object) -> Alone:
+        self.scheduler.post("", lambda: signal.raise_signal(signal.SIGTERM))
+        return self
+
+    def cancel(self) -> None:
+        self.cancels += 1
+
+
+def test_a_goal_that_does_not_end_when_it_is_cancelled_is_left_after_the_timeout(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(messages, "wanted", lambda *_: SimpleNamespace(name="/say", kinds=[None]))
+    monkeypatch.setattr(messages, "type_of", lambda *_: registry.action("rbxcompose_msgs/action/Say"))
+    with Alone() as guest:
+        assert messages.send(guest, argparse.Namespace(name="/say", content="", timeout=0.01, json=False)) == 1
+    assert guest.cancels == 1
+    assert "'/say': the goal has not ended within 0.01 s of the request to cancel it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("first", ENDINGS)
+def test_after_an_interrupt_each_signal_does_what_it_did_before(first: signal.Signals) -> None:
+    before = [signal.getsignal(number) for number in ENDINGS]
+    with Alone() as guest, guest.interruptible():
+        signal.raise_signal(first)
+        assert guest.is_interrupted
+        assert [signal.getsignal(number) for number in ENDINGS] == before
 
 
 @pytest.mark.parametrize("stays", [False, True])

@@ -386,6 +386,21 @@ def test_on_a_stepped_clock_nobody_looks_for_silence() -> None:
     assert stage.scheduler.next_due() is None
 
 
+def test_on_a_stepped_clock_the_end_of_a_process_ends_the_robot_but_that_of_the_router_does_not() -> None:
+    stage = Stage(options=RunOptions(is_stepped=True)).start()
+    stage.exit("router")
+    assert not stage.conductor.is_going_down
+    stage.exit("robot", "hung for 30 s in step of 'lidar' and ended itself")
+    assert stage.conductor.exit_code == 4
+    assert stage.conductor.reason.startswith("process 'robot' hung for 30 s in step of 'lidar' and ended itself")
+
+
+def test_a_failure_is_told_with_the_time_at_which_it_happened() -> None:
+    stage = Stage(options=RunOptions(is_stepped=True)).start()
+    stage.speak("robot", say.Failed("mux", "'mux' failed too often: no", 1.5))
+    assert stage.conductor.time == 1.5
+
+
 # Facts
 
 

@@ -224,8 +224,9 @@ def test_a_process_that_dies_again_and_again_fails_the_robot(robot: Robot) -> No
     assert "too often to continue" in output
 
 
-def test_a_component_that_cannot_be_configured_ends_the_start_with_its_reason(robot: Robot) -> None:
-    process = robot.up("-d", is_broken=True)
+@pytest.mark.parametrize("option", ["-d", "--stepped"])
+def test_a_component_that_cannot_be_configured_ends_the_start_with_its_reason(robot: Robot, option: str) -> None:
+    process = robot.up(option, is_broken=True)
     output, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 4
     assert "'second' failed too often: configure raised OSError: no such device" in output
@@ -251,6 +252,16 @@ def test_on_a_stepped_clock_two_runs_write_the_same_log(robot: Robot, options: l
     assert logs[0] == logs[1]
     assert logs[0].count(b"deactivated") == 2
     assert robot.texts("second")[-2:] == ["braking", "deactivated"]
+
+
+def test_on_a_stepped_clock_the_failure_that_is_one_too_many_ends_the_run_at_its_instant(robot: Robot) -> None:
+    process = robot.up("--stepped", "--duration", "1000", fails_at=0.3)
+    process.communicate(timeout=PATIENCE)
+    assert process.returncode == 4
+    records = read_log(robot.folder.path / NAME)
+    *_, last, told = (record.time for record in records if "no such device" in record.text)
+    assert 0.3 < last == told
+    assert [record.time for record in records if record.text == "braking"] == [last]
 
 
 @pytest.mark.soak  # how a run ends is tried by virtual time

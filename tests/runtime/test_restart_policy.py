@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -55,6 +56,12 @@ def test_never_means_no_try_at_all() -> None:
 def test_always_means_that_there_is_no_last_try() -> None:
     policy = RestartPolicy(restart("always"))
     assert None not in [policy.after_failure(0.01 * number) for number in range(50)]
+
+
+@pytest.mark.parametrize("when", ["on_failure", "always"])
+def test_while_time_stands_still_tries_follow_at_once_and_the_fifth_failure_is_the_last(when: When) -> None:
+    policy = RestartPolicy(restart(when))
+    assert [policy.after_failure(0.0, stands=True) for _ in range(5)] == [0.0, 0.0, 0.0, 0.0, None]
 
 
 @given(RESTARTS, st.floats(0.0, 1e4))

@@ -1,12 +1,19 @@
 from __future__ import annotations
 
+import socket
 import sys
 from itertools import count
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.runtime.channel import Channel, Start
+from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.process_group.connection import HANG, PERIOD, Watchdog
+from rbxcompose.runtime.process_group.group import ProcessGroup
+from rbxcompose.testing import Bench, instance
 
 MODULE = "rbxcompose.runtime.process_group.connection"
 
@@ -62,3 +69,22 @@ def test_time_in_which_the_process_waits_for_a_processor_does_not_count(monkeypa
 
 def test_it_lives_for_as_long_as_it_is_fed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert periods(monkeypatch, 0.0, fed=100) in (100 + HANG / PERIOD - 1, 100 + HANG / PERIOD)
+
+
+@pytest.mark.parametrize(("is_stepped", "bounds"), [(False, [HANG, HANG]), (True, [60.0, 30.0])])
+def test_a_hang_ends_the_process_on_a_stepped_clock_too_but_only_after_what_a_call_may_take(
+    monkeypatch: pytest.MonkeyPatch, is_stepped: bool, bounds: list[float]
+) -> None:
+    fed: list[float] = []
+    monkeypatch.setattr(Watchdog, "feed", lambda dog, seconds: fed.append(seconds))
+    ours, theirs = socket.socketpair()
+    monkeypatch.setattr("rbxcompose.runtime.process_group.group.gc", Mock())
+    bench = Bench(instance("battery", "battery_sim", {"runtime": "45 s"}), start=False)
+    plan = Plan("robot", "robot.yaml", bench.plan.instances)
+    options, process = RunOptions(is_stepped=is_stepped), plan.groups[0]
+    with ours, theirs:
+        group = ProcessGroup(plan, process, options, None, Channel(ours), start=0.0)  # type: ignore[arg-type]
+        group.beat()
+        group._host = bench.host
+        group.handle(Start())  # a step may hang before the next beat
+    assert fed == bounds

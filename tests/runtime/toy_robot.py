@@ -40,6 +40,8 @@ class ToyConfig(Config):
     """When it needs the robot to stand still [s of robot time]; 0: never."""
     holds_for: float = 1.0
     """How long it needs that [s]."""
+    fails_at: float = 0.0
+    """From when on it raises in each step [s of robot time]; 0: never."""
     hangs_at: float = 0.0
     """When it hangs [s of robot time]; 0: never."""
     waits_for: str = ""
@@ -109,6 +111,8 @@ class Toy(Component[ToyConfig]):
             signal.raise_signal(signal.SIGKILL)
         if self.config.holds_at:
             self.hold_still()
+        if self.config.fails_at and self.now >= self.config.fails_at:
+            raise OSError("no such device")
         if self.config.hangs_at and self.now >= self.config.hangs_at:
             time.sleep(60.0)
         if self.config.runs and self.has_started and self.now >= self.config.runs:

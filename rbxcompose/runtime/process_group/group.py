@@ -41,12 +41,14 @@ from rbxcompose.runtime.process_group.connection import (
 )
 from rbxcompose.runtime.process_group.host import Host, Notice
 from rbxcompose.runtime.process_group.parameters import Deciders
+from rbxcompose.runtime.process_group.worker import LONGEST
 from rbxcompose.runtime.processes import give_back_free_memory
 from rbxcompose.runtime.recording.tape import PLAN, Tape
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
 from rbxcompose.sdk.component import MissionOver, MissionWaits
 from rbxcompose.sdk.parameters import RobotRules
 from rbxcompose.sdk.ports import Qos
+from rbxcompose.sdk.registry import component_type
 
 if TYPE_CHECKING:
     from rbxcompose.runtime.recording.files import Recorder
@@ -451,6 +453,7 @@ class ProcessGroup:
             **({"on_order": tape.order} if tape else {}),
             post=self._inbox.put if isinstance(self._clock, MonotonicClock) else None,
             router="" if self._options.is_stepped else router,
+            stands_until_start=self._options.is_stepped,
             deciders=Deciders(rules=self._rules) if self._options.is_stepped else Deciders(self._channel.send),
         )
         if isinstance(self._driver, ExternalDriver):
@@ -469,6 +472,7 @@ class ProcessGroup:
         gc.freeze()  # what lives now lives until the end: later collections need not inspect it
         give_back_free_memory()
         self._made_host().start(starts_mission)
+        self._watch(HANG)
         if isinstance(self._driver, SteppedDriver):
             self._driver.go(self._options.duration)
         if isinstance(self._driver, RealTimeDriver):
@@ -592,8 +596,9 @@ class ProcessGroup:
                 self._notify(MissionOver(notice.mission, "failure", notice.message))
             return
         self._channel.send(notice)
-        is_the_end = isinstance(notice, MissionOver) and notice.mission == self._plan.start
-        if is_the_end and self._options.is_stepped and not self._options.is_detached:
+        is_over = isinstance(notice, MissionOver) and notice.mission == self._plan.start
+        is_the_end = isinstance(notice, messages.Failed) or (is_over and not self._options.is_detached)
+        if is_the_end and self._options.is_stepped:
             self._is_ending = True  # here and not by a message, which would arrive at another instant in each run
 
     def _printed(self, level: Level, text: str, detail: str) -> None:
@@ -614,8 +619,11 @@ class ProcessGroup:
         self._log.write(Record(self._clock.now(), Level.WARN, owner, text))
 
     def _watch(self, seconds: float) -> None:
-        if not self._options.is_stepped:
-            self._watchdog.feed(seconds)
+        if self._options.is_stepped:  # then calls that may block run here, too, and nothing real waits for them
+            has_started = self._host is not None and self._host.has_started
+            types = (component_type(instance.type) for instance in self._plan.of_group(self._name))
+            seconds = LONGEST if has_started else sum((one.configures_within for one in types), LONGEST)
+        self._watchdog.feed(seconds)
 
     def _on_sigterm(self, number: int, frame: FrameType | None) -> None:
         if not self._has_begun:

@@ -128,9 +128,11 @@ class Host:
         post: Post | None = None,
         deciders: Deciders = NOBODY_ELSE,
         router: str = "",
+        stands_until_start: bool = False,
     ) -> None:
         """Take `on_order`, which is called with each order carried out, so that a recording can be replayed.
 
+        If robot time `stands_until_start`, components that fail before are restarted without a pause.
         With `post`, other threads reach the scheduler's; without it, components that may block run in the scheduler's.
         """
         self.plan, self.clock, self.bus, self.scheduler = plan, clock, bus, scheduler
@@ -142,7 +144,7 @@ class Host:
         self.starts_mission = True  # that of `start`: not when it is over, and not because files have changed
         self.is_braking = False
         self.is_held = False  # robot time stands still
-        self._log, self._post = log, post
+        self._log, self._post, self._stands_until_start = log, post, stands_until_start
         self.owner = f"host_{instances[0].process}" if instances else "host"
         self._wanted: set[str] = set()  # components to activate as soon as possible
         self.statuses = Statuses(self.owner, bus, scheduler, clock)
@@ -467,7 +469,8 @@ class Host:
         self.hosted[name].abandon()
         self.bus.close_owner(name)
         self.scheduler.remove(name)
-        delay = None if self.is_braking else self._policies[name].after_failure(self.clock.now())
+        stands = self._stands_until_start and not self.has_started
+        delay = None if self.is_braking else self._policies[name].after_failure(self.clock.now(), stands=stands)
         self.changed(name)
         if delay is not None:
             hosted = self.hosted[name]
@@ -483,7 +486,7 @@ class Host:
         """Leave a component failed; one that failed too often, unlike one that is never restarted, ends the robot."""
         self.hosted[name].state = Lifecycle.FAILED
         if self._policies[name].is_allowed:  # first: else a starting robot would continue without it
-            self.notify(Failed(name, f"'{name}' failed too often: {text}"))
+            self.notify(Failed(name, f"'{name}' failed too often: {text}", self.clock.now()))
         else:
             self.log(name, Level.WARN, "stays failed: it is never restarted")
         self.changed(name)

@@ -221,7 +221,8 @@ class Conductor:
             case messages.States(states):
                 self._are(states)
                 self._proceed()
-            case messages.Failed(instance, text):
+            case messages.Failed(instance, text, time):
+                self.time = max(self.time, time)
                 self._failed(instance, text)
             case messages.Repeated() | ComponentNoted():
                 self.kept.receive(message)
@@ -297,7 +298,7 @@ class Conductor:
         is_for_good = bool(lost) and all(item.restart.when == "never" for item in lost)
         self._are({item.name: ("failed" if is_for_good else "unconfigured", 0) for item in lost})
         delay = member.policy.after_failure(self._scheduler.now)
-        if name == WORLD:
+        if name == WORLD or (self._options.is_stepped and lost):  # there, one process holds all, with the time
             self.go_down(ROBOT_FAILED, f"process '{name}' {how}, and simulated truth with it", Level.ERROR, detail)
         elif is_for_good:
             self._give_up(member, how, detail)

@@ -67,6 +67,15 @@ ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _OWNER = "supervisor"
 
 
+def with_reason(how: str, printed: str) -> str:
+    """Return how a process ended in words, with the reason that it printed: where it hung, or its error."""
+    _, is_hang, where = printed.rpartition(MARK)
+    if is_hang:
+        return f"hung for {where.splitlines()[0]} and ended itself"
+    has_error = how.startswith("ended with") and "Traceback (most recent call last):" in printed
+    return f"{how}: {printed.splitlines()[-1]}" if has_error else how
+
+
 @dataclass
 class _Child:
     """A child process of the supervisor; its pidfd is known once it has been forked."""
@@ -311,8 +320,7 @@ class Supervisor:
         if child.descriptor is not None:
             os.close(child.descriptor)
         printed = self._printed(name)
-        _, is_hang, where = printed.rpartition(MARK)
-        how = f"hung for {where.splitlines()[0]} and ended itself" if is_hang else how
+        how = with_reason(how, printed)
         if printed and self.conductor.is_going_down:
             self.log(Level.OK, f"process '{name}' {how}; what it had printed is in the log file", printed)
         self.conductor.exited(name, how, printed)

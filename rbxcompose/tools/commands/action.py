@@ -1,7 +1,7 @@
 """List the actions on the bus, or send a goal to one.
 
-`send` prints feedback as it arrives, then the result. An interrupt cancels the goal and waits for its end; a second one
-does not wait.
+`send` prints feedback as it arrives, then the result. An interrupt cancels the goal and waits for its end, at
+most for `--timeout`; a second one does not wait.
 """
 
 import argparse
