@@ -21,6 +21,8 @@ from rbxcompose.msgs import registry
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.runtime.supervision.plan_change import changes
 from rbxcompose.testing.bench import Bench, SystemBench
+from rbxcompose.tools.exporting.viewers import heard
+from rbxcompose.tools.inspection.plan_text import plan_text
 from rbxcompose.tools.lsp.project import Project as Editor
 from tests.conftest import ROOT
 from tests.loops import for_all
@@ -38,6 +40,9 @@ FILES = {
     "robots/one/msgs/my_msgs/msg/Finger.msg": "bool touches\n",
     "robots/one/msgs/my_msgs/srv/Open.srv": "Grasp grasp\n---\nbool ok\n",
 }
+SHUT = {"robots/one/msgs/my_msgs/srv/Shut.srv": "float64 force\n---\nbool success\nstring message\n"}
+ONE = ROBOT + "  hand: {type: program, command: [hand], serves: {shut: my_msgs/Shut}}\n"
+GO = "rbx: 1\nkind: Mission\nname: go\n"
 
 
 @pytest.fixture(autouse=True)
@@ -355,3 +360,41 @@ def test_robots_that_share_a_topic_must_have_the_same_definition(tmp_path: Path,
         bench.robots["one"].publish("grasp/first", registry.message("my_msgs/Grasp")(width=0.0))  # type: ignore[call-arg]
         bench.advance(2.0)
         assert statuses[-1].level == 1
+
+
+TWO = "components: {level: {type: threshold, topic: level, warn_below: 1}}\nmissions: {go: go.yaml}\n"
+SYSTEM = """rbx: 1
+kind: System
+name: both
+hosts: {desk: {}}
+robots:
+  one: {robot: ../robots/one/robot.yaml, share: [shut], callers: [two]}
+  two: {robot: ../robots/two/robot.yaml}
+"""
+
+
+@pytest.mark.parametrize(
+    ("two", "step", "codes"),
+    [
+        (TWO, "wait: 1 s", []),
+        (TWO, "one/shut: {force: 2}", ["RBX4102", "RBX6102"]),
+        (TWO + "msgs: {own: ../one/msgs}\n", "one/shut: {force: 2}", []),
+    ],
+)
+def test_each_robot_of_a_system_has_its_own_types(tmp_path: Path, two: str, step: str, codes: list[str]) -> None:
+    for name, written in {
+        **FILES,
+        **SHUT,
+        "robots/one/robot.yaml": f"rbx: 1\nkind: Robot\nname: one\n{ONE}",
+        "robots/two/robot.yaml": f"rbx: 1\nkind: Robot\nname: two\n{two}",
+        "robots/two/go.yaml": f"{GO}do: {{{step}}}\n",
+        "systems/both.yaml": SYSTEM,
+    }.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(written)
+    system = compile_system(str(tmp_path / "systems/both.yaml"), environment={})
+    assert [finding.code for finding in system.report if finding.severity == "error"] == codes, system.report.findings
+    one = system.robots["one"]
+    assert {end.type for end in one.ends} >= {"my_msgs/msg/Grasp", "my_msgs/srv/Shut"}
+    assert heard(one.plan)["/grasp"].type == "my_msgs/msg/Grasp"
+    assert "/shut (my_msgs/srv/Shut)" in plan_text(one.plan)
