@@ -12,9 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rbxcompose.commands.main import main
 from rbxcompose.compiler.message_texts import Examination, TypeText
 from rbxcompose.compiler.plan.dump import dump, load
 from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.compiler.schema.documents import installed_schema, schema_with
 from rbxcompose.compiler.systems.bundle import bundle_of
 from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.msgs import registry
@@ -27,6 +29,7 @@ from rbxcompose.tools.lsp.project import Project as Editor
 from tests.conftest import ROOT
 from tests.loops import for_all
 from tests.parts.project import Project
+from tests.third_party.places import put, see
 
 ROBOT = """
 msgs:
@@ -321,6 +324,37 @@ def test_a_component_of_another_package_imports_them_also_in_a_part(tmp_path: Pa
     )
     assert done.returncode == 0, done.stderr + done.stdout
     assert "error" not in done.stderr + done.stdout
+
+
+@pytest.mark.parametrize("in_editor", [True, False])
+def test_a_type_that_imports_them_is_in_the_schema_of_their_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], in_editor: bool
+) -> None:
+    put(tmp_path / "lib", "toy-gripper", {"component.toy_gripper": "toy_gripper"}, {"toy_gripper.py": PLUGIN})
+    see(tmp_path / "lib", monkeypatch)
+    schema_with.cache_clear()
+    robot = "rbx: 1\nkind: Robot\nname: one\nmsgs: {own: msgs}\ncomponents: {}\n"
+    for name, text in {**FILES, "robots/one/robot.yaml": robot}.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path / "lib")
+    assert main(["schema", "robot"]) == 0
+    printed, told = capsys.readouterr()
+    assert "component_toy_gripper" not in printed
+    assert "warning[RBX9302]: the component 'toy_gripper' of package 'toy-gripper' cannot be used" in told
+    assert "run this in the folder of that robot" in told
+    file = tmp_path / "robots/one/robot.yaml"
+    if in_editor:
+        editor = Editor({})
+        editor.change(file, robot)
+        assert editor.robot_of(file)
+        assert "component_toy_gripper" in installed_schema("Robot")["$defs"]
+        return
+    monkeypatch.chdir(file.parent)
+    assert main(["schema", "robot"]) == 0
+    printed, told = capsys.readouterr()
+    assert "component_toy_gripper" in printed
+    assert not told
 
 
 MUXED = """
