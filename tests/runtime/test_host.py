@@ -136,10 +136,10 @@ class Answering(Component[ToyConfig]):
 
     rate = 10.0
     answer: Later[Trigger.Response] | None = None
-    now = Serves(Trigger, "now", skill=None)
+    prompt = Serves(Trigger, "prompt", skill=None)
     later = Serves(Trigger, "later", skill=None)
 
-    def on_now(self, request: Trigger.Request) -> Trigger.Response:
+    def on_prompt(self, request: Trigger.Request) -> Trigger.Response:
         return None if self.config.times else Bool()  # type: ignore[return-value]
 
     def on_later(self, request: Trigger.Request) -> Later[Trigger.Response]:
@@ -154,8 +154,8 @@ class Answering(Component[ToyConfig]):
 @pytest.mark.parametrize(
     ("name", "times", "told"),
     [
-        ("now", 1, "on_now returned None: '/now' takes std_srvs/srv/Trigger_Response, not NoneType"),
-        ("now", 0, "on_now returned Bool: '/now' takes std_srvs/srv/Trigger_Response, not std_msgs/msg/Bool"),
+        ("prompt", 1, "on_prompt returned None: '/prompt' takes std_srvs/srv/Trigger_Response, not NoneType"),
+        ("prompt", 0, "on_prompt returned Bool: '/prompt' takes std_srvs/srv/Trigger_Response, not std_msgs/msg/Bool"),
         (
             "later",
             0,
