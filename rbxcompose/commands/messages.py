@@ -104,14 +104,14 @@ def _known(name: str, category: str, look: Callable[[str], type[T]]) -> type[T]:
     try:
         return look(name)
     except KeyError:
-        if _finds_types_here():
+        if finds_types_here():
             return _known(name, category, look)
         full = registry.full_name(name, category)
         words = f"unknown type '{full}'"
         raise NotDoneError(NO_TYPE.misspelt(None, words, full, registry.names(category), "known types")) from None
 
 
-def _finds_types_here() -> bool:
+def finds_types_here() -> bool:
     """Let names mean the types of the only robot in this folder, unless they mean those of one; return if it has any.
 
     On a bus that no robot of this machine has, they are the best guess; a hash tells whether it is right.

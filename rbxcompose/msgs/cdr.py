@@ -228,12 +228,17 @@ class _Flags(_Many):
 
     def write(self, value: Any, out: bytearray) -> None:
         self._write_count(len(value), out)
+        if not _BOTH.issuperset(value):
+            raise CdrError(f"{value!r} where {self._type} is expected")
         out += bytes(map(bool, value))
 
     def read(self, data: _Payload, at: int, values: list[Any]) -> int:
         count, at = self._read_count(data, at)
         values.append(tuple(map(bool, data[at : at + count])))
         return at + count
+
+
+_BOTH = frozenset((True, False))
 
 
 class _Array(_Many):
@@ -266,6 +271,8 @@ class _Elements(_Many):
         self._element = element
 
     def write(self, value: Any, out: bytearray) -> None:
+        if isinstance(value, str):  # which has texts as elements, too
+            raise CdrError(f"the text {value!r} where {self._type} is expected")
         self._write_count(len(value), out)
         for element in value:
             self._element.write(element, out)
@@ -365,7 +372,7 @@ class _Layout:
         if self._numbers:
             paths, types = zip(*self._numbers, strict=True)
             self._numbers = []
-            self._steps.append((_getter(paths), _Numbers(types)))
+            self._steps.append((_getter(paths, types), _Numbers(types)))
 
 
 _layouts: dict[type[Message], _Layout] = {}
@@ -378,11 +385,19 @@ def _layout(message: type[Message]) -> _Layout:
     return found
 
 
-def _getter(paths: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
-    if len(paths) > 1:
-        return attrgetter(*paths)
+def _getter(paths: tuple[str, ...], types: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
     get = attrgetter(*paths)
-    return lambda message: (get(message),)
+    all_of: Callable[[Any], tuple[Any, ...]] = get if len(paths) > 1 else lambda message: (get(message),)
+    flags = [index for index, type_ in enumerate(types) if type_ == "bool"]
+
+    def checked(message: Any) -> tuple[Any, ...]:
+        values = all_of(message)
+        for index in flags:
+            if values[index] not in _BOTH:  # `struct` takes anything for one of them
+                raise CdrError(f"{values[index]!r} where bool is expected")
+        return values
+
+    return checked if flags else all_of
 
 
 def _codec(message: type[Message], type_: FieldType) -> _Codec:

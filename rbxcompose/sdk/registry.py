@@ -80,7 +80,7 @@ def declared(name: str, config: Config, kind: type[K]) -> list[K]:
 
 def usable_names() -> list[str]:
     """Import all types and return their names, sorted, without broken ones of other packages."""
-    return [name for name in component_names() if _is_usable(name)]
+    return [name for name in component_names() if not why_unusable(name)]
 
 
 def types_with(port: type[Port[Any]], topic: str, interface: str) -> list[str]:
@@ -97,12 +97,13 @@ def types_with(port: type[Port[Any]], topic: str, interface: str) -> list[str]:
     return found
 
 
-def _is_usable(name: str) -> bool:
+def why_unusable(name: str) -> str:
+    """Return why the type of this name cannot be used; empty if it can."""
     try:
         component_type(name)
-    except BrokenPluginError:  # reported when a manifest uses it
-        return False
-    return True
+    except BrokenPluginError as error:
+        return str(error)
+    return ""
 
 
 SKILL_PLUGINS = Plugins("skill", "skills")

@@ -13,7 +13,9 @@ from rbxcompose.msgs.cdr import HEADER, CdrError, CdrLimitError, decode, encode
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
 from rbxcompose.msgs.geometry_msgs import PoseWithCovariance, Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.rbxcompose_msgs import Switches
 from rbxcompose.msgs.std_msgs import Bool, Empty, Float32, Int32, String
+from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
 from rbxcompose.msgs.types import Message, declared
 from rbxcompose.msgs.unique_identifier_msgs import UUID
@@ -176,11 +178,22 @@ def test_a_text_must_be_whole_utf_8(body: bytes, why: str) -> None:
         EVERYTHING(codes=("a", "b", "c")),
         EVERYTHING(few=[1, 2, 3, 4, 5]),
         EVERYTHING(pair=("one",)),
+        Bool(data="x"),  # type: ignore[arg-type]
+        Bool(data=None),  # type: ignore[arg-type]
+        SetBool.Response(success="no"),  # type: ignore[arg-type]
+        Switches(is_on=("on", "off")),  # type: ignore[arg-type]
+        JointTrajectory(joint_names="abc"),  # type: ignore[arg-type]
     ],
 )
 def test_what_cannot_be_written_is_a_cdr_error_that_names_the_type(message: Message) -> None:
     with pytest.raises(CdrError, match=f"^{message.TYPE} cannot be written: "):
         encode(message)
+
+
+def test_flags_of_numpy_are_flags() -> None:
+    assert encode(Bool(data=np.True_)) == encode(Bool(data=True))  # type: ignore[arg-type]
+    flags: Any = np.array([True, False])
+    assert encode(Switches(is_on=flags)) == encode(Switches(is_on=(True, False)))
 
 
 def test_decoded_arrays_are_read_only() -> None:

@@ -11,9 +11,10 @@ from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Query, answers, as_data
 from rbxcompose.missions.execution.requests import PauseMission
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
-from rbxcompose.msgs.std_msgs import Float32
+from rbxcompose.msgs.std_msgs import Bool, Float32
+from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.runtime.channel import Failed
-from rbxcompose.sdk import Component, Config, In, Out, Refused, component
+from rbxcompose.sdk import Component, Config, In, Later, Out, Refused, Reply, Serves, component
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
@@ -127,6 +128,48 @@ def test_a_mistake_is_told_with_method_cause_and_line_and_its_traceback_is_in_th
     assert record.source == "broken"
     assert record.text.startswith("break_in raised ValueError: planted (test_host.py:")
     assert "Traceback" in record.detail
+
+
+@component("toy_for_answers")
+class Answering(Component[ToyConfig]):
+    """Gives wrong answers."""
+
+    rate = 10.0
+    answer: Later[Trigger.Response] | None = None
+    prompt = Serves(Trigger, "prompt", skill=None)
+    later = Serves(Trigger, "later", skill=None)
+
+    def on_prompt(self, request: Trigger.Request) -> Trigger.Response:
+        return None if self.config.times else Bool()  # type: ignore[return-value]
+
+    def on_later(self, request: Trigger.Request) -> Later[Trigger.Response]:
+        self.answer = Later[Trigger.Response]()
+        return self.answer
+
+    def step(self, dt: float) -> None:
+        if self.answer is not None:
+            self.answer.reply(Bool())  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("name", "times", "told"),
+    [
+        ("prompt", 1, "on_prompt returned None: '/prompt' takes std_srvs/srv/Trigger_Response, not NoneType"),
+        ("prompt", 0, "on_prompt returned Bool: '/prompt' takes std_srvs/srv/Trigger_Response, not std_msgs/msg/Bool"),
+        (
+            "later",
+            0,
+            "step raised TypeError: '/later' takes std_srvs/srv/Trigger_Response, not std_msgs/msg/Bool (test",
+        ),
+    ],
+)
+def test_who_answers_with_something_else_is_named(name: str, times: int, told: str) -> None:
+    robot = Bench(instance("answering", "toy_for_answers", {"times": times}))
+    replies: list[Reply[Trigger.Response]] = []
+    robot.bus.client("bench", name, Trigger)(Trigger.Request(), replies.append)
+    robot.advance(1.0)
+    assert told in "".join(robot.texts())
+    assert name == "later" or replies == [Reply(None, told)]
 
 
 def test_a_component_in_error_says_so_in_diagnostics_until_it_is_back() -> None:

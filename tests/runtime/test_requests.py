@@ -17,6 +17,7 @@ from rbxcompose.compiler.plan.dump import dump
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.missions.execution.equipment import MissionConfig
 from rbxcompose.missions.execution.requests import ListMissions, PauseMission
+from rbxcompose.msgs import registry
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import HostReport
 from rbxcompose.runtime.folder import RobotState, RunOptions
@@ -306,6 +307,12 @@ def test_a_process_that_ends_has_nothing_to_say_about_a_change() -> None:
     desk.handler.handle(as_data(ComparePlan(text)), 1)
     desk.handler.consultations.gone("mission")
     assert [is_refused for _, _, is_refused in desk.replies] == [False]
+
+
+def test_a_robot_keeps_its_types_while_another_plan_is_compared() -> None:
+    with registry.choosing({"toy_msgs/msg/Ball": "float64 size"}):
+        Desk().compare(dump(PLAN))
+        assert registry.message("toy_msgs/Ball")
 
 
 def test_a_text_that_is_no_plan_is_refused() -> None:

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 import pytest
 
-from rbxcompose.compiler.schema.documents import installed_schema
+from rbxcompose.compiler.schema.documents import schema_with
 from rbxcompose.manifest import registry
 from rbxcompose.manifest.section import Section
 from rbxcompose.manifest.validate import ENTRY_WORDS
@@ -25,6 +25,6 @@ def lamps() -> Iterator[Section[Any, Any]]:
         monkeypatch.setattr(types, "_TYPES", dict(types._TYPES))
         monkeypatch.setitem(ENTRY_WORDS, "lamps", "lamp")
         monkeypatch.delitem(sys.modules, "tests.sections.toy", raising=False)
-        installed_schema.cache_clear()
+        schema_with.cache_clear()
         yield cast(Section[Any, Any], importlib.import_module("tests.sections.toy").lamps)
-    installed_schema.cache_clear()
+    schema_with.cache_clear()

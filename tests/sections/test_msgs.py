@@ -12,19 +12,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rbxcompose.commands.main import main
 from rbxcompose.compiler.message_texts import Examination, TypeText
 from rbxcompose.compiler.plan.dump import dump, load
 from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.compiler.schema.documents import installed_schema, schema_with
 from rbxcompose.compiler.systems.bundle import bundle_of
 from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.runtime.supervision.plan_change import changes
 from rbxcompose.testing.bench import Bench, SystemBench
+from rbxcompose.tools.exporting.viewers import heard
+from rbxcompose.tools.inspection.plan_text import plan_text
 from rbxcompose.tools.lsp.project import Project as Editor
 from tests.conftest import ROOT
 from tests.loops import for_all
 from tests.parts.project import Project
+from tests.third_party.places import put, see
 
 ROBOT = """
 msgs:
@@ -38,6 +43,9 @@ FILES = {
     "robots/one/msgs/my_msgs/msg/Finger.msg": "bool touches\n",
     "robots/one/msgs/my_msgs/srv/Open.srv": "Grasp grasp\n---\nbool ok\n",
 }
+SHUT = {"robots/one/msgs/my_msgs/srv/Shut.srv": "float64 force\n---\nbool success\nstring message\n"}
+ONE = ROBOT + "  hand: {type: program, command: [hand], serves: {shut: my_msgs/Shut}}\n"
+GO = "rbx: 1\nkind: Mission\nname: go\n"
 
 
 @pytest.fixture(autouse=True)
@@ -318,6 +326,37 @@ def test_a_component_of_another_package_imports_them_also_in_a_part(tmp_path: Pa
     assert "error" not in done.stderr + done.stdout
 
 
+@pytest.mark.parametrize("in_editor", [True, False])
+def test_a_type_that_imports_them_is_in_the_schema_of_their_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], in_editor: bool
+) -> None:
+    put(tmp_path / "lib", "toy-gripper", {"component.toy_gripper": "toy_gripper"}, {"toy_gripper.py": PLUGIN})
+    see(tmp_path / "lib", monkeypatch)
+    schema_with.cache_clear()
+    robot = "rbx: 1\nkind: Robot\nname: one\nmsgs: {own: msgs}\ncomponents: {}\n"
+    for name, text in {**FILES, "robots/one/robot.yaml": robot}.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path / "lib")
+    assert main(["schema", "robot"]) == 0
+    printed, told = capsys.readouterr()
+    assert "component_toy_gripper" not in printed
+    assert "warning[RBX9302]: the component 'toy_gripper' of package 'toy-gripper' cannot be used" in told
+    assert "run this in the folder of that robot" in told
+    file = tmp_path / "robots/one/robot.yaml"
+    if in_editor:
+        editor = Editor({})
+        editor.change(file, robot)
+        assert editor.robot_of(file)
+        assert "component_toy_gripper" in installed_schema("Robot")["$defs"]
+        return
+    monkeypatch.chdir(file.parent)
+    assert main(["schema", "robot"]) == 0
+    printed, told = capsys.readouterr()
+    assert "component_toy_gripper" in printed
+    assert not told
+
+
 MUXED = """
 msgs: {own: msgs}
 muxes:
@@ -355,3 +394,41 @@ def test_robots_that_share_a_topic_must_have_the_same_definition(tmp_path: Path,
         bench.robots["one"].publish("grasp/first", registry.message("my_msgs/Grasp")(width=0.0))  # type: ignore[call-arg]
         bench.advance(2.0)
         assert statuses[-1].level == 1
+
+
+TWO = "components: {level: {type: threshold, topic: level, warn_below: 1}}\nmissions: {go: go.yaml}\n"
+SYSTEM = """rbx: 1
+kind: System
+name: both
+hosts: {desk: {}}
+robots:
+  one: {robot: ../robots/one/robot.yaml, share: [shut], callers: [two]}
+  two: {robot: ../robots/two/robot.yaml}
+"""
+
+
+@pytest.mark.parametrize(
+    ("two", "step", "codes"),
+    [
+        (TWO, "wait: 1 s", []),
+        (TWO, "one/shut: {force: 2}", ["RBX4102", "RBX6102"]),
+        (TWO + "msgs: {own: ../one/msgs}\n", "one/shut: {force: 2}", []),
+    ],
+)
+def test_each_robot_of_a_system_has_its_own_types(tmp_path: Path, two: str, step: str, codes: list[str]) -> None:
+    for name, written in {
+        **FILES,
+        **SHUT,
+        "robots/one/robot.yaml": f"rbx: 1\nkind: Robot\nname: one\n{ONE}",
+        "robots/two/robot.yaml": f"rbx: 1\nkind: Robot\nname: two\n{two}",
+        "robots/two/go.yaml": f"{GO}do: {{{step}}}\n",
+        "systems/both.yaml": SYSTEM,
+    }.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(written)
+    system = compile_system(str(tmp_path / "systems/both.yaml"), environment={})
+    assert [finding.code for finding in system.report if finding.severity == "error"] == codes, system.report.findings
+    one = system.robots["one"]
+    assert {end.type for end in one.ends} >= {"my_msgs/msg/Grasp", "my_msgs/srv/Shut"}
+    assert heard(one.plan)["/grasp"].type == "my_msgs/msg/Grasp"
+    assert "/shut (my_msgs/srv/Shut)" in plan_text(one.plan)

@@ -115,6 +115,7 @@ def build_robot(
     outside: Outside = NOTHING,
 ) -> Robot:
     """Return the whole robot, with what it has of others; errors in its mission files go into `report`."""
+    outside = outside.understood()
     written = written_components(manifest, report)
     components = {**written, **own_components(manifest, written)}
     values = values_of(manifest, components)

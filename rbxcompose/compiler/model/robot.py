@@ -20,6 +20,7 @@ from rbxcompose.manifest.tree import Entry, KeyPath, ScalarNode, all_nodes, at, 
 from rbxcompose.missions.analysis.facts import settings_of
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of
+from rbxcompose.msgs import registry
 from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import In, Out, Port, Serves, ServesAction
@@ -70,6 +71,14 @@ class Outside:
     names: frozenset[str] = frozenset()
     services: Mapping[str, str] = field(default_factory=dict)  # with their ROS types
     skills: tuple[SkillSource, ...] = ()
+
+    def understood(self) -> "Outside":
+        """Return what the robot being read can use of it: that whose types it has, too."""
+        if not (self.services or self.skills):
+            return self
+        known = {*registry.names("srv"), *registry.names("action")}
+        services = {name: type_ for name, type_ in self.services.items() if type_ in known}
+        return Outside(self.names, services, tuple(source for source in self.skills if source.action in known))
 
 
 NOTHING = Outside()

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field, replace
+from typing import Any
 
 from rbxcompose.base.config import DEFAULT, Bound, Config, Restart
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.bus.endpoints import LINK_LEASE
+from rbxcompose.msgs import registry
+from rbxcompose.sdk.ports import Port
+from rbxcompose.sdk.registry import component_type
 
 STEPPED_GROUP = "robot"  # the one process group of a robot on a stepped clock
 
@@ -170,6 +174,11 @@ class Plan:
     def of_group(self, group: str) -> tuple[Instance, ...]:
         """Return the instances of a process group in start order."""
         return tuple(instance for instance in self.instances if instance.process == group)
+
+    def ports(self, instance: Instance) -> Mapping[str, Port[Any]]:
+        """Return the ports of an instance by name; names of types mean those of this robot, not of one read later."""
+        with registry.choosing(self.messages):
+            return component_type(instance.type).ports(instance.config)
 
     def in_one_process(self) -> Plan:
         """Return the same robot with all instances in one process group, as a stepped clock requires."""

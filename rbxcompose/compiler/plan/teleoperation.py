@@ -8,7 +8,7 @@ from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.sdk.capabilities import TELEOP, Drives, Forwards
 from rbxcompose.sdk.ports import Out
-from rbxcompose.sdk.registry import component_type, declared
+from rbxcompose.sdk.registry import declared
 
 
 def teleoperated(plan: Plan) -> dict[str, str]:
@@ -29,7 +29,7 @@ def teleoperated(plan: Plan) -> dict[str, str]:
 
 def _free(plan: Plan, topic: str, passed: tuple[str, ...]) -> Iterator[str]:
     """Yield the topics that nobody writes and that command what listens to `topic`, the best one first."""
-    writers = [instance for instance in plan.everywhere if topic in _written(instance)]
+    writers = [instance for instance in plan.everywhere if topic in _written(plan, instance)]
     if topic in passed:
         return
     if not writers:
@@ -41,6 +41,5 @@ def _free(plan: Plan, topic: str, passed: tuple[str, ...]) -> Iterator[str]:
                     yield from _free(plan, mux.topic(name), (*passed, topic))
 
 
-def _written(instance: Instance) -> set[str]:
-    ports = component_type(instance.type).ports(instance.config)
-    return {instance.topic(name) for name, port in ports.items() if isinstance(port, Out)}
+def _written(plan: Plan, instance: Instance) -> set[str]:
+    return {instance.topic(name) for name, port in plan.ports(instance).items() if isinstance(port, Out)}

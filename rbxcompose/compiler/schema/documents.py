@@ -6,7 +6,7 @@
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from rbxcompose.manifest import system_file, test_file
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT, SYSTEM, TEST
+from rbxcompose.msgs.registry import Types, chosen
 from rbxcompose.sdk import registry
 
 STEP = "step"
@@ -97,9 +98,17 @@ def makers() -> Mapping[str, Callable[[Iterable[str]], Schema]]:
     }
 
 
-@cache
 def installed_schema(kind: str) -> Schema:
-    """Return the schema of a kind of manifest with all installed component types; it must not be modified."""
+    """Return the schema of a kind of manifest with all installed component types; it must not be modified.
+
+    Those that import message types of a robot are among them while these are chosen.
+    """
+    return schema_with(kind, chosen())
+
+
+@lru_cache(64)
+def schema_with(kind: str, types: Types) -> Schema:
+    """Return what `installed_schema` does, while these message types are chosen."""
     return makers()[kind](registry.usable_names())
 
 

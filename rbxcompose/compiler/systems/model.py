@@ -95,7 +95,7 @@ class TopicEnd:
 def ends_of(plan: Plan, hosts: Mapping[str, str]) -> Iterator[TopicEnd]:
     """Yield all ends of components; `hosts` has the host of each."""
     for instance in plan.instances:
-        for (topic, type_), end in _ends(instance, hosts[instance.name]):
+        for (topic, type_), end in _ends(plan, instance, hosts[instance.name]):
             yield TopicEnd(topic, type_, end)
 
 
@@ -115,9 +115,8 @@ def crossings(plan: Plan, hosts: Mapping[str, str]) -> Iterator[Crossing]:
             yield Crossing(topic, type_, tuple(sending), tuple(away))
 
 
-def _ends(instance: Instance, host: str) -> Iterator[tuple[tuple[str, str], End]]:
-    cls = component_type(instance.type)
-    ports: Mapping[str, Port[Any]] = cls.ports(instance.config)
+def _ends(plan: Plan, instance: Instance, host: str) -> Iterator[tuple[tuple[str, str], End]]:
+    ports = plan.ports(instance)
     if any(isinstance(port, Looks) for port in ports.values()):
         looks = next(port for port in ports.values() if isinstance(port, Looks))
         yield from (((topic, TFMessage.TYPE), End(instance.name, host, looks)) for topic in TRANSFORMS)
@@ -125,10 +124,8 @@ def _ends(instance: Instance, host: str) -> Iterator[tuple[tuple[str, str], End]
         port = ports.get(wire.port)
         if isinstance(port, (*_GIVES, *_TAKES)) and wire.topic:
             declared = port.rate if isinstance(port, Out) else None
-            yield (
-                (wire.topic, wire.type),
-                End(instance.name, host, port, declared or cls.rate_of(instance.config) or None),
-            )
+            rate = declared or component_type(instance.type).rate_of(instance.config) or None
+            yield (wire.topic, wire.type), End(instance.name, host, port, rate)
 
 
 def least_size(interface: type[Message]) -> int:

@@ -191,7 +191,8 @@ def unknown_skill(mission: Examined) -> Iterator[findings.Finding]:
                 owner, is_other, own = node.skill.rpartition("/")
                 if is_other and not close:
                     help_text = (
-                        f"a robot '{owner}' of the system must share '{own}', and name this robot below 'callers'"
+                        f"a robot '{owner}' of the system must share '{own}', and name this robot below 'callers'; "
+                        "if the type is one of its 'msgs', this robot needs that, too"
                     )
                     yield unknown_skill.at(node.span, message, help=help_text)
                     continue

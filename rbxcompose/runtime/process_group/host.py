@@ -11,7 +11,7 @@ from typing import Any, TypeVar, cast
 from rbxcompose.base.clock import Clock
 from rbxcompose.base.config import Config, leaves, value_at, with_values
 from rbxcompose.base.levels import Level
-from rbxcompose.base.requests import Command, Query, Refused, Request, UnreadableError, as_data, to_data
+from rbxcompose.base.requests import Command, OutsideError, Query, Refused, Request, UnreadableError, as_data, to_data
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.actions import ActionServer
 from rbxcompose.bus.bus import Bus
@@ -936,19 +936,22 @@ def _on_message(hosted: Hosted, component: Component[Any], name: str, port: In[A
 def _on_request(
     hosted: Hosted, component: Component[Any], name: str, port: Port[Any]
 ) -> Callable[[ServedRequest[Any, Any]], None]:
-    answer = getattr(component, f"on_{name}")
+    label = f"on_{name}"
+    answer = getattr(component, label)
 
     def serve(request: ServedRequest[Any, Any]) -> None:
         if reason := hosted.refusal(port):
             raise Refused(reason)
         worker = hosted.worker
         send = worker.send if worker is not None else _at_once
-        hosted.do(f"on_{name}", partial(_answer, request, answer, send))
+        hosted.do(label, partial(_answer, label, request, answer, send))
 
     return serve
 
 
-def _answer(request: ServedRequest[Any, Any], answer: Callable[[Any], Any], send: Callable[[Call], None]) -> None:
+def _answer(
+    label: str, request: ServedRequest[Any, Any], answer: Callable[[Any], Any], send: Callable[[Call], None]
+) -> None:
     try:
         response = answer(request.message)
     except Refused as refusal:
@@ -957,8 +960,21 @@ def _answer(request: ServedRequest[Any, Any], answer: Callable[[Any], Any], send
         send(partial(request.fail, f"{type(error).__name__}: {error}"))
         raise
     else:
-        reply = response.then if isinstance(response, Later) else lambda then: then(response)
-        reply(lambda answer: send(partial(request.reply, answer)))
+        if isinstance(response, Later):
+            response.then(partial(_reply, request, send))
+            return
+        try:
+            _reply(request, send, response)
+        except TypeError as error:
+            given = "None" if response is None else type(response).__name__
+            words = f"{label} returned {given}: {error}"
+            send(partial(request.fail, words))
+            raise OutsideError(words) from error  # no line of code stands for what is missing in the handler
+
+
+def _reply(request: ServedRequest[Any, Any], send: Callable[[Call], None], response: Any) -> None:
+    request.require(response)  # before another thread sends it: its sender is to blame
+    send(partial(request.reply, response))
 
 
 def _at_once(call: Call) -> None:

@@ -14,6 +14,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.requests import Command, Refused, Request, UnreadableError, as_data, name_in, requests, to_data
 from rbxcompose.compiler.plan.dump import PlanTextError, load
 from rbxcompose.compiler.plan.model import Instance, Plan
+from rbxcompose.msgs import registry
 from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.folder import ChosenLayers, RobotState
 from rbxcompose.runtime.plan_requests import AdoptSaved, ApplyPlan, ComparePlan, PlanComparison, RevertPlan
@@ -264,7 +265,8 @@ class RequestHandler:
 
 def _loaded(plan: str) -> Plan:
     try:
-        return load(plan)
+        with registry.choosing(registry.chosen().texts):  # the robot keeps its types, also if the plan is refused
+            return load(plan)
     except PlanTextError as error:
         raise Refused(str(error)) from error
 

@@ -85,7 +85,7 @@ def _topics(plan: Plan, kind: type[In[Any]] | type[Out[Any]]) -> dict[str, Viewe
     found = (
         (wire.topic, ViewedTopic(wire.topic, port.interface.TYPE if port.interface else "", port.qos))
         for instance in plan.everywhere
-        for ports in (component_type(instance.type).ports(instance.config),)
+        for ports in (plan.ports(instance),)
         for wire in instance.wires
         if isinstance(port := ports.get(wire.port), kind) and wire.topic
     )

@@ -19,7 +19,6 @@ from rbxcompose.compiler.systems.model import Crossing, PlacedRobot, System
 from rbxcompose.compiler.systems.share import exchange_of, hosts_of, robots_on, share_of, shared_crossings
 from rbxcompose.manifest.tree import KeyPath, TreeNode, at, key_span, value_span
 from rbxcompose.sdk.ports import Looks, Port
-from rbxcompose.sdk.registry import component_type
 from rbxcompose.tools.inspection.diagram import does, keys_of, qos_of
 from rbxcompose.tools.inspection.origin import indexed
 
@@ -76,7 +75,7 @@ def _options(instance: Instance) -> Iterator[str]:
 
 
 def _wires(plan: Plan, instance: Instance, with_keys: bool) -> Iterator[str]:
-    ports: dict[str, Port[Any]] = component_type(instance.type).ports(instance.config)
+    ports = plan.ports(instance)
     for wire in instance.wires:
         port = ports.get(wire.port)
         if port is not None:
