@@ -15,7 +15,6 @@ from rbxcompose.domains.navigation.localisation import LocalisationSettings, Par
 from rbxcompose.domains.navigation.localiser import (
     BASE,
     BEGAN_AGAIN,
-    GIVEN,
     ODOM,
     RESTARTED,
     Localiser,
@@ -158,7 +157,7 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
         if stayed is None:
             return "" if self.begin(since.pose, since.spread, since.turn_spread) else RESTARTED
         self.scan = NewestMessage()  # it may be from before
-        self.begin(stayed, *GIVEN, since.pose)
+        self.begin(stayed, self.config.spread, self.config.turn_spread, since.pose)
         return BEGAN_AGAIN
 
     def on_scan(self, message: LaserScan) -> None:
