@@ -602,6 +602,18 @@ def test_the_simulator_tells_where_the_robot_is_however_wrong_its_odometry(tmp_p
     assert pose_in(told[-1].pose.pose).distance(room.base.core.pose) < 0.05
 
 
+def test_a_robot_stops_soon_after_nobody_localises_it_any_more(tmp_path: Path) -> None:
+    room = Room(tmp_path, ROBOT.replace(LASER, "") + "  localisation: {type: fake}\n")
+    goal = NavigateToPose.Goal(pose=PoseStamped(Header(frame_id="map"), Pose(Point(-2.0, 2.5, 0.0))))
+    room.bench.bus.action_client("me", "/go_to", NavigateToPose)(goal, room.ends.append, room.feedback.append)
+    assert room.bench.run_until(lambda: room.base.core.velocity.linear > 0.3, 20.0)
+    room.bench.host.retire(["localisation"])
+    room.bench.advance(2.5)
+    assert room.base.is_at_rest
+    assert room.bench.run_until(lambda: bool(room.ends), 30.0)
+    assert room.reason() == "it is not known where the robot is in 'map'"
+
+
 def test_a_real_robot_has_no_simulator_that_tells_where_it_is(tmp_path: Path) -> None:
     Room(tmp_path, ROBOT + "  localisation: {type: fake}\n")
     report = compile_robot(str(tmp_path / "robots/one"), real=True, environment={}).report
