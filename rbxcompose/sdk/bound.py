@@ -1,5 +1,6 @@
 """The ports and windows of a running component: the runtime binds them to the bus, tests to whatever they like."""
 
+import math
 from collections.abc import Callable, Mapping
 from enum import StrEnum
 from typing import Any, Generic, Protocol, TypeVar
@@ -186,8 +187,8 @@ class Window(Protocol):
 class Look(Protocol):
     """A pose of one frame in another."""
 
-    def now(self) -> Pose2 | None:
-        """Return the newest pose [m, m, rad], or None while the frames are not connected."""
+    def now(self, *, within: float = math.inf) -> Pose2 | None:
+        """Return the newest pose [m, m, rad]; None while the frames are not connected, or if it is older [s]."""
 
     def transform(self, *, at: int | None = None) -> Transform3:
         """Return the newest pose in space, or the one at a stamp [ns], interpolated.

@@ -22,6 +22,7 @@ from rbxcompose.missions.execution.requests import (
 from rbxcompose.sdk import Outcome
 from rbxcompose.sdk.component import BusAddress
 from tests.executive.fake_robot import Robot
+from tests.executive.test_live_edits import change, config_of
 
 PATROL = """
 data:
@@ -161,6 +162,19 @@ def test_a_changed_mission_starts_again_and_says_what_has_changed() -> None:
     assert robot.lines[0] == (
         "0 mission test cannot go on from its snapshot: the mission '' changed since; it starts again"
     )
+
+
+def test_a_mission_that_was_changed_while_it_ran_goes_on_at_its_leaf_too() -> None:
+    robot = Real()
+    robot.start()
+    robot.advance(2.0)
+    robot.go_to.end(Outcome.SUCCEEDED)
+    robot.advance(2.0)
+    changed = PATROL.replace("10 s", "20 s")
+    assert change(robot, config_of(robot, changed)) == ["mission test goes on where it is"]
+    again = Real(changed, policy="continue")
+    again.start()
+    assert goals(again) == [0.5]
 
 
 @pytest.mark.parametrize("text", ['{"version": 1', "[]", '{"version": 2}'])

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from rbxcompose.base.findings import Report, Span
 from rbxcompose.base.geometry import Pose2, Velocity2, wrap_angle
 from rbxcompose.domains.navigation.localisation import LocalisationSettings, ParticleFilter
+from rbxcompose.domains.navigation.localiser import RecallPlace
 from rbxcompose.domains.worlds.grid_map import GridMap
 from rbxcompose.domains.worlds.shapes import WorldShape
 from rbxcompose.domains.worlds.world import SimulatedWorld
@@ -126,6 +127,16 @@ def test_a_robot_that_was_carried_away_notices_and_finds_itself_again() -> None:
     assert ride.is_found()
 
 
+def test_scans_from_one_place_decide_between_two_where_the_robot_may_be() -> None:
+    ride = from_dock()
+    ride.at = Pose2(7.03, 1.83, 0.03)
+    ride.core.start(Pose2(6.5, 4.8, 1.0), 0.2, math.radians(10), ride.at)
+    for _ in range(4):
+        assert ride.core.see(LASER, ANGLES, ride.scan(), anew=True)
+    assert ride.is_found()
+    assert math.sqrt(ride.core.covariance[0, 0]) < 0.1
+
+
 @given(POSES, st.lists(POSES, min_size=1, max_size=8))
 def test_without_scans_the_particles_follow_odometry_in_any_direction(first: Pose2, steps: list[Pose2]) -> None:
     core = ParticleFilter(ONE_WALL, LocalisationSettings(turn_from_way=0.01, turn_from_turn=0.01, way_from_way=0.01))
@@ -225,6 +236,25 @@ def test_a_start_outside_of_the_map_is_refused(pose: Pose2, spread: float) -> No
     with pytest.raises(ValueError, match="a start"):
         core.start(pose, spread, 0.1)
     assert np.array_equal(core.poses, before)
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "follows", "outlives"),
+    [
+        (Pose2(5.0, 3.0, 1.0), Pose2(5.1, 3.1, 1.2), True, True),
+        (Pose2(5.0, 3.0, 1.0), Pose2(5.4, 3.4, 0.8), True, True),  # it was driving
+        (Pose2(5.0, 3.0, 1.0), Pose2(5.0, 3.0, -1.5), False, True),  # it was turning
+        (Pose2(5.0, 3.0, 1.0), Pose2(4.0, 3.0, 1.0), True, False),
+        (Pose2(5.0, 3.0, 1.0), Pose2(0.1, 0.0, 0.0), False, False),
+        (Pose2(0.1, 0.1, 3.0), Pose2(0.0, 0.0, 0.0), False, False),
+        (Pose2(0.5, 0.0, 0.0), Pose2(0.1, 0.0, 0.0), True, False),  # through the origin, or again from it
+    ],
+)
+def test_odometry_has_begun_again_if_no_base_can_have_moved_so_or_a_restart_finds_it_elsewhere_or_at_its_origin(
+    before: Pose2, now: Pose2, *, follows: bool, outlives: bool
+) -> None:
+    known = RecallPlace(Pose2(1.0), before, 0.1, 0.1, 10.0)
+    assert (known.follows(now, 10.4), known.outlives(now)) == (follows, outlives)
 
 
 def test_what_is_no_number_and_a_map_without_room_are_refused() -> None:

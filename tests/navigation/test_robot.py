@@ -12,17 +12,20 @@ import numpy as np
 import pytest
 
 from rbxcompose.base.geometry import Pose2
+from rbxcompose.base.levels import Level
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.bases.components.diff_drive_sim import DiffDriveSim
 from rbxcompose.domains.navigation.components.navigator import Navigator
 from rbxcompose.domains.navigation.planner import PlannedPath
 from rbxcompose.domains.worlds.grid_map import map_files
-from rbxcompose.domains.worlds.poses import pose_in
+from rbxcompose.domains.worlds.poses import message_of, pose_in
 from rbxcompose.msgs.builtin_interfaces import Duration, Time
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 from rbxcompose.msgs.geometry_msgs import (
     Point,
     Pose,
     PoseStamped,
+    PoseWithCovariance,
     PoseWithCovarianceStamped,
     Quaternion,
     Twist,
@@ -599,6 +602,18 @@ def test_the_simulator_tells_where_the_robot_is_however_wrong_its_odometry(tmp_p
     assert pose_in(told[-1].pose.pose).distance(room.base.core.pose) < 0.05
 
 
+def test_a_robot_stops_soon_after_nobody_localises_it_any_more(tmp_path: Path) -> None:
+    room = Room(tmp_path, ROBOT.replace(LASER, "") + "  localisation: {type: fake}\n")
+    goal = NavigateToPose.Goal(pose=PoseStamped(Header(frame_id="map"), Pose(Point(-2.0, 2.5, 0.0))))
+    room.bench.bus.action_client("me", "/go_to", NavigateToPose)(goal, room.ends.append, room.feedback.append)
+    assert room.bench.run_until(lambda: room.base.core.velocity.linear > 0.3, 20.0)
+    room.bench.host.retire(["localisation"])
+    room.bench.advance(2.5)
+    assert room.base.is_at_rest
+    assert room.bench.run_until(lambda: bool(room.ends), 30.0)
+    assert room.reason() == "it is not known where the robot is in 'map'"
+
+
 def test_a_real_robot_has_no_simulator_that_tells_where_it_is(tmp_path: Path) -> None:
     Room(tmp_path, ROBOT + "  localisation: {type: fake}\n")
     report = compile_robot(str(tmp_path / "robots/one"), real=True, environment={}).report
@@ -611,6 +626,69 @@ def test_a_manifest_says_how_many_particles_there_are(tmp_path: Path) -> None:
     room.bench.advance(1.0)
     localisation: Any = room.bench.component("localisation")
     assert 50 <= len(localisation.filter.poses) <= 150
+
+
+def localised(tmp_path: Path) -> tuple[Room, list[PoseWithCovarianceStamped], list[DiagnosticStatus]]:
+    """Return a robot that has driven on from its start, with what its localisation tells from then on."""
+    robot = ROBOT.replace("diff_drive_sim}", "diff_drive_sim, drift: 1 %}")
+    room = Room(tmp_path, robot + "  localisation: {type: particles}\n")
+    assert room.go(-0.6, 1.5).outcome is Outcome.SUCCEEDED
+    room.bench.advance(0.5)
+    told = room.bench.collect("/amcl_pose", PoseWithCovarianceStamped)
+    return room, told, room.bench.statuses("localisation: scan")
+
+
+def is_at(room: Room, told: list[PoseWithCovarianceStamped]) -> bool:
+    return bool(told) and all(pose_in(one.pose.pose).distance(room.base.core.pose) < 0.2 for one in told)
+
+
+@pytest.mark.parametrize("how", ["fails", "is replaced"])
+def test_a_localisation_that_restarts_goes_on_where_the_robot_is(tmp_path: Path, how: str) -> None:
+    room, told, statuses = localised(tmp_path)
+    host = room.bench.host
+    assert room.base.core.pose.distance(Pose2(-2.0, 0.0)) > 1.0
+    if how == "fails":
+        host.failed("localisation", ValueError("planted"))
+    else:
+        host.prepare([host.hosted["localisation"].instance])
+        host.activate(["localisation"])
+    room.bench.advance(3.0)
+    assert is_at(room, told)
+    assert statuses[-1].level == Level.OK
+    assert room.go(-2.0, 1.0).outcome is Outcome.SUCCEEDED
+    assert room.base.core.pose.distance(Pose2(-2.0, 1.0)) < 0.2
+
+
+def test_a_localisation_that_cannot_know_its_place_after_a_restart_lets_nothing_drive(tmp_path: Path) -> None:
+    room, told, statuses = localised(tmp_path)
+    localisation: Any = room.bench.component("localisation")
+    localisation.keep(None)
+    before = room.base.core.pose
+    room.bench.host.failed("localisation", ValueError("planted"))
+    room.bench.advance(3.0)
+    assert room.go(-2.0, 1.0).outcome is Outcome.ABORTED
+    assert "no pose of 'base_link' in 'map'" in room.reason()
+    assert (room.base.core.pose, told) == (before, [])
+    assert statuses[-1].level == Level.ERROR
+    assert "does not know where the robot is, so nothing drives: give a pose on 'initialpose'" in statuses[-1].message
+    pose = PoseWithCovariance(message_of(before), np.zeros(36))
+    room.bench.publish("/initialpose", PoseWithCovarianceStamped(Header(frame_id="map"), pose), Qos.EVENT)
+    assert room.go(-2.0, 1.0).outcome is Outcome.SUCCEEDED
+    assert is_at(room, told[-1:])
+
+
+@pytest.mark.parametrize("stays", [True, False])
+def test_a_robot_whose_odometry_begins_again_is_where_the_laser_sees_it(tmp_path: Path, *, stays: bool) -> None:
+    room, told, statuses = localised(tmp_path)
+    if stays:
+        room.base.estimate = Pose2()
+    else:
+        room.bench.host.failed("base", ValueError("planted"))  # a simulated one is carried to its start
+    room.bench.advance(3.0)
+    assert is_at(room, told)
+    assert statuses[-1].level == Level.OK
+    assert room.go(-2.0, 1.0).outcome is Outcome.SUCCEEDED
+    assert is_at(room, told[-1:])
 
 
 @pytest.mark.soak

@@ -13,8 +13,9 @@ from rbxcompose.base.geometry import Pose2, wrap_angle
 from rbxcompose.base.levels import Level
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.navigation.components.tag_localisation import SURE, PlacedTag, TagFilter
+from rbxcompose.domains.navigation.localiser import RESTARTED
 from rbxcompose.domains.worlds.poses import message_of, pose_in
-from rbxcompose.msgs.geometry_msgs import PoseWithCovariance, PoseWithCovarianceStamped
+from rbxcompose.msgs.geometry_msgs import PoseWithCovariance, PoseWithCovarianceStamped, Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.std_msgs import Header, String
 from rbxcompose.msgs.tf2_msgs import TFMessage
@@ -164,3 +165,29 @@ def test_a_pose_that_somebody_points_at_counts_unless_it_is_no_pose() -> None:
     assert odom_in_map() == []
     point(2.0)
     assert odom_in_map() == pytest.approx([2.0])
+
+
+def test_over_a_restart_the_place_stays_known_unless_odometry_begins_again() -> None:
+    bench = Bench(
+        instance("base", "diff_drive_sim", {}),
+        instance("localisation", "tag_localisation", {"tags": {"west": (0.0, 2.0, 0.0)}, "start": (2.0, 1.0, 0.5)}),
+    )
+    for _ in range(20):
+        bench.publish("/cmd_vel", Twist(linear=Vector3(x=0.4)))
+        bench.advance(0.25)
+    placed, statuses = bench.collect("/tf", TFMessage), bench.statuses("localisation")
+
+    def odom_in_map() -> list[float]:
+        found = [one for message in placed for one in message.transforms if one.header.frame_id == "map"]
+        return [one.transform.translation.x for one in found]
+
+    bench.host.failed("localisation", ValueError("planted"))
+    bench.advance(2.5)
+    assert set(np.round(odom_in_map(), 2)) == {2.0}
+    for name, doubt in ("base", "the odometry of the base has begun again"), ("localisation", RESTARTED):
+        bench.host.failed(name, ValueError("planted"))
+        bench.advance(0.5)
+        placed.clear()
+        bench.advance(2.0)
+        assert odom_in_map() == []
+        assert statuses[-1].message == f"{doubt}: the camera has told nothing yet"

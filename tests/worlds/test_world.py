@@ -79,7 +79,7 @@ class Placed:
 
     known = 0
 
-    def now(self) -> Pose2:
+    def now(self, *, within: float = 0.0) -> Pose2:
         return Pose2()
 
     def transform(self, *, at: int | None = None) -> Transform3:

@@ -90,8 +90,10 @@ class ParticleFilter:
         """Share of the newest scan's beams that end within two sigma of something in the map, seen from the pose."""
         self.start_anywhere()
 
-    def start(self, pose: Pose2, spread: float, turn_spread: float) -> None:
+    def start(self, pose: Pose2, spread: float, turn_spread: float, *others: Pose2) -> None:
         """Begin around a pose in `map`, with standard deviations of both coordinates [m] and the heading [rad].
+
+        It may as well be at one of `others`: the next scan decides.
 
         Raises:
             ValueError: if the pose is outside of the map, or a number is not finite or a spread is below zero.
@@ -102,8 +104,9 @@ class ParticleFilter:
         rows, columns = self.grid.cells.shape
         if not (0 <= column < columns and 0 <= row < rows):
             raise ValueError(f"a start at ({pose.x:g} m, {pose.y:g} m) is outside of the map")
-        noise = self._random.standard_normal((self.settings.most, 3)) * (spread, spread, turn_spread)
-        self._begin(noise + np.array((pose.x, pose.y, pose.heading)), pose)
+        middles = np.array([(one.x, one.y, one.heading) for one in (pose, *others)]).repeat(self.settings.most, axis=0)
+        noise = self._random.standard_normal(middles.shape) * (spread, spread, turn_spread)
+        self._begin(middles + noise, pose)
 
     def start_anywhere(self) -> None:
         """Begin with no idea: evenly on all free cells, with any heading."""
@@ -128,17 +131,18 @@ class ParticleFilter:
             self._sample()
             self._is_due = True
 
-    def see(self, sensor: Pose2, angles: ArrayLike, ranges: ArrayLike) -> bool:
+    def see(self, sensor: Pose2, angles: ArrayLike, ranges: ArrayLike, *, anew: bool = False) -> bool:
         """Take a scan of a sensor at a pose in the base: rays at `angles` (n,) [rad] end at `ranges` (n,) [m].
 
         Ranges that are infinite, no number, or not above zero are left out, as are angles that are not finite: a
         likelihood field says nothing of rays that end nowhere. Returns whether the scan was weighed and the particles
-        resampled; it is not before the robot has moved on since the last one.
+        resampled; it is not before the robot has moved on since the last one, except `anew`: among a few places, scans
+        from the same one decide.
         """
         points = self._echoes(sensor, np.asarray(angles, float), np.asarray(ranges, float))
         if not len(points):
             return False
-        if is_due := self._is_due:
+        if is_due := self._is_due or anew:
             self._sample()
             self._weigh(points)
             self._is_due = False

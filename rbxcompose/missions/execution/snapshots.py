@@ -45,7 +45,7 @@ class SnapshotStore:
         engine = run.engine
         if self._folder is None or engine.status != RUNNING:
             return None
-        state = (list(engine.statuses), dict(engine.data), run.is_paused)
+        state = (engine, list(engine.statuses), dict(engine.data), run.is_paused)  # another one has another identity
         if self._known.get(run.name) == state:
             return None
         if now < self._due.get(run.name, now) - ROUNDING:

@@ -70,9 +70,9 @@ class Lookup:
     target: str
     source: str
 
-    def now(self) -> Pose2 | None:
-        """Return the pose [m, m, rad], or None while the frames are not connected."""
-        found = self.frames.lookup(self.target, self.source)
+    def now(self, *, within: float = math.inf) -> Pose2 | None:
+        """Return the pose [m, m, rad]; None while the frames are not connected, or if one of them is older [s]."""
+        found = self.frames.lookup(self.target, self.source, within)
         return found.to_pose2() if found else None
 
     def transform(self, *, at: int | None = None) -> Transform3:
@@ -102,9 +102,11 @@ class Frames:
         self._moving = bus.subscribe(owner, "/tf", TFMessage, ports.Qos.STATE, self._move, is_patient=is_patient)
         bus.subscribe(owner, "/tf_static", TFMessage, ports.Qos.LATCHED, self._fix)
 
-    def lookup(self, target: str, source: str) -> Transform3 | None:
-        """Return the newest pose of frame `source` in frame `target`, or None while they are not connected."""
+    def lookup(self, target: str, source: str, within: float = math.inf) -> Transform3 | None:
+        """Return the newest pose of frame `source` in frame `target`; None if there is none, or it is older [s]."""
         self._moving.catch_up()
+        if within < math.inf and (self.tree.age(target, source, self._clock.now()) or 0.0) > within:
+            return None
         return self.tree.lookup(target, source)
 
     def transform(self, target: str, source: str, at: int | None = None) -> Transform3:

@@ -31,6 +31,7 @@ class FakeLocalisation(Localiser[FakeLocalisationConfig]):
 
     def configure(self) -> None:
         """Know nothing yet."""
+        super().configure()
         self.correction = Pose2()  # of `odom` in `map`
 
     def step(self, dt: float) -> None:

@@ -28,6 +28,7 @@ from rbxcompose.domains.navigation.costs import (
     LayeredCosts,
 )
 from rbxcompose.domains.navigation.follower import FollowerSettings, FollowState, PathFollower
+from rbxcompose.domains.navigation.localiser import STALE
 from rbxcompose.domains.navigation.manoeuvres import BackUpManoeuvre, Manoeuvre, ManoeuvreState, SpinManoeuvre
 from rbxcompose.domains.navigation.markers import zone_markers
 from rbxcompose.domains.navigation.planner import NoPathError, PlannedPath, plan
@@ -337,7 +338,7 @@ class Navigator(BaseDriver[NavigatorConfig]):
         elif self.recovery is not None or self.now < self.yields:
             self.waits = self.now
             self.wait(goal, self.reason)
-        elif (trouble := self.trouble()) or (pose := self.pose.now()) is None or self.costs is None:
+        elif (trouble := self.trouble()) or (pose := self.pose.now(within=STALE)) is None or self.costs is None:
             self.wait(goal, trouble or f"it is not known where the robot is in '{MAP_FRAME}'")
         else:
             self.drive_on(goal, pose, self.costs, dt)
@@ -463,7 +464,7 @@ class Navigator(BaseDriver[NavigatorConfig]):
             wanted.canceled()
         elif (why := self.silence()) and self.now - self.started <= self.config.silence:
             self.rest()  # the first scan may be on its way
-        elif (pose := self.pose.now()) is None or why:
+        elif (pose := self.pose.now(within=STALE)) is None or why:
             why = why or f"it is not known where the robot is in '{MAP_FRAME}'"
             self.end_manoeuvre(wanted, why, Spin.Result.TF_ERROR)
         elif 0 < (allowed := seconds_of(wanted.request)) < self.now - self.turned:

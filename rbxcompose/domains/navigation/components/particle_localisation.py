@@ -12,7 +12,15 @@ from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.navigation.localisation import LocalisationSettings, ParticleFilter
-from rbxcompose.domains.navigation.localiser import BASE, ODOM, Localiser, given_pose
+from rbxcompose.domains.navigation.localiser import (
+    BASE,
+    BEGAN_AGAIN,
+    ODOM,
+    RESTARTED,
+    Localiser,
+    RecallPlace,
+    given_pose,
+)
 from rbxcompose.domains.worlds.poses import NewestMessage, message_of, rays_of
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_of
 from rbxcompose.msgs import geometry_msgs as geometry
@@ -23,6 +31,7 @@ from rbxcompose.msgs.std_srvs import Empty
 from rbxcompose.sdk.ports import BULK
 
 LOST = 0.3  # share of a scan that the map explains below which the robot is probably elsewhere
+FOUND, SURE = 0.5, 0.3  # such a share, and a standard deviation [m], by which a doubtful place is right
 
 
 class LocalisationConfig(sdk.Config):
@@ -82,6 +91,7 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
 
     def configure(self) -> None:
         """Know no map yet."""
+        super().configure()
         self.filter: ParticleFilter | None = None
         self.scan = NewestMessage[LaserScan]()
         self.correction = Pose2()  # of `odom` in `map`, until the map is known
@@ -101,6 +111,9 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
         """Report how much of the newest scan the map explains."""
         if self.filter is None:
             return sdk.TaskStatus(Level.WARN, "there is no map")
+        if self.doubt:
+            help_text = "give a pose on 'initialpose', or let it drive by hand until it has found itself"
+            return sdk.TaskStatus(Level.ERROR, f"{self.doubt}, so nothing drives: {help_text}")
         share = f"the map explains {self.filter.quality:.0%} of what the laser sees"
         return sdk.TaskStatus(Level.OK if self.filter.quality >= LOST else Level.WARN, share)
 
@@ -108,27 +121,44 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
         """Begin in a new map: at the start, or where the robot was believed to be."""
         config, before = self.config, self.filter
         self.filter = ParticleFilter(grid_of(message), filter_settings(config), config.seed)
-        if before is not None or not config.anywhere:
-            self.begin(before.pose if before is not None else Pose2(*config.start), config.spread, config.turn_spread)
+        if before is not None:
+            self.begin(before.pose, config.spread, config.turn_spread)
+        elif self.is_new and not config.anywhere:
+            self.begin(Pose2(*config.start), config.spread, config.turn_spread)
 
     def on_initialpose(self, message: geometry.PoseWithCovarianceStamped) -> None:
         """Begin again at a pose that somebody pointed at in a viewer."""
-        self.begin(*given_pose(message))
+        if self.begin(*given_pose(message)):
+            self.doubt, self.recalled = "", None
+            self.keep(None)  # until the next scan
 
     def on_anywhere(self, request: Empty.Request) -> Empty.Response:
         """Begin again with no idea."""
         if self.filter is not None:
             self.filter.start_anywhere()
+            self.doubt = self.doubt and RESTARTED  # scans from one place do not decide among all
         return Empty.Response()
 
-    def begin(self, pose: Pose2, spread: float, turn_spread: float) -> None:
-        """Begin around a pose, unless it is none of the map."""
+    def begin(self, pose: Pose2, spread: float, turn_spread: float, *others: Pose2) -> bool:
+        """Begin around a pose, or others; return whether it is one of the map."""
         if self.filter is None:
-            return
+            return False
         try:
-            self.filter.start(pose, spread, turn_spread)
+            self.filter.start(pose, spread, turn_spread, *others)
         except ValueError as error:
             self.warn(str(error))
+            return False
+        return True
+
+    def go_on_from(self, since: RecallPlace, stayed: Pose2 | None) -> str:
+        """Begin where the robot was, moved since; where it may have stayed, the next scan decides."""
+        if self.filter is not None:
+            self.filter.move(since.odometry)
+        if stayed is None:
+            return "" if self.begin(since.pose, since.spread, since.turn_spread) else RESTARTED
+        self.scan = NewestMessage()  # it may be from before
+        self.begin(stayed, self.config.spread, self.config.turn_spread, since.pose)
+        return BEGAN_AGAIN
 
     def on_scan(self, message: LaserScan) -> None:
         """Weigh a scan, now or as soon as it is known from where it was taken."""
@@ -137,25 +167,37 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
 
     def take_scan(self) -> None:
         """Weigh the newest scan, unless that has been done."""
-        if self.filter is None or (placed := self.scan.take(self.now, self.bound["laser"], self.odometry)) is None:
+        if self.filter is None:
+            return
+        if (odometry := self.odometry.now()) is not None:
+            self.look_back(odometry)
+        if (placed := self.scan.take(self.now, self.bound["laser"], self.odometry)) is None:
             return  # diagnostics of transforms say so
         message, (laser, base) = placed
         self.filter.move(base.to_pose2())
         angles, ranges = rays_of(message)
         ranges = np.where(ranges <= message.range_max, ranges, math.inf)
-        if self.filter.see(laser.to_pose2(), angles, ranges):
+        is_weighed = self.filter.see(laser.to_pose2(), angles, ranges, anew=self.doubt == BEGAN_AGAIN)
+        covariance = self.filter.covariance
+        if self.filter.quality >= FOUND and math.sqrt(covariance[[0, 1], [0, 1]].max()) <= SURE:
+            self.doubt = ""
+        if is_weighed:
             self.tell(self.filter, message.header)
+        if not self.doubt:
+            self.remember(self.filter.pose, base.to_pose2(), covariance)
 
     def step(self, dt: float) -> None:
-        """Publish where `odom` is in `map`."""
+        """Publish where `odom` is in `map`, unless that is in doubt."""
         self.take_scan()
         if self.filter is not None:
             self.correction = self.filter.correction
-        self.place(self.correction)
+        if not self.doubt:
+            self.place(self.correction)
 
     def tell(self, found: ParticleFilter, of: Header) -> None:
-        """Publish the pose and, for viewers, the particles."""
-        self.publish_pose(found.pose, found.covariance, of.stamp)
+        """Publish the pose, unless it is in doubt, and for viewers the particles."""
+        if not self.doubt:
+            self.publish_pose(found.pose, found.covariance, of.stamp)
         if self.cloud.is_wanted:
             header = Header(stamp=of.stamp, frame_id=MAP_FRAME)
             self.cloud(geometry.PoseArray(header, tuple(message_of(Pose2(*one)) for one in found.poses.tolist())))

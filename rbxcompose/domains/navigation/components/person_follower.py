@@ -16,6 +16,7 @@ from rbxcompose.domains.bases.driving import BaseDriver
 from rbxcompose.domains.navigation.companion import CompanionState, PersonCompanion, whom_to_follow
 from rbxcompose.domains.navigation.costs import CostSettings, CostZone, LayeredCosts
 from rbxcompose.domains.navigation.follower import FollowerSettings
+from rbxcompose.domains.navigation.localiser import STALE
 from rbxcompose.domains.navigation.people import TrackedPerson
 from rbxcompose.domains.worlds.grid_map import GridMap
 from rbxcompose.domains.worlds.poses import NewestMessage, pose_in, rays_of
@@ -181,7 +182,7 @@ class PersonFollower(BaseDriver[PersonFollowerConfig]):
             self.rest()
             goal.canceled()
             return
-        if (pose := self.bound["base"].now()) is None:
+        if (pose := self.bound["base"].now(within=STALE)) is None:
             self.wait(goal, f"it is not known where the robot is in '{self.config.stands_in}'")
             return
         costs = self.around(pose)

@@ -7,7 +7,7 @@ direction in place of the range and the bearing of a landmark. The innovation ga
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Self
 
 from pydantic import Field
 
@@ -16,7 +16,7 @@ from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, Transform3, rotate, wrap_angle
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.navigation.localiser import Localiser, given_pose
+from rbxcompose.domains.navigation.localiser import BEGAN_AGAIN, Localiser, RecallPlace, given_pose
 from rbxcompose.domains.vision.tag_watcher import SQUARE, TagWatcher, TagWatcherConfig, WatchedTag
 from rbxcompose.domains.worlds.physics.solids import rotation_matrix
 from rbxcompose.msgs import geometry_msgs as geometry
@@ -203,14 +203,30 @@ class TagLocalisation(Localiser[TagLocalisationConfig], TagWatcher[TagLocalisati
         self.agreed = 0  # tags that were, since a goal began
         self.goal: ServedLocalise | None = None
         self.turned = 0.0  # since then [rad]
-        if not config.anywhere:
+        if self.is_new and not config.anywhere:
             self.filter.start(Pose2(*config.start), config.spread, config.turn_spread)
+
+    def take_over(self, old: Self) -> None:
+        """Go on from where the one before knew the robot to be."""
+        super().take_over(old)
+        if not self.is_new:
+            self.filter.pose = None
+
+    def go_on_from(self, since: RecallPlace, stayed: Pose2 | None) -> str:
+        """Begin where the robot was, moved since; where it may have stayed, it is nowhere until a tag is seen."""
+        self.filter.move(since.odometry)
+        if stayed is None:
+            self.filter.start(since.pose, since.spread, since.turn_spread)
+            return ""
+        self.filter.pose = None
+        return BEGAN_AGAIN
 
     def on_initialpose(self, message: geometry.PoseWithCovarianceStamped) -> None:
         """Begin again at a pose that somebody pointed at in a viewer."""
         pose, spread, turn_spread = given_pose(message)
         if math.isfinite(pose.x + pose.y + pose.heading):
             self.filter.start(pose, spread, turn_spread)
+            self.recalled = None
         else:
             self.warn("an initial pose is not finite")
 
@@ -228,9 +244,14 @@ class TagLocalisation(Localiser[TagLocalisationConfig], TagWatcher[TagLocalisati
 
     def step(self, dt: float) -> None:
         """Publish where `odom` is in `map`, and report how well that is known."""
-        self.take_tags()
         if (base := self.bound["base"].now()) is not None:
+            self.look_back(base)
+        self.take_tags()
+        if base is not None:
             self.filter.move(base)
+            if self.filter.pose is not None:
+                self.doubt = ""
+                self.remember(self.filter.pose, base, self.filter.covariance)
         if (correction := self.filter.correction) is not None:
             self.place(correction)
         self.status(*self.state())
@@ -282,7 +303,8 @@ class TagLocalisation(Localiser[TagLocalisationConfig], TagWatcher[TagLocalisati
         """Return how well it is known where the robot is."""
         trouble = self.trouble(UNSURE * 4)
         if self.filter.pose is None:
-            return Level.WARN, trouble or "no tag of a known place has been seen yet"
+            unseen = trouble or "no tag of a known place has been seen yet"
+            return Level.WARN, f"{self.doubt}: {unseen}" if self.doubt else unseen
         seen = self.now - self.recognised
         last = f"a tag was seen {seen:.0f} s ago" if seen < math.inf else "no tag has been seen yet"
         words = f"{last}, known to {self.filter.error:.2f} m"
