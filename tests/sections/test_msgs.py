@@ -330,7 +330,12 @@ def test_a_component_of_another_package_imports_them_also_in_a_part(tmp_path: Pa
 def test_a_type_that_imports_them_is_in_the_schema_of_their_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], in_editor: bool
 ) -> None:
-    put(tmp_path / "lib", "toy-gripper", {"component.toy_gripper": "toy_gripper"}, {"toy_gripper.py": PLUGIN})
+    put(
+        tmp_path / "lib",
+        "toy-squeezer",
+        {"component.toy_squeezer": "toy_squeezer"},
+        {"toy_squeezer.py": PLUGIN.replace("toy_gripper", "toy_squeezer")},
+    )
     see(tmp_path / "lib", monkeypatch)
     schema_with.cache_clear()
     robot = "rbx: 1\nkind: Robot\nname: one\nmsgs: {own: msgs}\ncomponents: {}\n"
@@ -340,20 +345,20 @@ def test_a_type_that_imports_them_is_in_the_schema_of_their_robot(
     monkeypatch.chdir(tmp_path / "lib")
     assert main(["schema", "robot"]) == 0
     printed, told = capsys.readouterr()
-    assert "component_toy_gripper" not in printed
-    assert "warning[RBX9302]: the component 'toy_gripper' of package 'toy-gripper' cannot be used" in told
+    assert "component_toy_squeezer" not in printed
+    assert "warning[RBX9302]: the component 'toy_squeezer' of package 'toy-squeezer' cannot be used" in told
     assert "run this in the folder of that robot" in told
     file = tmp_path / "robots/one/robot.yaml"
     if in_editor:
         editor = Editor({})
         editor.change(file, robot)
         assert editor.robot_of(file)
-        assert "component_toy_gripper" in installed_schema("Robot")["$defs"]
+        assert "component_toy_squeezer" in installed_schema("Robot")["$defs"]
         return
     monkeypatch.chdir(file.parent)
     assert main(["schema", "robot"]) == 0
     printed, told = capsys.readouterr()
-    assert "component_toy_gripper" in printed
+    assert "component_toy_squeezer" in printed
     assert not told
 
 
