@@ -45,7 +45,7 @@ def names_of_skills(components: Mapping[str, RobotComponent], outside: Outside =
 
 
 def usable_skills(robot: Robot) -> dict[str, SkillSource]:
-    """Return all skills that a mission of the robot may use, by name; it need not use any of those in Python."""
+    """Return all skills that a mission of the robot may use, by name: those in Python also where none does so far."""
     in_python = {source.skill.name: source for source in python_skills(skill_names())}
     return dict(sorted({**in_python, **robot.skills}.items()))
 

@@ -267,12 +267,10 @@ class _Compiling:
     def _file(self, entry: str, model: SystemRobotModel) -> str | Finding:
         """Return the file of a robot as findings show it."""
         span = value_span(self.out.root, ("robots", entry, "robot"))
-        file = (
-            model.robot
-            if model.robot.startswith(PREFIX)
-            else resolve(model.robot, self.out.path or Path(), span, may_be_robot=True)
-        )
-        return file if isinstance(file, str | Finding) else shown_name(file)
+        if model.robot.startswith(PREFIX):
+            return model.robot
+        file = resolve(model.robot, self.out.path or Path(), span, may_be_robot=True)
+        return file if isinstance(file, Finding) else shown_name(file)
 
     def _compile(self, file: str, profile: str | None, world: str, outside: Outside) -> Compilation:
         return compile_robot(

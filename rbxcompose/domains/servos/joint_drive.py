@@ -206,9 +206,7 @@ class JointDrive(ABC):
         if (raw := values.get("present_voltage")) is not None:
             self.voltage = model.to_si("present_voltage", raw)
         if model.protocol == 1 or "hardware_error" in values:  # in 2.0, not each reading has errors
-            bits = (
-                reading.alert & ONE_ERRORS if model.protocol == 1 else values["hardware_error"] * (reading.alert > 127)
-            )
+            bits = reading.alert & ONE_ERRORS if model.protocol == 1 else values["hardware_error"]
             self._errors[id] = ", ".join(hardware_errors(bits))
 
     def _measure(self, servo: JointServo, raw: int, speed: int, stamp: float) -> None:
