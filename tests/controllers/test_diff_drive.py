@@ -15,7 +15,8 @@ from rbxcompose.domains.bases.controllers.diff_drive import DiffDriveConfig, Dif
 from rbxcompose.domains.servos.controller_manager import SwitchControllers
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from tests.controllers.wheels import DISTANCE, RADIUS, STEP, Rover
+from rbxcompose.testing import instance
+from tests.controllers.wheels import DISTANCE, RADIUS, STEP, Rover, wheels
 from tests.soak import rare
 
 QUARTER = 0.6, 0.15  # radius of the path [m], speed [m/s]
@@ -300,3 +301,65 @@ def test_settings_that_contradict_each_other_are_a_mistake() -> None:
     assert mistake(ticks_per_metre=4000.0).startswith("ticks_per_metre: it has")
     assert mistake(right="a") == "right: 'a' is its left and its right wheel"
     assert mistake(odometry={"frame": "odom", "child": "odom"}).startswith("odometry: the frame 'odom'")
+
+
+def restarted(rover: Rover, *, loses: float | None = None, turns: float = 0.0) -> Rover:
+    """Let the driver fail and start again, with its servos where they are, or at `loses` [ticks] as after a power cut.
+
+    Meanwhile the wheels `turn` [ticks].
+    """
+    ticks = [servo.motor.position for servo in rover.servos]
+    rover.bench.host.start()
+    rover.bench.host.failed("servos", RuntimeError("planted"))
+    rover.told.clear()
+    rover.bench.run_until(lambda: rover.bench.host.hosted["servos"].component not in (None, rover.driver), 5.0)
+    rover.driver = rover.bench.component("servos")
+    for servo, tick, way in zip(rover.servos, ticks, (turns, -turns), strict=True):
+        servo.motor.position = (tick + way) if loses is None else loses
+    rover.bench.advance(1.0)
+    return rover
+
+
+@pytest.mark.parametrize("model", ["XL430-W250", *rare("MX-28")])
+@pytest.mark.parametrize("turns", [0.0, 700.0])
+def test_after_a_restart_odometry_goes_on_by_what_the_wheels_have_turned_since(model: str, turns: float) -> None:
+    rover = Rover(model)
+    rover.drive(0.2, 0.4, 4.0)
+    rover.command(0.0)
+    rover.advance(1.0)
+    sure = rover.told[-1].pose.covariance
+    before, way = rover.pose, turns * rover.servos[0].model.per_tick * RADIUS
+    restarted(rover, turns=turns)
+    expected = before.compose(Pose2(way))
+    assert rover.pose.distance(expected) < 0.003
+    places = [Pose2(told.pose.pose.position.x, told.pose.pose.position.y) for told in rover.told]
+    assert max(place.distance(expected) for place in places) < 0.003  # it says nothing before it knows
+    assert rover.told[-1].pose.covariance[0] >= 0.9 * sure[0]
+
+
+def test_after_a_restart_of_driver_and_servos_odometry_goes_on_where_it_was_and_that_is_said() -> None:
+    rover = Rover()
+    rover.drive(0.2, 0.4, 4.0)
+    rover.command(0.0)
+    rover.advance(1.0)
+    before = rover.pose
+    restarted(rover, loses=2048.0)
+    assert rover.pose.distance(before) < 0.003
+    spread = rover.told[-1].pose.covariance.reshape(6, 6)
+    assert 0.1 < math.sqrt(spread[0, 0]) < 0.5  # [m]: how far it went until it stood is not known
+    assert any("a wheel counts from elsewhere since a restart" in text for text in rover.bench.texts())
+    rover.drive(0.2, 0.0, 1.0)
+    assert 0.1 < rover.pose.distance(before) < 0.3
+
+
+def test_other_settings_of_a_bus_leave_the_base_where_it_is() -> None:
+    rover = Rover()
+    rover.drive(0.2, 0.4, 4.0)
+    rover.command(0.0)
+    rover.advance(1.0)
+    before = rover.pose
+    rover.bench.host.prepare([instance("servos", "servo_bus", wheels("XL430-W250", max_speed=0.3))])
+    rover.bench.host.activate(["servos"])
+    rover.told.clear()
+    rover.bench.advance(1.0)
+    assert rover.pose.distance(before) < 0.003

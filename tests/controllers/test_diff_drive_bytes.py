@@ -36,7 +36,7 @@ class Site:
     start = Pose2()
 
     def __init__(self, joints: Any) -> None:
-        self.joints, self.told = joints, list[str]()
+        self.joints, self.told, self.is_again = joints, list[str](), False
 
     @property
     def now(self) -> float:
@@ -53,6 +53,9 @@ class Site:
 
     def send(self, port: str, message: Any) -> None:
         raise AssertionError(port)
+
+    def keep(self, memory: object) -> None:
+        """Nothing starts again here."""
 
     def warn(self, text: str) -> None:
         self.told.append(text)

@@ -218,6 +218,29 @@ def test_a_board_that_starts_again_is_greeted_again_and_the_odometry_goes_on(tmp
 
 
 @needs_compiler
+@pytest.mark.parametrize("begins", [False, True])
+def test_odometry_goes_on_over_a_restart_of_the_base_also_if_the_board_starts_again(
+    tmp_path: Path, program: Path, *, begins: bool
+) -> None:
+    with wired(tmp_path, program) as robot:
+        robot.speed = (0.2, 0.0)
+        robot.run(3.0)
+        before = robot.place[0]
+        robot.bench.host.failed("base", RuntimeError("planted"))
+        robot.speed = None
+        if begins:
+            robot.start_board_again()
+        robot.odom.clear()
+        robot.run(3.0)
+        assert robot.odom
+        assert robot.base.last is not None
+        assert all(told.pose.pose.position.x > before - 0.06 for told in robot.odom)
+        assert robot.place[0] == pytest.approx(
+            before if begins else robot.base.last.left / 4000, abs=0.06 if begins else 1e-6
+        )
+
+
+@needs_compiler
 def test_an_unplugged_board_is_reported_and_driven_again_when_it_is_back(tmp_path: Path, program: Path) -> None:
     with wired(tmp_path, program) as robot:
         robot.speed = (0.2, 0.0)

@@ -38,7 +38,7 @@ ROOMS: dict[str, Cost] = {
     "compiler": Cost(code=7771, files=53, small=1, imports=874),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
     "domains/arms": Cost(code=12793, files=64, small=1, imports=1122),
-    "domains/bases": Cost(code=1992, files=16, small=0, imports=187),
+    "domains/bases": Cost(code=2076, files=16, small=0, imports=194),
     "domains/body": Cost(code=3563, files=27, small=2, imports=364),
     "domains/console": Cost(code=3544, files=20, small=0, imports=249),
     "domains/devices": Cost(code=1890, files=15, small=0, imports=183),
@@ -48,7 +48,7 @@ ROOMS: dict[str, Cost] = {
     "domains/policies": Cost(code=820, files=6, small=0, imports=71),
     "domains/power": Cost(code=439, files=5, small=0, imports=31),
     "domains/programs": Cost(code=3800, files=26, small=0, imports=372),
-    "domains/servos": Cost(code=7810, files=47, small=2, imports=557),
+    "domains/servos": Cost(code=7834, files=47, small=2, imports=559),
     "domains/vision": Cost(code=2511, files=24, small=1, imports=301),
     "domains/worlds": Cost(code=4499, files=37, small=3, imports=526),
     "manifest": Cost(code=3558, files=19, small=1, imports=271),
@@ -62,7 +62,7 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 112367,
+    "lines of code": 112473,
     "files": 757,
     "files of 1 to 30 lines of code": 42,
     "lines of imports": 10316,

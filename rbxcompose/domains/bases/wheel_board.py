@@ -91,13 +91,17 @@ class FrameReader:
 
 @dataclass(frozen=True, slots=True)
 class BoardState:
-    """What a board says: positions of its wheels [ticks], its battery [V], and what its flags mean."""
+    """What a board says: positions of its wheels [ticks], its battery [V], and what its flags mean.
+
+    With `begins`, it has started since the last state, so that its wheels count from elsewhere.
+    """
 
     left: int
     right: int
     voltage: float
     has_failed: bool
     stands: bool
+    begins: bool
 
 
 class BoardLink:
@@ -109,6 +113,7 @@ class BoardLink:
         self.is_greeted = False
         self._heard_at = self._greeted_at = -math.inf
         self._number = 0
+        self._begins = False
         self._next: int | None = None  # number of the next frame of the board
 
     def forget(self) -> None:
@@ -138,9 +143,12 @@ class BoardLink:
                 case 0x82, _STATE.size:
                     left, right, millivolts, flags = _STATE.unpack(found.payload)
                     self._heard_at = now
+                    self._begins |= not flags & GREETED
                     self.is_greeted = bool(flags & GREETED) and self.version == VERSION
                     if self.is_greeted:
-                        yield BoardState(left, right, millivolts / 1000.0, bool(flags & FAILED), bool(flags & STANDS))
+                        begins, self._begins = self._begins, False
+                        failed, stands = bool(flags & FAILED), bool(flags & STANDS)
+                        yield BoardState(left, right, millivolts / 1000.0, failed, stands, begins)
                 case _:
                     self._faults["unknown frames"] += 1
 

@@ -19,6 +19,9 @@ from rbxcompose.msgs.tf2_msgs import TFMessage
 ROUNDING = 1e-12  # a smaller difference of velocities counts as none [m/s, rad/s]
 UNKNOWN = 1e6  # variance of what wheels cannot measure: height, roll, pitch
 PLANAR = (0, 1, 5)  # x, y, and the turn about z, of the six that a covariance has
+KEPT = 0.05, 0.1  # [m], [rad] of motion after which a place is kept again for a restart
+KEPT_AT_REST = 0.001, 0.005  # [m], [rad] after which it is when the base rests
+PATIENCE = 0.5  # [s] for which a base that starts again reports no place unless it has the last one
 
 
 class VelocityWindow:
@@ -63,8 +66,8 @@ class WheelGeometry:
     """Between the points where the wheels touch the ground [m]."""
     metres_per_unit: float
     """Way of a wheel for each unit of its position [m/rad or m/tick]."""
-    counts: int | None = None
-    """Encoders start again at 0 after this many ticks; None if positions go on."""
+    counts: float | None = None
+    """Positions start again at 0 after this much [rad or ticks]; None if they go on."""
 
     def __post_init__(self) -> None:
         for value in (self.wheel_distance, self.metres_per_unit):
@@ -274,6 +277,28 @@ class OdometryPolicy:
     """Way of a wheel for one tick of its reading [m]."""
     window: float = 0.0
     """Over how long velocities are averaged [s], since ticks make those between two readings rough."""
+    stopping: float = math.inf
+    """Way of a wheel until the base rests [m]. One that has gone further over a restart counts from elsewhere."""
+
+
+@dataclass(frozen=True, slots=True)
+class OdometryRecord:
+    """Where a base and its wheels were, for an odometry that starts again; positions are [rad] or [ticks]."""
+
+    pose: Pose2
+    left: float
+    right: float
+    at: float
+    """Robot time [s]."""
+    covariance: tuple[float, ...]
+    """Of x [m], y [m], heading [rad], row by row."""
+
+    def is_news(self, kept: OdometryRecord | None, *, is_at_rest: bool) -> bool:
+        """Return whether the base has moved so far since `kept` that this one is worth keeping."""
+        if kept is None:
+            return True
+        step, (way, turn) = kept.pose.inverse().compose(self.pose), KEPT_AT_REST if is_at_rest else KEPT
+        return math.hypot(step.x, step.y) > way or abs(step.heading) > turn
 
 
 class WheelOdometry:
@@ -292,6 +317,26 @@ class WheelOdometry:
         self._last: tuple[float, float, float] | None = None  # left, right, time
         self._ways = (0.0, 0.0)  # of the wheels so far [m]
         self._past: deque[tuple[float, float, float]] = deque()  # time and ways, over the window
+        self._furthest = math.inf  # way of a wheel since the last reading, above which it counts from elsewhere [m]
+
+    @property
+    def record(self) -> OdometryRecord | None:
+        """Return where it is; None before the first reading."""
+        if self._last is None:
+            return None
+        return OdometryRecord(self.pose, *self._last, tuple(self.covariance.ravel().tolist()))
+
+    def go_on_from(self, record: OdometryRecord) -> None:
+        """Be where a base was before a restart, moved by what its wheels have turned since."""
+        self.pose, self._last = record.pose, (record.left, record.right, record.at)
+        self.covariance = np.array(record.covariance).reshape(3, 3)
+        self._past = deque([(record.at, *self._ways)])
+        self._furthest = self.policy.stopping
+
+    def lose_wheels(self) -> None:
+        """Stay here until the next reading: encoders have started again, and count from elsewhere."""
+        self.velocity, self._last = AT_REST, None
+        self._past.clear()
 
     def update(self, left: float, right: float, now: float) -> str | None:
         """Take in positions of the wheels [rad or ticks] at `now` [s]; return why they do not count, else None.
@@ -310,6 +355,11 @@ class WheelOdometry:
         dt = now - before[2]
         wheels = WheelSpeeds(self._difference(left, before[0]) / dt, self._difference(right, before[1]) / dt)
         way = max(abs(wheels.left), abs(wheels.right)) * self.geometry.metres_per_unit * dt
+        furthest, self._furthest = self._furthest, math.inf
+        if way > furthest:
+            spread = np.array((0.5, 0.5, 1.0 / self.geometry.wheel_distance)) * furthest
+            self.covariance = self.covariance + np.diag(spread**2)
+            return f"a wheel counts from elsewhere since a restart: its way within {dt:.1f} s is not known"
         speed = way / max(dt, self.policy.window)  # readings come late at times, and the next one soon after
         if speed > self.policy.greatest_speed:
             return f"a wheel has jumped: it would have moved at {speed:.3g} m/s"

@@ -22,6 +22,7 @@ if TYPE_CHECKING:  # `check` needs none of them
     from rbxcompose.base.geometry import Pose2
     from rbxcompose.domains.servos.joint_drive import JointDrive
     from rbxcompose.domains.servos.servo_cycle import ServoItem
+    from rbxcompose.sdk.component import Context
 
 PLUGINS = Plugins("controller", "controllers")
 _TYPES: dict[str, type[Controller[Any]]] = {}
@@ -77,6 +78,7 @@ class ControllerHost(Protocol):
     """The component that runs controllers, as their sites see it."""
 
     bound: dict[str, Any]
+    context: Context
 
     @property
     def now(self) -> float:
@@ -94,6 +96,9 @@ class ControllerHost(Protocol):
 
     def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ServoItem:
         """Return an item of a servo."""
+
+    def keep(self, controller: str, memory: object) -> None:
+        """Give a controller this frozen dataclass again, as data, when it starts again."""
 
 
 class ControllerSite:
@@ -133,6 +138,15 @@ class ControllerSite:
     def send(self, port: str, message: Any) -> None:
         """Publish at one of the controller's ports."""
         self._bus.bound[f"{self._name}_{port}"](message)
+
+    @property
+    def is_again(self) -> bool:
+        """Return whether the controller was already started since the robot came up."""
+        return self._bus.context.is_again
+
+    def keep(self, memory: object) -> None:
+        """Have `recall` called with this frozen dataclass, as data, when the controller starts again."""
+        self._bus.keep(self._name, memory)
 
     def warn(self, text: str) -> None:
         """Log something that a person should look at."""
@@ -192,6 +206,9 @@ class Controller(ABC, Generic[C]):
 
     def prepare(self) -> None:
         """Set up what it needs."""
+
+    def recall(self, memory: Any) -> None:
+        """Take what it has given its site to keep, as data: it has started again."""
 
     def accept(self, port: str, goal: Any) -> str:
         """Return why a goal at a port is refused; nothing accepts it."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import Command, Query, Refused
@@ -55,6 +56,14 @@ class ScaleMotion(Command):
     component: str
     controller: str
     share: float
+
+
+@dataclass(frozen=True, slots=True)
+class RecallControllers(Command):
+    """What controllers have kept, by their names, for those that start again."""
+
+    about = BUS
+    memories: Mapping[str, Any]
 
 
 class ControllerManager:

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field
 
 from rbxcompose import sdk
 from rbxcompose.base.config import BitRate
-from rbxcompose.base.geometry import Pose2, Velocity2
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.geometry import Velocity2
 from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Command
 from rbxcompose.domains.bases import wheel_board
 from rbxcompose.domains.bases.driving import drives
 from rbxcompose.domains.bases.wheels import (
+    PATIENCE,
     BaseLimits,
     OdometryPolicy,
+    OdometryRecord,
     WheelDrive,
     WheelGeometry,
     WheelOdometry,
@@ -60,12 +64,21 @@ class SerialBaseConfig(SerialConfig):
     """How often it tells the board how fast to drive."""
 
 
+@dataclass(frozen=True, slots=True)
+class RecallOdometry(Command):
+    """Where the base and its wheels were, for a base that starts again."""
+
+    about: ClassVar[str] = "serial_base"
+    record: OdometryRecord
+
+
 @sdk.component("serial_base")
 class SerialBase(SerialSensor[SerialBaseConfig]):
     """Drives a base on two wheels by a board at a serial port, such as an Arduino, and publishes its odometry.
 
     The board has the sketch `wheel_board`, or another one of its protocol. It stops its motors by itself when nothing
     comes from here for 0.2 s. While nothing comes from it for as long, the base rests, and begins again from rest.
+    Odometry goes on over a restart of the process, by what the wheels have turned meanwhile, and over one of the board.
 
     Example:
         base: {type: serial_base, port: /dev/ttyACM0, ticks_per_metre: 4200, wheel_distance: 24 cm}
@@ -103,18 +116,31 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
         limits = BaseLimits(config.max_speed, config.max_turn_rate, config.acceleration, config.turn_acceleration)
         self.drive = WheelDrive(self.geometry, limits, config.command_timeout, wheel_board.MOST_TICKS)
         self.link = wheel_board.BoardLink(self.faults)
-        self.odometry = self.new_odometry(Pose2())
+        tick = 1.0 / config.ticks_per_metre
+        fastest = self.geometry.fastest(Velocity2(config.max_speed, config.max_turn_rate)) * tick
+        policy = OdometryPolicy(greatest_speed=JUMP * fastest, resolution=tick, window=AVERAGED)
+        self.odometry = WheelOdometry(self.geometry, policy)
+        self.kept: OdometryRecord | None = None  # what the supervisor knows of that
+        self.knows_from = self.now + PATIENCE if self.context.is_again else -math.inf  # when it reports its place
+        self.has_begun = False  # the board has started since this component has
         self.last: wheel_board.BoardState | None = None
         self.was_alive = False
         self.refused = ""
         self.at_end.callback(self.stand)
 
-    def new_odometry(self, pose: Pose2) -> WheelOdometry:
-        """Return an odometry that begins at a pose, wherever the encoders are."""
-        config, tick = self.config, 1.0 / self.config.ticks_per_metre
-        fastest = self.geometry.fastest(Velocity2(config.max_speed, config.max_turn_rate)) * tick
-        policy = OdometryPolicy(greatest_speed=JUMP * fastest, resolution=tick, window=AVERAGED)
-        return WheelOdometry(self.geometry, policy, pose)
+    def take_over(self, old: Self) -> None:
+        """Go on where a base with other settings was."""
+        if record := old.odometry.record or old.kept:
+            self.recall(RecallOdometry(record))
+
+    @sdk.answers(RecallOdometry)
+    def recall(self, request: RecallOdometry) -> str:
+        """Go on where the base was before the restart."""
+        self.odometry.go_on_from(request.record)
+        if self.has_begun:
+            self.odometry.lose_wheels()
+        self.kept, self.knows_from = request.record, -math.inf
+        return "odometry goes on from before the restart"
 
     @property
     def is_at_rest(self) -> bool:
@@ -134,12 +160,22 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
         """Publish what the board says."""
         for state in self.link.feed(data, self.now):
             self.understood()
-            if self.last is None:
-                self.odometry = self.new_odometry(self.odometry.pose)  # its encoders may have begun again
             self.last = state
+            if state.begins:
+                self.has_begun = True
+                self.odometry.lose_wheels()
             if reason := self.odometry.update(state.left, state.right, self.now):
                 self.faults["jumps of wheels"] += "jumped" in reason
-            self.publish(state)
+            if self.now >= self.knows_from:
+                self.publish(state)
+                self.keep()
+
+    def keep(self) -> None:
+        """Let the supervisor know where the base is, if that is news."""
+        record = self.odometry.record
+        if record is not None and record.is_news(self.kept, is_at_rest=self.drive.at_rest):
+            self.kept = record
+            self.context.repeat([RecallOdometry(record)])
 
     def publish(self, state: wheel_board.BoardState) -> None:
         """Publish the odometry and the battery."""

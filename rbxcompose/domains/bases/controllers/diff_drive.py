@@ -11,10 +11,13 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.config import AngularJerk, Config, Jerk, JointName, LinkName
 from rbxcompose.base.geometry import Velocity2
+from rbxcompose.base.requests import from_data
 from rbxcompose.domains.bases.driving import drives
 from rbxcompose.domains.bases.wheels import (
+    PATIENCE,
     BaseLimits,
     OdometryPolicy,
+    OdometryRecord,
     WheelDrive,
     WheelGeometry,
     WheelOdometry,
@@ -31,6 +34,7 @@ from rbxcompose.msgs.tf2_msgs import TFMessage
 
 AVERAGED = 0.1  # [s], over which velocities are averaged
 JUMP = 2.0  # times the largest speed of a wheel: a servo that has started again counts from elsewhere
+OVERRUN = 0.5  # [s] for which wheels turn on when their process has died: watchdogs take less
 STALE = 3.0  # cycles after which nobody knows where a wheel is
 
 
@@ -153,7 +157,9 @@ class DiffDriveController(Controller[DiffDriveConfig]):
         self.wheels = joints[config.left], joints[config.right]
         tick = self.wheels[0].per_tick
         radius = config.wheel_radius or 1.0 / ((config.ticks_per_metre or math.nan) * tick)
-        rolling = WheelGeometry(config.wheel_distance, radius)
+        servo = self.wheels[0].joint.servos[0].model
+        turn = servo.family.ticks * tick if servo.protocol == 1 else None  # it does not report how many it has made
+        rolling = WheelGeometry(config.wheel_distance, radius, turn)
         speeds = config.max_speed, config.max_turn_rate, config.acceleration, config.turn_acceleration
         limits = BaseLimits(*speeds, config.jerk, config.turn_jerk)
         own = [wheel.rules.limits for wheel in self.wheels]
@@ -162,8 +168,11 @@ class DiffDriveController(Controller[DiffDriveConfig]):
             rolling, limits.of_wheels(rolling, least), config.command_timeout, min(item.speed for item in own)
         )
         fastest = rolling.fastest(Velocity2(config.max_speed, config.max_turn_rate)) * radius
-        policy = OdometryPolicy(config.odometry.variance_per_metre, JUMP * fastest, radius * tick, AVERAGED)
+        spread = config.odometry.variance_per_metre
+        policy = OdometryPolicy(spread, JUMP * fastest, radius * tick, AVERAGED, OVERRUN * fastest)
         self.odometry = WheelOdometry(rolling, policy, self.site.start)
+        self.kept: OdometryRecord | None = None  # what is known of that after a restart
+        self.knows_from = self.site.now + PATIENCE if self.site.is_again else -math.inf  # when it reports its place
         self.seen = -math.inf  # when both wheels had been measured last [s]
         self.refused = self.trouble = ""
 
@@ -228,9 +237,19 @@ class DiffDriveController(Controller[DiffDriveConfig]):
             if reason := self.odometry.update(left.measured.position, right.measured.position, seen):
                 self.site.warn(reason)
 
+    def recall(self, memory: Any) -> None:
+        """Go on where the base was before a restart."""
+        self.kept, self.knows_from = from_data(OdometryRecord, memory), -math.inf
+        self.odometry.go_on_from(self.kept)
+
     def publish(self) -> None:
         """Publish where the base is, and how it moves."""
         odometry, known = self.config.odometry, self.odometry
+        if self.site.now < self.knows_from:
+            return
+        if (record := known.record) is not None and record.is_news(self.kept, is_at_rest=self.drive.at_rest):
+            self.kept = record
+            self.site.keep(record)
         header = Header(stamp=to_time(self.site.stamp), frame_id=odometry.frame)
         self.site.send("odometry", odometry_message(known, header, odometry.child))
         if odometry.tf:

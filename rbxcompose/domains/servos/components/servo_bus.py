@@ -9,14 +9,14 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from rbxcompose.base.arrays import np
 from rbxcompose.base.clock import MonotonicClock
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.levels import Level
-from rbxcompose.base.requests import Refused, answers
+from rbxcompose.base.requests import Refused, answers, to_data
 from rbxcompose.domains.devices.serial_ports import PortError
 from rbxcompose.domains.servos import controller_manager
 from rbxcompose.domains.servos.bus import ServoBus, bus_type
@@ -317,6 +317,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
                 for name, controller in config.controllers.items()
             }
         )
+        self.kept: dict[str, Any] = {}  # what controllers want to know after a restart, as data
         self.is_stopped, self.lost_at = self.context.is_stopped, -math.inf
         self.reported_at, self.published_at = -math.inf, -math.inf
         self.is_parking = False
@@ -431,6 +432,23 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.publish()
 
     # Controllers
+
+    def keep(self, controller: str, memory: object) -> None:
+        """Give a controller this frozen dataclass again, as data, when it starts again."""
+        self.kept = {**self.kept, controller: to_data(memory)}
+        self.context.repeat([controller_manager.RecallControllers(self.kept)])
+
+    def take_over(self, old: Self) -> None:
+        """Let controllers go on from what those of a bus with other settings have known."""
+        self.recall(controller_manager.RecallControllers(old.kept))
+
+    @answers(controller_manager.RecallControllers)
+    def recall(self, request: controller_manager.RecallControllers) -> str:
+        """Let controllers go on from what they have known before a restart."""
+        self.kept = {name: memory for name, memory in request.memories.items() if name in self.controllers.controllers}
+        for name, memory in self.kept.items():
+            self.controllers.controllers[name].recall(memory)
+        return "controllers know what they did before the restart"
 
     def accept(self, controller: str, port: str, goal: Any) -> str:
         """Refuse what moves while the robot is stopped, or its bus has gone; else the controller decides."""
