@@ -31,13 +31,13 @@ from rbxcompose.domains.navigation.planner import plan
 from rbxcompose.domains.navigation.reach import ReachableAreas
 from rbxcompose.domains.worlds.contact import first_contact, overlap
 from rbxcompose.domains.worlds.grid_map import SOLID, GridMap, read_map
-from rbxcompose.domains.worlds.poses import message_of
 from rbxcompose.domains.worlds.ray_casting import Rays
 from rbxcompose.domains.worlds.sections.world import world
 from rbxcompose.domains.worlds.shapes import CircleFootprint, PolygonFootprint
 from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.poses import message_of
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.sdk.bound import Ended, Outcome
 from rbxcompose.sdk.ports import Qos

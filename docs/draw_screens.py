@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from rbxcompose.base.levels import level_of
-from rbxcompose.commands.story import StoryWriter
+from rbxcompose.runtime.log import StoryWriter
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.missions.components.mission import Mission

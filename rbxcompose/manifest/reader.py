@@ -410,6 +410,7 @@ def _bytes(path: Path, shown: str, sources: MutableMapping[str, str], most: int,
     return data
 
 
+@once  # a profile reads the same files again
 def _saved(path: Path, shown: str, most: int) -> bytes | Finding:
     try:
         with open_regular(path) as file:
@@ -422,6 +423,7 @@ def _saved(path: Path, shown: str, most: int) -> bytes | Finding:
         return UNREADABLE.at(None, f"'{shown}' {reason}")
 
 
+@once
 def _decode(data: bytes, file: str) -> tuple[str, list[Finding]]:
     """Return the text with newlines only, and the findings if it is not UTF-8."""
     try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rbxcompose.base.geometry import Transform3, Velocity2
+from rbxcompose.base.geometry import Pose2, Transform3, Velocity2
 from rbxcompose.msgs.geometry_msgs import Point, Pose, Quaternion, Transform, Twist, Vector3
 
 
@@ -31,3 +31,13 @@ def transform_message(pose: Transform3) -> Transform:
 def twist_message(velocity: Velocity2) -> Twist:
     """Return the velocity of a base as a message."""
     return Twist(linear=Vector3(x=velocity.linear), angular=Vector3(z=velocity.angular))
+
+
+def pose_in(message: Pose) -> Pose2:
+    """Return the planar part of a pose."""
+    return pose_of(message).to_pose2()
+
+
+def message_of(pose: Pose2) -> Pose:
+    """Return a planar pose as a message."""
+    return pose_message(Transform3.from_pose2(pose))

@@ -1,12 +1,18 @@
-"""The ports and windows of a running component: the runtime binds them to the bus, tests to whatever they like."""
+"""The ports and windows of a running component, which the runtime binds to the bus and tests to whatever they like."""
+
+from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
 from enum import StrEnum
-from typing import Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, Transform3
+from rbxcompose.msgs.stamps import to_nanoseconds
+
+if TYPE_CHECKING:
+    from rbxcompose.msgs.std_msgs import Header
 
 M = TypeVar("M")
 M_contra = TypeVar("M_contra", contravariant=True)
@@ -234,3 +240,55 @@ def added(known: KeyedParts, update: KeyedParts) -> dict[str, Any]:
     """Return what is known after an update."""
     kept = {} if update["whole"] else {key: entry for key, entry in known.items() if key not in update["gone"]}
     return {**kept, **update["changed"]}
+
+
+LATE = 0.3  # [s] that a transform may come later than what was measured at its time
+
+
+class WithHeader(Protocol):
+    """A message with a header."""
+
+    @property
+    def header(self) -> Header:
+        """Return when and in which frame it was measured."""
+        ...
+
+
+H = TypeVar("H", bound=WithHeader)
+
+
+class NewestMessage(Generic[H]):
+    """The newest message of a sensor, until it is known where that was when it measured.
+
+    Transforms of that time may come later than the message, so that they are missing is a problem only if it lasts.
+    """
+
+    def __init__(self, frame: str = "", wrong: str = "it is in '{}', not in '{}'") -> None:
+        """Take messages in a frame, or in any; `wrong` says what is wrong with those in another one."""
+        self._frame, self._wrong = frame, wrong
+        self._message: H | None = None
+        self._waits = math.inf  # since when transforms have been missing [s]
+        self.problem = ""
+        """Why it cannot be used so far."""
+
+    def put(self, message: H) -> None:
+        """Take a message in place of the one before."""
+        self._message = message
+
+    def take(self, now: float, *looks: Look) -> tuple[H, list[Transform3]] | None:
+        """Return the message with the poses of frames at its time, once; None as long as there is none [s]."""
+        if (message := self._message) is None:
+            return None
+        frame, stamp = message.header.frame_id.lstrip("/"), to_nanoseconds(message.header.stamp) or None
+        if self._frame and frame not in ("", self._frame):
+            self.problem = self._wrong.format(frame, self._frame)
+            return None
+        try:
+            poses = [look.transform(at=stamp) for look in looks]
+        except LookupError as error:
+            self._waits = min(self._waits, now)
+            if now - self._waits >= LATE:
+                self.problem = str(error)
+            return None
+        self._message, self._waits, self.problem = None, math.inf, ""
+        return message, poses

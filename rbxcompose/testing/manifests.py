@@ -87,7 +87,7 @@ def check_file(
             sets=sets,
             real=real,
             environment=environment or {},
-            tries_profiles=True,
+            processes=1,
         )
     )
 

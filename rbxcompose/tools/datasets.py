@@ -18,7 +18,7 @@ from rbxcompose.domains.policies.episode import Episode, NoEpisodeError, Sample,
 from rbxcompose.domains.policies.lerobot import Dataset, DatasetError
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.cdr import CdrError, decode
-from rbxcompose.msgs.images import WrongPictureError
+from rbxcompose.msgs.sensor_arrays import WrongPictureError
 from rbxcompose.runtime.recording.topics import CDR, DAMAGED, RecordedTopic, Selection
 from rbxcompose.tools.commands.lsp import NOT_INSTALLED
 from rbxcompose.tools.recordings import opened, warn

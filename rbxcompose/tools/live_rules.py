@@ -61,5 +61,5 @@ def compiled_with(file: str, layers: ChosenLayers, unsaved: Mapping[Path, str] =
         environment=os.environ,
         unsaved=unsaved,
         outside=outside,
-        tries_profiles=bool(unsaved),  # what is about to be saved must not break a profile that runs another day
+        processes=int(bool(unsaved)),  # what is about to be saved must not break a profile that runs another day
     )

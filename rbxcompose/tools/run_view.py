@@ -8,7 +8,6 @@ from rbxcompose.base.findings import Report
 from rbxcompose.base.levels import Level
 from rbxcompose.commands.console import emit, good, has_colour, refuse, write_report
 from rbxcompose.commands.lookup import ALREADY_UP, UNSAFE
-from rbxcompose.commands.story import StoryWriter, summary
 from rbxcompose.commands.targets import missing_extras
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan, extent
@@ -17,7 +16,7 @@ from rbxcompose.domains.devices.serial_ports import serial_ports
 from rbxcompose.domains.devices.udev import look_at, port_findings
 from rbxcompose.domains.programs.runnable import ask_for_real, program_findings
 from rbxcompose.runtime.folder import RobotFolder, RunOptions
-from rbxcompose.runtime.log import NAME, Follower, Record
+from rbxcompose.runtime.log import NAME, Follower, Record, StoryWriter, summary
 from rbxcompose.runtime.supervision import launch
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED
 from rbxcompose.sdk.capabilities import RunsContainer, RunsProgram, RunsRosNode, ServesPage

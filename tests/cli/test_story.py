@@ -1,8 +1,7 @@
 from __future__ import annotations
 
 from rbxcompose.base.levels import Level
-from rbxcompose.commands.story import StoryWriter, summary
-from rbxcompose.runtime.log import Record
+from rbxcompose.runtime.log import Record, StoryWriter, summary
 
 
 def test_a_record_is_time_source_and_text() -> None:

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from rbxcompose.base.config import Place
 from rbxcompose.base.geometry import Pose2, quaternion_from_yaw
 from rbxcompose.bus.services import ServedRequest
-from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
+from rbxcompose.msgs.poses import pose_in
 from rbxcompose.msgs.rbxcompose_msgs import Recharge, SetBatteryLevel
 from rbxcompose.msgs.stamps import to_nanoseconds, to_seconds
 from rbxcompose.msgs.std_msgs import Float32, Header

@@ -10,7 +10,7 @@ import pytest
 
 from rbxcompose.domains.console import video as module
 from rbxcompose.domains.console.video import Picture, Streams
-from rbxcompose.msgs.images import WrongPictureError
+from rbxcompose.msgs.sensor_arrays import WrongPictureError
 from rbxcompose.msgs.sensor_msgs import Image
 
 TOPIC = "/camera"

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from PIL import Image as Pictures
 
 from rbxcompose.domains.console.video import LARGEST, Picture, encoded, wanted
-from rbxcompose.msgs.images import WrongPictureError, pixels
+from rbxcompose.msgs.sensor_arrays import WrongPictureError, pixels
 from rbxcompose.msgs.sensor_msgs import CompressedImage, Image
 
 RED = (200, 30, 10)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from rbxcompose.commands.story import StoryWriter
+from rbxcompose.runtime.log import StoryWriter
 from rbxcompose.testing import run_robot
 from rbxcompose.testing.manifests import check_file
 from tests.docs.examples import ROOT

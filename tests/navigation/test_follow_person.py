@@ -11,10 +11,10 @@ import pytest
 
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.worlds.grid_map import map_files
-from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.domains.worlds.world import world_of
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped
 from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.poses import pose_in
 from rbxcompose.msgs.rbxcompose_msgs import FollowPerson, World
 from rbxcompose.msgs.std_msgs import Bool, Float32, Header, String
 from rbxcompose.msgs.visualization_msgs import Marker, MarkerArray

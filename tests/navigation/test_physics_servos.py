@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.poses import pose_in
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.msgs.tf2_msgs import TFMessage

@@ -18,7 +18,6 @@ from rbxcompose.domains.bases.components.diff_drive_sim import DiffDriveSim
 from rbxcompose.domains.navigation.components.navigator import Navigator
 from rbxcompose.domains.navigation.planner import PlannedPath
 from rbxcompose.domains.worlds.grid_map import map_files
-from rbxcompose.domains.worlds.poses import message_of, pose_in
 from rbxcompose.msgs.builtin_interfaces import Duration, Time
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 from rbxcompose.msgs.geometry_msgs import (
@@ -35,6 +34,7 @@ from rbxcompose.msgs.nav2_msgs import BackUp as Nav2BackUp
 from rbxcompose.msgs.nav2_msgs import NavigateThroughPoses, NavigateToPose, Spin
 from rbxcompose.msgs.nav_msgs import OccupancyGrid, Odometry
 from rbxcompose.msgs.nav_msgs import Path as PathMessage
+from rbxcompose.msgs.poses import message_of, pose_in
 from rbxcompose.msgs.rbxcompose_msgs import BackUp, World
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import to_time

@@ -14,9 +14,9 @@ from rbxcompose.base.levels import Level
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.navigation.components.tag_localisation import SURE, PlacedTag, TagFilter
 from rbxcompose.domains.navigation.localiser import RESTARTED
-from rbxcompose.domains.worlds.poses import message_of, pose_in
 from rbxcompose.msgs.geometry_msgs import PoseWithCovariance, PoseWithCovarianceStamped, Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.poses import message_of, pose_in
 from rbxcompose.msgs.std_msgs import Header, String
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.sdk.component import MissionOver

@@ -11,9 +11,9 @@ import pytest
 
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2, wrap_angle
 from rbxcompose.domains.vision.components.tag_docking import OVER, Docking, DockingState, DockPlace, TagDockingConfig
-from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.poses import pose_in
 from rbxcompose.msgs.rbxcompose_msgs import DockAt
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.sdk.bound import Ended, Outcome

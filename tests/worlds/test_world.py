@@ -13,13 +13,13 @@ from rbxcompose.base.geometry import Pose2, Transform3
 from rbxcompose.base.transforms import TransformError
 from rbxcompose.domains.worlds.contact import first_contact
 from rbxcompose.domains.worlds.grid_map import GridMap
-from rbxcompose.domains.worlds.poses import LATE, NewestMessage
 from rbxcompose.domains.worlds.ray_casting import Rays
 from rbxcompose.domains.worlds.shapes import CircleFootprint, ShapePath, WorldShape
 from rbxcompose.domains.worlds.world import SimulatedWorld
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.sdk.bound import LATE, NewestMessage
 from tests.parts.project import Project
 from tests.worlds.scenes import ANGLES, HEIGHT, grids, shapes
 

@@ -160,6 +160,7 @@ def _remember(request: XacroRequest, kept: KeptAnswer) -> None:
         _answers.popitem(last=False)
 
 
+@once
 def _digest(path: str) -> str:
     """Return a digest of what a file or folder contains; none for what cannot be read."""
     try:

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.msgs import registry
-from rbxcompose.msgs.images import WrongPictureError, pixels
+from rbxcompose.msgs.sensor_arrays import WrongPictureError, pixels
 from rbxcompose.msgs.sensor_msgs import CompressedImage, Image
 from rbxcompose.msgs.types import Message
 

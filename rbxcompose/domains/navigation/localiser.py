@@ -10,11 +10,10 @@ from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, Transform3
 from rbxcompose.base.requests import Command
-from rbxcompose.domains.worlds.poses import message_of, pose_in
 from rbxcompose.domains.worlds.world import MAP_FRAME
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.builtin_interfaces import Time
-from rbxcompose.msgs.poses import transform_message
+from rbxcompose.msgs.poses import message_of, pose_in, transform_message
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage

@@ -15,8 +15,8 @@ from typing import Any
 from rbxcompose.base.clock import NANOSECONDS
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.msgs.geometry_msgs import Twist
-from rbxcompose.msgs.images import DEPTHS
 from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.sensor_arrays import DEPTHS
 from rbxcompose.msgs.sensor_msgs import CompressedImage, Image, JointState
 
 STATE, ACTION, PICTURES = "observation.state", "action", "observation.images"

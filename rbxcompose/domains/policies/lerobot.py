@@ -16,11 +16,11 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from rbxcompose.base.arrays import np
+from rbxcompose.base.arrays import Bytes, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import TEMPORARY, read_regular, replace_file
 from rbxcompose.domains.policies.episode import ACTION, PICTURES, STATE, EpisodeFrame, Features, NoEpisodeError
-from rbxcompose.msgs.images import Pixels, WrongPictureError, pixels
+from rbxcompose.msgs.sensor_arrays import WrongPictureError, pixels
 from rbxcompose.msgs.sensor_msgs import Image
 
 VERSION = "v3.0"
@@ -266,7 +266,7 @@ class _Camera:
     """Of its pictures: rows and columns; a video has even sides."""
     stream: Any = None
     container: Any = None
-    last: Pixels | None = None
+    last: Bytes | None = None
     count: int = 0
     seen: list[Array] = field(default_factory=list)
     """What statistics are made of: values of some pictures, for each colour."""
@@ -326,7 +326,7 @@ class _Camera:
         return {key: [len(self.seen)] if key == "count" else [[[one]] for one in value] for key, value in found.items()}
 
 
-def _colours(message: Any) -> Pixels:
+def _colours(message: Any) -> Bytes:
     """Return a picture as an array, rows x columns x 3.
 
     Raises:
@@ -336,7 +336,7 @@ def _colours(message: Any) -> Pixels:
     return found if found.ndim == 3 else np.repeat(found[:, :, np.newaxis], 3, axis=2)
 
 
-def _unpacked(data: bytes) -> Pixels:
+def _unpacked(data: bytes) -> Bytes:
     import av
 
     try:

@@ -9,10 +9,10 @@ from rbxcompose import sdk
 from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, Transform3
-from rbxcompose.domains.worlds.poses import NewestMessage
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.poses import pose_of
 from rbxcompose.msgs.vision_msgs import Detection3D, Detection3DArray
+from rbxcompose.sdk.bound import NewestMessage
 
 BASE, ODOM = "base_footprint", "odom"
 SQUARE = 0.5  # score from which on it is known how a tag is turned

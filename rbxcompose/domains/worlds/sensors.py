@@ -12,11 +12,10 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import Pose2, Transform3
-from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.domains.worlds.world import SimulatedWorld, world_of
 from rbxcompose.msgs.geometry_msgs import Transform
 from rbxcompose.msgs.nav_msgs import Odometry
-from rbxcompose.msgs.poses import pose_of, transform_of
+from rbxcompose.msgs.poses import pose_in, pose_of, transform_of
 from rbxcompose.msgs.rbxcompose_msgs import Switches, World, WorldRobots
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header

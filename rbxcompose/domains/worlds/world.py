@@ -12,7 +12,6 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.worlds.contact import TOUCHING, FirstContact, first_contact, in_polygon, overlap, touching
 from rbxcompose.domains.worlds.grid_map import GridMap
-from rbxcompose.domains.worlds.poses import message_of, pose_in
 from rbxcompose.domains.worlds.ray_casting import Rays
 from rbxcompose.domains.worlds.shapes import (
     CircleFootprint,
@@ -29,7 +28,7 @@ from rbxcompose.domains.worlds.shapes import (
 )
 from rbxcompose.msgs import rbxcompose_msgs as ours
 from rbxcompose.msgs.nav_msgs import MapMetaData, OccupancyGrid
-from rbxcompose.msgs.poses import pose_message, pose_of
+from rbxcompose.msgs.poses import message_of, pose_in, pose_message, pose_of
 from rbxcompose.msgs.std_msgs import Header
 
 MAP_FRAME = "map"

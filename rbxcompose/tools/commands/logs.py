@@ -16,9 +16,8 @@ from rbxcompose.base.levels import LOG_LEVELS
 from rbxcompose.commands.console import NotDoneError, emit, has_colour
 from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, known_state
 from rbxcompose.commands.options import EACH, add_system_options, count_from_zero
-from rbxcompose.commands.story import StoryWriter
 from rbxcompose.runtime.folder import RobotFolder, base_folder
-from rbxcompose.runtime.log import NAME, Follower, Record
+from rbxcompose.runtime.log import NAME, Follower, Record, StoryWriter
 
 if TYPE_CHECKING:  # only needed for systems
     from rbxcompose.commands.hosts import SystemCommand

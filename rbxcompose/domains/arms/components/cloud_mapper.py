@@ -21,8 +21,8 @@ from rbxcompose.domains.arms.motion.scene_messages import object_message, placed
 from rbxcompose.domains.body.model import Body, Geometry
 from rbxcompose.domains.body.urdf import body_of
 from rbxcompose.domains.worlds.physics.solids import apply, rotation_matrix
-from rbxcompose.msgs.clouds import CloudError, points_of
 from rbxcompose.msgs.rbxcompose_msgs import SceneObject, SceneObjects
+from rbxcompose.msgs.sensor_arrays import CloudError, points_of
 from rbxcompose.msgs.sensor_msgs import JointState, PointCloud2
 from rbxcompose.msgs.stamps import NANOSECONDS, to_nanoseconds
 from rbxcompose.sdk.updater import TaskStatus

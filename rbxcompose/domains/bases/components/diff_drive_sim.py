@@ -11,10 +11,9 @@ from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Pose2, Transform3, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.bases.driving import ABSURD, drives
-from rbxcompose.domains.worlds.poses import message_of, pose_in
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import Odometry
-from rbxcompose.msgs.poses import transform_message, twist_message
+from rbxcompose.msgs.poses import message_of, pose_in, transform_message, twist_message
 from rbxcompose.msgs.rbxcompose_msgs import Switches, World, WorldRobots
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header, String

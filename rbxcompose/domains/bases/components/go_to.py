@@ -12,9 +12,9 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Pose2
 from rbxcompose.domains.bases.driving import BaseDriver, GoToCore, GoToSettings, least_time
-from rbxcompose.domains.worlds.poses import message_of, pose_in
 from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
+from rbxcompose.msgs.poses import message_of, pose_in
 from rbxcompose.msgs.stamps import LONGEST, to_duration, to_time
 from rbxcompose.msgs.std_msgs import Header
 

@@ -43,7 +43,7 @@ from rbxcompose.domains.console.models import MESHES, CandidateModels, ServedFil
 from rbxcompose.domains.console.rosapi import BusView
 from rbxcompose.domains.console.video import BOUNDARY, IMAGES, Picture, Streams, list_page, part, viewer_page, wanted
 from rbxcompose.missions.view.tested import read_tested
-from rbxcompose.msgs.images import WrongPictureError
+from rbxcompose.msgs.sensor_arrays import WrongPictureError
 from rbxcompose.msgs.types import Action, Message, Service
 from rbxcompose.runtime.control import NoAnswerError, ask_as_data
 from rbxcompose.runtime.folder import FINDINGS, BrokenStateError, RobotFolder, all_folders

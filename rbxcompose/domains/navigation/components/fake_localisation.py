@@ -6,9 +6,9 @@ from rbxcompose import sdk
 from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.navigation.localiser import BASE, ODOM, Localiser
-from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.domains.worlds.sensors import TRUTH_REMEDY
 from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.poses import pose_in
 from rbxcompose.msgs.stamps import to_nanoseconds
 
 

@@ -14,13 +14,14 @@ from rbxcompose.base.geometry import Pose2, wrap_angle
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.navigation.costs import trace
 from rbxcompose.domains.worlds.grid_map import FREE, OCCUPIED, UNKNOWN, GridMap
-from rbxcompose.domains.worlds.poses import NewestMessage, rays_of
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_message
 from rbxcompose.msgs.nav_msgs import OccupancyGrid
+from rbxcompose.msgs.sensor_arrays import rays_of
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.std_srvs import Trigger
+from rbxcompose.sdk.bound import NewestMessage
 
 SHOWN = 2.0  # [s] between two maps
 GROWTH = 64  # cells by which a map grows, so that it does not with each scan

@@ -30,22 +30,24 @@ from rbxcompose.domains.navigation.costs import (
 from rbxcompose.domains.navigation.follower import FollowerSettings, FollowState, PathFollower
 from rbxcompose.domains.navigation.localiser import STALE
 from rbxcompose.domains.navigation.manoeuvres import BackUpManoeuvre, Manoeuvre, ManoeuvreState, SpinManoeuvre
-from rbxcompose.domains.navigation.markers import zone_markers
 from rbxcompose.domains.navigation.planner import NoPathError, PlannedPath, plan
+from rbxcompose.domains.navigation.reports import zone_markers
 from rbxcompose.domains.worlds.grid_map import GridMap
-from rbxcompose.domains.worlds.poses import NewestMessage, message_of, pose_in, rays_of
 from rbxcompose.domains.worlds.shapes import PolygonFootprint
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_message, grid_of
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav2_msgs import BackUp as Nav2BackUp
 from rbxcompose.msgs.nav2_msgs import NavigateThroughPoses, NavigateToPose, Spin
 from rbxcompose.msgs.nav_msgs import OccupancyGrid, Path
+from rbxcompose.msgs.poses import message_of, pose_in
 from rbxcompose.msgs.rbxcompose_msgs import BackUp, RunMission
+from rbxcompose.msgs.sensor_arrays import rays_of
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import LONGEST, to_duration, to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.msgs.visualization_msgs import MarkerArray
+from rbxcompose.sdk.bound import NewestMessage
 from rbxcompose.sdk.ports import BULK
 
 AGAIN = 1.0  # [s] between two looks whether the way is free, and between two plans

@@ -21,13 +21,15 @@ from rbxcompose.domains.navigation.localiser import (
     RecallPlace,
     given_pose,
 )
-from rbxcompose.domains.worlds.poses import NewestMessage, message_of, rays_of
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_of
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import OccupancyGrid
+from rbxcompose.msgs.poses import message_of
+from rbxcompose.msgs.sensor_arrays import rays_of
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.std_srvs import Empty
+from rbxcompose.sdk.bound import NewestMessage
 from rbxcompose.sdk.ports import BULK
 
 LOST = 0.3  # share of a scan that the map explains below which the robot is probably elsewhere

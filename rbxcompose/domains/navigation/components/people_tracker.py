@@ -9,12 +9,13 @@ from pydantic import Field
 
 from rbxcompose import sdk
 from rbxcompose.domains.navigation.people import KnownWalls, PeopleTracks, sightings
-from rbxcompose.domains.navigation.people_reports import PeopleConfig, TellsPeople
-from rbxcompose.domains.worlds.poses import NewestMessage, rays_of
+from rbxcompose.domains.navigation.reports import PeopleConfig, TellsPeople
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_of
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.nav_msgs import OccupancyGrid
+from rbxcompose.msgs.sensor_arrays import rays_of
 from rbxcompose.msgs.sensor_msgs import LaserScan
+from rbxcompose.sdk.bound import NewestMessage
 from rbxcompose.sdk.ports import BULK
 
 

@@ -19,14 +19,16 @@ from rbxcompose.domains.navigation.follower import FollowerSettings
 from rbxcompose.domains.navigation.localiser import STALE
 from rbxcompose.domains.navigation.people import TrackedPerson
 from rbxcompose.domains.worlds.grid_map import GridMap
-from rbxcompose.domains.worlds.poses import NewestMessage, pose_in, rays_of
 from rbxcompose.domains.worlds.shapes import PolygonFootprint
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_of
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.nav_msgs import OccupancyGrid
 from rbxcompose.msgs.people_msgs import People
+from rbxcompose.msgs.poses import pose_in
 from rbxcompose.msgs.rbxcompose_msgs import FollowPerson
+from rbxcompose.msgs.sensor_arrays import rays_of
 from rbxcompose.msgs.sensor_msgs import LaserScan
+from rbxcompose.sdk.bound import NewestMessage
 from rbxcompose.sdk.ports import BULK
 
 BLANK, CELL = 16.0, 0.05  # [m] sides of the area around a robot without a map, and of its cells

@@ -9,7 +9,7 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.geometry import rotate
 from rbxcompose.domains.navigation.people import NamedTracks, PersonSighting
-from rbxcompose.domains.navigation.people_reports import BLIND, PeopleConfig, TellsPeople
+from rbxcompose.domains.navigation.reports import BLIND, PeopleConfig, TellsPeople
 from rbxcompose.domains.vision.tag_watcher import SQUARE, TagWatcher, TagWatcherConfig, WatchedTag
 
 

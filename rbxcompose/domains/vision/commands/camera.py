@@ -35,7 +35,7 @@ from rbxcompose.domains.vision.calibration import (
 from rbxcompose.domains.vision.commands.tags import PAPERS, numbers, one_of, tag_places
 from rbxcompose.domains.worlds.tag_pictures import DEFAULT_FAMILY, FAMILIES, with_margin
 from rbxcompose.msgs.cdr import CdrError, decode
-from rbxcompose.msgs.images import WrongPictureError, grey
+from rbxcompose.msgs.sensor_arrays import WrongPictureError, grey
 from rbxcompose.msgs.sensor_msgs import Image
 
 GROUP = "write"

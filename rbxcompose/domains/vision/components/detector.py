@@ -21,7 +21,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import vision_msgs as vision
-from rbxcompose.msgs.images import WrongPictureError, pixels
+from rbxcompose.msgs.sensor_arrays import WrongPictureError, pixels
 from rbxcompose.msgs.sensor_msgs import Image
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.sdk.ports import BULK

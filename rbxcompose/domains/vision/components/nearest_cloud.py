@@ -10,8 +10,8 @@ from rbxcompose import sdk
 from rbxcompose.base.arrays import np
 from rbxcompose.base.levels import Level
 from rbxcompose.manifest.fields import TopicName
-from rbxcompose.msgs.clouds import CloudError, points_of
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped
+from rbxcompose.msgs.sensor_arrays import CloudError, points_of
 from rbxcompose.msgs.sensor_msgs import PointCloud2
 from rbxcompose.sdk.ports import BULK
 

@@ -15,9 +15,9 @@ from rbxcompose.base.units import TIME
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs import vision_msgs as vision
-from rbxcompose.msgs.clouds import CloudError, rows_of
 from rbxcompose.msgs.poses import pose_message, pose_of
 from rbxcompose.msgs.rbxcompose_msgs import FindObjects
+from rbxcompose.msgs.sensor_arrays import CloudError, rows_of
 from rbxcompose.msgs.sensor_msgs import PointCloud2
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.std_msgs import Header

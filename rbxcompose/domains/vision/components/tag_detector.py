@@ -18,8 +18,8 @@ from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs import vision_msgs as vision
 from rbxcompose.msgs.builtin_interfaces import Time
-from rbxcompose.msgs.images import WrongPictureError, grey
 from rbxcompose.msgs.poses import pose_message, transform_message
+from rbxcompose.msgs.sensor_arrays import WrongPictureError, grey
 from rbxcompose.msgs.sensor_msgs import CameraInfo, Image
 from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.std_msgs import Header, String

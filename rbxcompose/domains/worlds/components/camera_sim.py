@@ -24,7 +24,7 @@ from rbxcompose.domains.worlds.optics import (
 from rbxcompose.domains.worlds.sensors import SensorConfig, WorldSensor
 from rbxcompose.domains.worlds.shapes import WorldShape
 from rbxcompose.manifest.fields import Farthest, TopicName
-from rbxcompose.msgs.images import pixels
+from rbxcompose.msgs.sensor_arrays import pixels
 from rbxcompose.msgs.sensor_msgs import CameraInfo, Image, PointCloud2
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Empty, Header

@@ -19,13 +19,12 @@ from rbxcompose.domains.worlds.physics.conversion import GROUND
 from rbxcompose.domains.worlds.physics.engine import PhysicsWorld
 from rbxcompose.domains.worlds.physics.looks import DepthPicture, PhysicsCamera
 from rbxcompose.domains.worlds.physics.robot import PhysicsRobot, outline_body
-from rbxcompose.domains.worlds.poses import message_of
 from rbxcompose.domains.worlds.sensors import OTHERS
 from rbxcompose.domains.worlds.shapes import ShapePath
 from rbxcompose.domains.worlds.world import MAP_FRAME, world_of
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import Odometry
-from rbxcompose.msgs.poses import transform_message, twist_message
+from rbxcompose.msgs.poses import message_of, transform_message, twist_message
 from rbxcompose.msgs.rbxcompose_msgs import World, WorldRobots
 from rbxcompose.msgs.sensor_msgs import Image, Imu, JointState
 from rbxcompose.msgs.stamps import to_time

@@ -13,13 +13,13 @@ from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import Pose2, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.worlds.grid_map import read_map
-from rbxcompose.domains.worlds.poses import pose_in
 from rbxcompose.domains.worlds.sensors import OTHERS
 from rbxcompose.domains.worlds.shapes import WorldCylinder, WorldShape
 from rbxcompose.domains.worlds.world import FORESEEN, MAP_FRAME, SimulatedWorld, no_walls, world_message
 from rbxcompose.domains.worlds.world_file import WorldHoleModel, WorldLightModel, WorldObjectModel
 from rbxcompose.msgs import rbxcompose_msgs
 from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.poses import pose_in
 from rbxcompose.msgs.rbxcompose_msgs import WorldRobots
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
