@@ -73,6 +73,7 @@ class Goal(Generic[G, R]):
     state: GoalState = GoalState.EXECUTING
     result: R | None = None
     ended: float = 0.0  # [s] of robot time
+    cause: str = ""  # why the robot has asked it to end
 
 
 class Goals(Generic[G, R]):
@@ -220,8 +221,10 @@ class ActionServer(Generic[G, R, F]):
             ),
         ]
 
-    def cancel_all(self) -> None:
-        """Request the cancellation of the current goal."""
+    def cancel_all(self, cause: str) -> None:
+        """Request the cancellation of the current goal; its result says why, unless its server gives one."""
+        if self._goals.current is not None:
+            self._goals.current.cause = cause
         self._goals.cancel()
         self._tell_canceling()
 
@@ -236,7 +239,7 @@ class ActionServer(Generic[G, R, F]):
         if result is None:
             made: Any = self._action.Result()
             told = [name for name in REASONS if isinstance(getattr(made, name, None), str)][:1]
-            result = replace(made, **dict.fromkeys(told, reason))
+            result = replace(made, **dict.fromkeys(told, reason or goal.cause))
         require_type(result, self._action.Result, self._name)
         if not self._goals.end(goal, state, result, self._now):
             return

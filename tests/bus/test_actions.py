@@ -125,13 +125,16 @@ def test_a_client_can_cancel_its_goal_even_before_it_was_accepted(alone: Alone, 
     assert ends == [Ended(Outcome.CANCELED, Result())]
 
 
-def test_a_stop_cancels_the_current_goal(alone: Alone) -> None:
+def test_a_stop_cancels_the_current_goal_whose_result_says_so(alone: Alone, ends: Ends) -> None:
     server = served(alone)
-    alone.bus.action_client("mission", "go_to", NavigateToPose)(TO_DOCK, lambda end: None)
+    alone.bus.action_client("mission", "go_to", NavigateToPose)(TO_DOCK, ends.append)
     alone.settle()
-    server.cancel_all()
+    server.cancel_all("the robot was stopped")
     assert server.current is not None
     assert server.current.cancel_requested
+    server.current.canceled()
+    alone.settle()
+    assert ends == [Ended(Outcome.CANCELED, Result(error_msg="the robot was stopped"))]
 
 
 def test_a_goal_whose_client_is_gone_is_cancelled(alone: Alone) -> None:
@@ -215,7 +218,7 @@ def test_the_states_of_goals_are_published_and_latched(alone: Alone) -> None:
 
     alone.bus.subscribe("tool", "go_to/_action/status", GoalStatusArray, Qos.LATCHED, note)
     alone.settle()
-    server.cancel_all()
+    server.cancel_all("the robot was stopped")
     alone.settle()
     assert server.current is not None
     server.current.canceled()

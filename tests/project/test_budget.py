@@ -33,7 +33,7 @@ ROOMS: dict[str, Cost] = {
     "__init__": Cost(code=1, files=1, small=1, imports=0),
     "__main__": Cost(code=4, files=1, small=1, imports=2),
     "base": Cost(code=3761, files=25, small=3, imports=213),
-    "bus": Cost(code=2373, files=17, small=0, imports=160),
+    "bus": Cost(code=2376, files=17, small=0, imports=160),
     "commands": Cost(code=2545, files=24, small=3, imports=321),
     "compiler": Cost(code=7812, files=53, small=1, imports=880),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
@@ -62,7 +62,7 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 112496,
+    "lines of code": 112499,
     "files": 753,
     "files of 1 to 30 lines of code": 42,
     "lines of imports": 10316,

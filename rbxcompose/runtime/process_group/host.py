@@ -209,7 +209,7 @@ class Host:
         self._on_order("stop")
         self.is_stopped = True
         for hosted in self.hosted.values():
-            hosted.cancel_claimed()
+            hosted.cancel_claimed("the robot was stopped")
         self._each_active("stop")
 
     def release(self) -> None:
@@ -239,7 +239,7 @@ class Host:
         self._on_order("brake")
         self.is_braking = True
         for hosted in self.hosted.values():
-            hosted.cancel_claimed()
+            hosted.cancel_claimed("the robot goes down")
         self._each_active("brake")
 
     def lost(self, names: Sequence[str], cause: str) -> None:
@@ -295,7 +295,7 @@ class Host:
         for name in names:
             if (hosted := self.hosted.get(name)) is None:
                 continue
-            hosted.cancel_claimed()
+            hosted.cancel_claimed("its component is taken away")
             if hosted.component is not None and hosted.state is Lifecycle.ACTIVE:
                 self._guarded(name, hosted.component.brake)
             if hosted.component is not None:
@@ -710,10 +710,10 @@ class Hosted:
             return f"'{self.instance.name}' carries out a goal"
         return component.occupation if component.claims else ""
 
-    def cancel_claimed(self) -> None:
+    def cancel_claimed(self, cause: str) -> None:
         """Request the end of the goals that claim a part of the robot."""
         for server in self._claiming:
-            server.cancel_all()
+            server.cancel_all(cause)
 
     def refusal(self, port: Port[Any]) -> str:
         """Return why a message, request or goal cannot be taken now; empty if it can."""
