@@ -107,3 +107,9 @@ def test_a_mission_whose_lines_have_moved_is_the_same_and_one_with_another_step_
     assert difference(plans[0], plans[1]).is_empty
     changed = difference(plans[0], plans[2])
     assert [str(one) for one in changed.changed["mission"]] == ["programs.tour.do.1.wait: 1 s -> 2 s"]
+
+
+def test_a_setting_without_a_limit_can_be_compared(tmp_path: Path) -> None:
+    text = "rbx: 1\nkind: Robot\nname: still\ncomponents: {battery: {type: battery_sim, runtime: 1 h}}\nconsole: {}\n"
+    still = check_text(text, tmp_path).plan  # without a base, its console limits no speed
+    assert difference(load(dump(still)), still).is_empty

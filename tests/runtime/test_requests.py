@@ -24,6 +24,7 @@ from rbxcompose.runtime.folder import RobotState, RunOptions
 from rbxcompose.runtime.plan_requests import AdoptSaved, ApplyPlan, ComparePlan, PlanComparison, RevertPlan
 from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import BringDown, NoteInLog, ReleaseRobot, RobotStatus, StopRobot
+from rbxcompose.runtime.supervision import request_handler
 from rbxcompose.runtime.supervision.conductor import Conductor
 from rbxcompose.runtime.supervision.plan_change import Fate
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
@@ -255,6 +256,13 @@ def test_another_plan_is_compared_first_and_taken_only_if_nobody_was_faster() ->
     assert [change.fate for change in found.components] == [Fate.LIVE]
     assert str(desk.ask(ApplyPlan(text, 7))[0]).startswith("it was changed by someone else meanwhile")
     assert [type(message) for _, message in desk.sent] == [say.Consider]
+
+
+def test_a_question_that_fails_by_a_bug_of_ours_ends_no_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    desk = Desk()
+    monkeypatch.setattr(request_handler, "changes", lambda *_: 1 / 0)
+    assert desk.ask(ComparePlan(dump(PLAN))) == ("ZeroDivisionError: division by zero", True)
+    assert any("a question was not answered" in text for text in desk.texts)
 
 
 def test_a_change_that_a_component_refuses_touches_nothing() -> None:

@@ -1,6 +1,7 @@
 """The difference between two plans, and which processes of a running robot it affects."""
 
 import hashlib
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
@@ -196,6 +197,8 @@ def _text(value: Any) -> str:
         case float():
             short = format_number(value)
             return short if float(short) == value else repr(value)
+        case Quantity() if math.isinf(value.value):
+            return "no limit"
         case Quantity():
             short = format_quantity(value.value, value.dimension)
             return short if to_si(short, value.dimension) == value.value else f"{value.value!r} in SI"

@@ -6,12 +6,23 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from enum import Enum
+from traceback import format_exc
 from typing import Any, Protocol
 
 from rbxcompose.base.config import value_at, with_values
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import plain
-from rbxcompose.base.requests import Command, Refused, Request, UnreadableError, as_data, name_in, requests, to_data
+from rbxcompose.base.requests import (
+    Command,
+    Query,
+    Refused,
+    Request,
+    UnreadableError,
+    as_data,
+    name_in,
+    requests,
+    to_data,
+)
 from rbxcompose.compiler.plan.dump import PlanTextError, load
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.msgs import registry
@@ -77,6 +88,12 @@ class RequestHandler:
             self._supervisor.refuse(number, "the request is nested too deeply")
         except Refused as refusal:
             self._supervisor.refuse(number, str(refusal))
+        except Exception as error:  # our own bug: a question has changed nothing, so the robot goes on
+            if not issubclass(OWN.types.get(name_in(data), Command), Query):
+                raise
+            reason = plain(f"{type(error).__name__}: {error}")
+            self._supervisor.log(Level.ERROR, f"a question was not answered: {reason}", format_exc())
+            self._supervisor.refuse(number, reason)
 
     def _carry_out(self, request: Request[Any], number: int) -> None:
         if not isinstance(request, RobotStatus | DescribeRobot | BringDown):
