@@ -39,8 +39,7 @@ class SettingChecks:
         before = dict[str, RobotComponent]()
         for name, config in configs.items():
             old = self._components[name]
-            if config is not old.config and config != old.config:
-                new = replace(old, config=config, capabilities=old.cls.capabilities(config))
+            if config is not old.config and (new := old.configured(config)) is not old:
                 before[name], self._components[name] = old, new
                 self._watched[name] = _Watched.of(new, self._recorder)
         is_known, other = self._report is not None, self._other(before)

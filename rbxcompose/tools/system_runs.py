@@ -110,7 +110,7 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
         if (problem := _address_problem(plan, arguments.host)) is not None:
             return refuse(problem)
         own = replace(options, layers=layers_of(system, robot, real=arguments.real))
-        if (exit_code := run_plan(plan, own, LiveRules(robot.robot))) or not options.is_detached:
+        if (exit_code := run_plan(plan, own, LiveRules(robot.robot, (system, robot)))) or not options.is_detached:
             return exit_code
     return 0
 

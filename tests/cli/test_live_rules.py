@@ -13,6 +13,7 @@ from rbxcompose.commands.main import main as command
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.diff import difference
 from rbxcompose.compiler.plan.dump import dump, load
+from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.msgs.rcl_interfaces import Parameter
 from rbxcompose.runtime.supervision.plan_change import Fate, changes
 from rbxcompose.sdk.parameters import changed, to_message
@@ -135,3 +136,17 @@ def test_what_a_mission_sets_keeps_the_rules_of_the_robot(tmp_path: Path, pace: 
     assert "set: speed = 0.4 m/s, by mission hurry" in done.stdout, done.stdout + done.stderr
     assert "'base' can do 0.5 m/s at most (RBX3503)" in done.stdout, done.stdout
     assert "set: speed = 0.55 m/s" not in done.stdout
+
+
+def test_a_value_by_which_the_base_would_stop_too_late_after_a_cut_link_is_refused() -> None:
+    system = compile_system(str(ROOT / "systems/patrol_two_hosts.yaml"), environment={})
+    (placed,) = system.robots.values()
+    base, rules = placed.robot.components["base"].config, LiveRules(placed.robot, (system, placed))
+    assert rules.why_not({}, {"base": set_to(base, "command_timeout", "0.2 s")}) is None
+    refusal = rules.why_not({}, {"base": set_to(base, "command_timeout", "3 s")})
+    assert refusal is not None
+    assert refusal.reason.startswith("after a link is cut, 'base' on robot stands still within")
+    assert refusal.reason.endswith("(RBX6140)")
+    assert (
+        LiveRules(placed.robot).why_not({}, {"base": set_to(base, "command_timeout", "3 s")}) is None
+    )  # nobody's link

@@ -1,9 +1,9 @@
 """The typed model of a whole robot: its components with their wires, its skills, values and missions."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from rbxcompose.base.config import COMPONENT, DEFAULT, PLACE, Bound, Config, Place, Restart
 from rbxcompose.base.dataclass import dataclass
@@ -113,6 +113,12 @@ class RobotComponent:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_by_port", {end.name: end for end in self.ends})
+
+    def configured(self, config: Config) -> Self:
+        """Return it with another configuration, and what it can do by that."""
+        return (
+            self if config == self.config else replace(self, config=config, capabilities=self.cls.capabilities(config))
+        )
 
     def end(self, port: str) -> PortEnd | None:
         """Return the end of a port, or None."""
