@@ -142,6 +142,8 @@ export class Rosbridge {
   readonly state = new Signal<LinkState>({ is: "connecting" });
   /** Called with each status frame: errors of the server about what this client sent, by the id of that. */
   onStatus: (frame: Frame & { op: "status" }) => void = () => undefined;
+  /** What lets this client in, where the browser sends no cookie: to another host. */
+  token = "";
 
   readonly #url: string;
   readonly #open: (url: string) => Socket;
@@ -294,6 +296,7 @@ export class Rosbridge {
     this.#heard = performance.now();
     this.#guard(socket);
     this.state.set({ is: "open" });
+    if (this.token) this.#send({ op: "auth", id: this.#nextId("auth"), mac: this.token });
     for (const [topic, type] of this.#advertised) {
       this.#send({ op: "advertise", id: this.#nextId("advertise"), topic, type });
     }

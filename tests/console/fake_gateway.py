@@ -55,7 +55,8 @@ class FakeGateway:
         """Further addresses, with what is there."""
         self._others: str | None = None
         self.is_away = False  # takes no connections
-        self.is_locked = False  # knows nobody
+        self.is_locked = False  # knows nobody but who has the token
+        self.token = "the-token"
         self.subscribed: dict[ServerConnection, set[str]] = {}
         self.velocity = (0.0, 0.0)
         self._server = serve(self._serve, "127.0.0.1", 0, process_request=self._respond)
@@ -169,6 +170,8 @@ class FakeGateway:
 
     def _handle(self, connection: ServerConnection, frame: dict[str, Any]) -> None:
         match frame["op"]:
+            case "auth" if frame["mac"] == self.token:
+                self.is_locked = False
             case _ if self.is_locked:
                 words = "this needs the role 'view'; yours is 'nobody'"
                 connection.send(json.dumps({"op": "status", "level": "error", "id": frame["id"], "msg": words}))

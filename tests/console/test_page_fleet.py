@@ -72,11 +72,16 @@ def test_robots_of_a_system_are_seen_at_once_and_one_opens_each(
     assert violations(page) == []
     fleet.is_locked = True
     fleet.drop()
-    expect(cards["Digger"]).to_contain_text("Nothing is known of it. Open its link")
+    expect(cards["Digger"]).to_contain_text("Nothing is known of it. Paste its link")
     expect(cards["Digger"]).not_to_contain_text("mission")
-    fleet.is_locked = False
-    fleet.drop()
+    for given in ("wrong", f"{fleet.url}#token=the-token"):
+        expect(cards["Digger"]).to_contain_text("Nothing is known of it")
+        cards["Digger"].get_by_label("Link of Digger").fill(given)
+        cards["Digger"].get_by_role("button", name="Show").click()
     expect(cards["Digger"]).to_contain_text("Dig is running")
+    fleet.is_locked = True
+    page.reload()
+    expect(cards["Digger"]).to_contain_text("Dig is running")  # the browser has kept the link
 
 
 def test_the_map_is_empty_when_all_robots_are_gone(

@@ -1,5 +1,5 @@
 /** Fleet: the robots of a system, each with its charge, mission, diagnostics and place, and the way to its console. */
-import { pluck } from "../config";
+import { pluck, tokenOf } from "../config";
 import { watchComponents } from "../description";
 import { levelOf } from "../diagnostics";
 import { h, icon, setText, svg, type Icon } from "../dom";
@@ -8,6 +8,7 @@ import { frameOf, gridOf, pageOf } from "../fleet";
 import { formatName, formatNumber } from "../format";
 import { runningText } from "../mission";
 import type { Page, Robot } from "../page";
+import { recall, remember } from "../remembered";
 import { isMessage, Rosbridge, type Json } from "../rosbridge";
 import { Whereabouts } from "../whereabouts";
 import "./fleet.css";
@@ -48,12 +49,21 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
   const mission = h("p", { class: "fleet-mission" });
   const health = h("p", { class: "fleet-health" });
   const charges = h("div", { class: "fleet-charges" });
+  const given = h("input", { type: "password", autocomplete: "off", required: "", "aria-label": `Link of ${formatName(name)}` });
+  const door = h("form", { class: "fleet-door", hidden: "" }, given, h("button", {}, "Show"));
+  door.onsubmit = (event) => {
+    event.preventDefault();
+    link.token = tokenOf(given.value) || given.value.trim();
+    remember(keyOf(address), link.token);
+    link.reconnect();
+  };
   const open = isOwn ? h("span", { class: "label" }, "This page") : h("a", { href: url, class: "button" }, "Open");
   const element = h(
     "article",
     { class: "card fleet-robot" },
     h("header", {}, h("h2", {}, formatName(name)), open),
     state,
+    door,
     mission,
     health,
     charges,
@@ -62,6 +72,7 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
   let isKnown = false; // it has said how it is since the connection was opened
   let isRefused = false; // it tells nothing to who has not opened its link
   const showState = () => {
+    door.hidden = isKnown || !isRefused;
     element.classList.toggle("unknown", !isKnown);
     if (!isKnown) {
       place.pose = null;
@@ -73,7 +84,7 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
         ? ["stop", `Stopped by ${stoppedBy}`]
         : ["link", "Up"]
       : isRefused
-        ? ["unlink", "Nothing is known of it. Open its link, which `rbxcompose up` printed, in this browser."]
+        ? ["unlink", "Nothing is known of it. Paste its link, which `rbxcompose up` printed."]
         : ["unlink", link.state.value.is === "lost" ? "Does not answer" : "Connecting\u2026"];
     state.replaceChildren(icon(picture), words);
   };
@@ -110,6 +121,7 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
   let isClosed = false;
   let wasOpen = false;
   if (!isOwn) {
+    link.token = recall(keyOf(address)) ?? "";
     link.onStatus = ({ level }) => {
       isRefused ||= level === "error" && !isKnown;
       showState();
@@ -146,6 +158,11 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
       if (!isOwn) link.close();
     },
   };
+}
+
+/** Returns under which name this browser keeps what lets it in at an address. */
+function keyOf(address: string): string {
+  return `token of ${address}`;
 }
 
 /** All robots from above, in `map`, or where their odometry has them if they have no such frame; x points right. */
