@@ -36,12 +36,16 @@ POLICY = "default-src 'self'; frame-ancestors 'none'"
 DATA = {"/battery_level": 78.4, "/laptop_charge": 23.0, "/supply": 12.37}
 
 
+PATIENCE = 20.0  # [s]
+
+
 class FakeGateway:
     """Serves pages below `static` at `url` and keeps what their connections sent, with the time [s] of each frame."""
 
     def __init__(self, static: Path, config: dict[str, Any] = CONFIG) -> None:
         self.static, self.config = static, config
         self.frames: list[tuple[float, dict[str, Any]]] = []
+        self._arrived = threading.Condition()  # another frame
         self.holder = ""
         self.windows: dict[str, Any] = {"drive": {"holder": ""}, RUNNING: {"stop": None}}
         """What queries answer, by name and fields: `mission/ListMissions`; change them by `show`."""
@@ -112,9 +116,9 @@ class FakeGateway:
                 with suppress(ConnectionClosed):
                     connection.send(json.dumps({"op": "publish", "topic": topic, "msg": message}))
 
-    def goals(self) -> list[dict[str, Any]]:
-        """Return the frames of the goals that were sent."""
-        return [frame for _, frame in list(self.frames) if frame["op"] == "send_action_goal"]
+    def goals(self, least: int = 0) -> list[dict[str, Any]]:
+        """Return the frames of the goals that were sent, as soon as there are so many."""
+        return self._with("send_action_goal", lambda _: True, least)
 
     def act(self, op: str, goal: dict[str, Any], values: Any, **more: Any) -> None:
         """Send feedback or the result of a goal to all clients."""
@@ -123,14 +127,26 @@ class FakeGateway:
             with suppress(ConnectionClosed):
                 connection.send(json.dumps(frame))
 
-    def asked(self, request: str) -> list[dict[str, Any]]:
-        """Return the requests of a type that were sent to the robot."""
-        return [given for given in self.calls("/console/ask") if given["type"] == request]
+    def asked(self, request: str, least: int = 0) -> list[dict[str, Any]]:
+        """Return the requests of a type that were sent to the robot, as soon as there are so many."""
+        return self.calls("/console/ask", least, lambda given: bool(given["type"] == request))
 
-    def calls(self, service: str) -> list[dict[str, Any]]:
-        """Return the arguments of each call of a service."""
-        calls = [frame for _, frame in list(self.frames) if frame["op"] == "call_service"]
-        return [frame["args"] for frame in calls if frame["service"] == service]
+    def calls(
+        self, service: str, least: int = 0, is_meant: Callable[[dict[str, Any]], bool] = lambda _: True
+    ) -> list[dict[str, Any]]:
+        """Return the arguments of each call of a service, as soon as there are so many."""
+        found = self._with("call_service", lambda one: one["service"] == service and is_meant(one["args"]), least)
+        return [frame["args"] for frame in found]
+
+    def _with(self, op: str, is_meant: Callable[[dict[str, Any]], bool], least: int) -> list[dict[str, Any]]:
+        """Return the frames that are meant: what a page shows may be seen before its frame has come."""
+
+        def found() -> list[dict[str, Any]]:
+            return [frame for _, frame in self.frames if frame["op"] == op and is_meant(frame)]
+
+        with self._arrived:
+            assert self._arrived.wait_for(lambda: len(found()) >= least, PATIENCE)
+            return found()
 
     def _respond(self, connection: ServerConnection, request: Request) -> Response | None:
         path = request.path.partition("?")[0]
@@ -160,7 +176,9 @@ class FakeGateway:
         try:
             for text in connection:
                 frame = json.loads(text)
-                self.frames.append((time.monotonic(), frame))
+                with self._arrived:
+                    self.frames.append((time.monotonic(), frame))
+                    self._arrived.notify_all()
                 self._handle(connection, frame)
         except ConnectionClosed:
             pass

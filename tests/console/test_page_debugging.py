@@ -162,7 +162,7 @@ def test_a_step_is_ended_by_hand_and_a_machine_is_brought_into_a_state(
     expect(actions.get_by_role("button", name="Force failure")).to_have_count(0)
     actions.get_by_role("button", name="Jump to this state").click()
     done(page, "JumpMission")
-    assert patrol.asked("mission.JumpMission")[0]["state"] == "3"
+    assert patrol.asked("mission.JumpMission", 1)[0]["state"] == "3"
 
 
 @pytest.mark.soak
@@ -191,7 +191,7 @@ def test_data_are_set_in_their_table_with_their_type(open_page: Callable[..., Pa
     form.get_by_role("button", name="Set").click()
     expect(page.get_by_text("mission patrol: done")).to_be_visible()
     expect(form).to_have_count(0)
-    assert patrol.asked("mission.SetMissionData")[1] == {
+    assert patrol.asked("mission.SetMissionData", 2)[1] == {
         "type": "mission.SetMissionData",
         "values": {"rounds": "5"},
         "mission": "patrol",

@@ -191,7 +191,7 @@ def test_without_the_tool_a_drag_moves_the_view_and_not_the_robot(
     tool(page, "Go").click()
     drag(page, at(page, 0.0, 0.2), at(page, 0.5, 0.2))
     expect_drive(page, "(0.60, 0.20)")
-    (goal,) = rolling.goals()
+    (goal,) = rolling.goals(1)
     assert is_goal(goal, 0.6, 0.2, 0.0)
 
 
@@ -202,7 +202,7 @@ def test_a_finger_sends_the_same_goal_and_escape_gives_up(open_page: Callable[..
     tool(page, "Go").tap()
     move_fingers(page, [at(page, 0.2, 0.1)], [at(page, 0.7, 0.1)])
     expect_drive(page, "(0.20, 0.10)")
-    (goal,) = rolling.goals()
+    (goal,) = rolling.goals(1)
     assert is_goal(goal, 0.2, 0.1, 0.0)
     tool(page, "Go").tap()
     page.mouse.move(*at(page, 0.2, 0.1))
@@ -224,7 +224,7 @@ def test_two_fingers_and_the_wheel_zoom_and_send_no_goal(open_page: Callable[...
     page.mouse.wheel(0, -math.log(1.2) / math.log(1.0015))
     drag(page, at(page, 0.3, 0.1, 1.8 * SCALE), at(page, 0.3, 0.0, 1.8 * SCALE))
     expect_drive(page, "(0.30, 0.10)")
-    (goal,) = rolling.goals()
+    (goal,) = rolling.goals(1)
     assert is_goal(goal, 0.3, 0.1, -math.pi / 2)
 
 
@@ -310,7 +310,7 @@ def test_a_goal_is_canceled_after_the_page_was_loaded_again(
     page.get_by_role("button", name="Cancel").click()
     rolling.say("/go_to/_action/status", {"status_list": [{**goal, "status": 5}]})
     expect(state(page)).to_have_text("Canceled on the way to Dock")
-    (call,) = rolling.calls(cancels)
+    (call,) = rolling.calls(cancels, 1)
     assert call["goal_info"]["goal_id"] == goal["goal_info"]["goal_id"]  # type: ignore[index]
 
 
@@ -322,7 +322,7 @@ def test_places_are_the_way_without_the_canvas(open_page: Callable[..., Page], r
     expect(places.get_by_role("listitem").last).to_contain_text("x 1.00\u202fm, y 0.50\u202fm, heading 90°")
     page.get_by_role("button", name="Go to Window seat").press("Enter")
     expect_drive(page, "Window seat")
-    (goal,) = rolling.goals()
+    (goal,) = rolling.goals(1)
     assert is_goal(goal, 1.0, 0.5, math.pi / 2)
     rolling.act("action_feedback", goal, {"distance_remaining": 1.25})
     expect(page.get_by_text("1.25\u202fm to go")).to_be_visible()
@@ -335,8 +335,8 @@ def test_places_are_the_way_without_the_canvas(open_page: Callable[..., Page], r
     page.get_by_label("heading [°]").fill("45")
     page.get_by_role("button", name="Go", exact=True).last.click()
     expect_drive(page, "(0.25, 0.00)")
-    assert is_goal(rolling.goals()[1], 0.25, 0.0, math.pi / 4)
-    rolling.act("action_result", rolling.goals()[1], {}, status=4, result=True)
+    assert is_goal(rolling.goals(2)[1], 0.25, 0.0, math.pi / 4)
+    rolling.act("action_result", rolling.goals(2)[1], {}, status=4, result=True)
     expect(state(page)).to_have_text("Arrived at (0.25, 0.00)")
 
 

@@ -82,7 +82,7 @@ def test_a_person_pauses_cancels_and_starts_a_mission(open_page: Callable[..., P
     page.get_by_role("combobox", name="Speed").select_option("fast")
     page.get_by_role("button", name="Start").click()
     expect(page.get_by_text("patrol runs")).to_be_visible()
-    (asked,) = patrol.asked("mission.RunMission")
+    (asked,) = patrol.asked("mission.RunMission", 1)
     assert asked["inputs"] == {"rounds": "3", "speed": "fast"}
     assert asked["start"] == ""
     assert violations(page) == []
@@ -153,7 +153,7 @@ def test_a_run_that_did_not_end_goes_on_or_starts_again(open_page: Callable[...,
     page.get_by_role("button", name="Start again").click()
     expect(page.get_by_text("mission.RunMission is done")).to_be_visible()
     assert len(patrol.asked("mission.CancelMission")) == 1
-    assert patrol.asked("mission.RunMission")[0]["inputs"] == {"rounds": "5"}
+    assert patrol.asked("mission.RunMission", 1)[0]["inputs"] == {"rounds": "5"}
     patrol.show("mission/ListMissions", listed("success"))
     patrol.show("mission/ListSnapshots", left_over())
     page.get_by_role("button", name="Go on from where it was").click()
@@ -239,7 +239,7 @@ def test_what_is_wrong_and_why_is_seen_at_once(open_page: Callable[..., Page], g
     assert violations(page) == []
     page.get_by_role("button", name="Acknowledge", exact=True).click()
     expect(page.get_by_text("acknowledged", exact=True)).to_be_visible()
-    assert gateway.asked("diagnostics.Acknowledge")[0]["path"] == ""
+    assert gateway.asked("diagnostics.Acknowledge", 1)[0]["path"] == ""
 
 
 def test_a_press_and_the_focus_outlive_what_is_measured_meanwhile(

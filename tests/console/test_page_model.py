@@ -160,7 +160,7 @@ def test_sliders_move_a_ghost_unless_they_may_move_the_robot(
     expect(page.locator(".scene")).to_have_attribute("data-ghost", "")
     expect(page.get_by_text("Nothing of the robot moves")).to_be_hidden()
     wait_for(crane.goals, page)
-    (goal,) = crane.goals()
+    (goal,) = crane.goals(1)
     assert (goal["action"], goal["args"]["joints"]) == ("/crane/move", ["turn"])
     assert goal["args"]["positions"] == [pytest.approx(-math.pi / 6)]
     page.get_by_label("Slide 0 to 50").fill("20")
@@ -217,17 +217,17 @@ def test_a_goal_of_an_arm_is_planned_shown_and_executed(open_page: Callable[...,
     x.fill("50")
     page.get_by_role("button", name="Plan").click()
     expect(page.get_by_text("Planning")).to_be_visible()
-    (ask,) = crane.calls("/arm/compute_ik")
+    (ask,) = crane.calls("/arm/compute_ik", 1)
     assert ask["ik_request"]["pose_stamped"]["pose"]["position"] == {"x": 0.5, "y": 0, "z": 0.2}
     expect(page.locator(".scene")).to_have_attribute("data-ghost", re.compile("turn_joint"))
-    (plan,) = crane.goals()
+    (plan,) = crane.goals(1)
     assert plan["args"]["planning_options"] == {"plan_only": True}
     crane.act("action_result", plan, {"planned_trajectory": WAY, "error_code": {"val": 1}}, status=4, result=True)
     expect(page.get_by_text("A way of 1.0\u202fs")).to_be_visible()
     assert scene(page, "ghost") == {"turn_joint": 1}
     page.get_by_role("button", name="Execute").click()
     expect(page.get_by_text("Moving")).to_be_visible()
-    go = crane.goals()[-1]
+    go = crane.goals(2)[-1]
     assert go["args"]["trajectory"] == WAY
     page.get_by_role("button", name="Let go of its tip").click()
     page.get_by_role("link", name="Log").click()

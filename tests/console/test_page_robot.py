@@ -171,7 +171,7 @@ def test_a_goal_is_followed_and_canceled_after_another_page_was_looked_at(
     card.get_by_label("Amount").fill("0.5")
     card.get_by_role("button", name="Spray").click()
     expect(card.get_by_role("button", name="Cancel spray")).to_be_visible()
-    (goal,) = robot.goals()
+    (goal,) = robot.goals(1)
     page.get_by_role("link", name="Log").click()
     expect(card).to_have_count(0)
     robot.act("action_feedback", goal, {"left": 3})
@@ -237,7 +237,7 @@ def test_a_fault_of_a_simulated_servo_is_simulated(open_page: Callable[..., Page
     servos.get_by_label("For how long, s").fill("5")
     servos.get_by_role("button", name="Simulate it").click()
     expect(servos).to_contain_text("overheat of slide for 5 s")
-    (asked,) = robot.asked("servo_bus.InjectFault")
+    (asked,) = robot.asked("servo_bus.InjectFault", 1)
     assert (asked["joint"], asked["fault"], asked["lasts"]) == ("slide", "overheat", 5)
 
 

@@ -16,7 +16,7 @@ from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.sdk import Component, Config, Live, MissionOver, MissionWaits, RobotHeld, component
 from rbxcompose.tools.run_view import run_plan
 
-SLOW = 5.0  # [s]
+SLOW = 120.0  # [s], longer than any test waits
 
 
 class ToyConfig(Config):
