@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 from rbxcompose.base.levels import level_of
-from rbxcompose.runtime.log import StoryWriter
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.missions.components.mission import Mission
@@ -24,6 +23,7 @@ from rbxcompose.missions.view.replica import joined, status_list
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
+from rbxcompose.runtime.log import StoryWriter
 from rbxcompose.testing.bench import Bench
 from rbxcompose.tools import mission_view as live_view
 from rbxcompose.tools.inspection.mission_text import running_lines
