@@ -70,6 +70,7 @@ class Remote:
     name: str
     model: HostModel
     config: Path | None = None  # of ssh, instead of the user's
+    is_former: bool = False  # its share was brought up from here, and the system has that no longer
 
     @property
     def is_here(self) -> bool:
@@ -215,7 +216,8 @@ def compiled(path: str, arguments: argparse.Namespace, *, needs_all: bool = True
     """Return a system, and where each of its shares runs. Its warnings are for `check` and `up`.
 
     Unless a verb `needs_all`, names and hosts are enough, so that nobody who edits a file keeps others from stopping
-    robots: with errors, shares are where they were brought up from here; those of other robots may be on any host.
+    robots: shares that were brought up from here and that the system has no longer are among them. With errors, shares
+    are where they were brought up from here; those of other robots may be on any host.
 
     Raises:
         ReportedError: if it has errors, and all is needed or nothing is known of its robots.
@@ -225,7 +227,8 @@ def compiled(path: str, arguments: argparse.Namespace, *, needs_all: bool = True
     system = compile_system(path, environment=os.environ, profiles=arguments.profile)
     if not system.report.has_errors:
         require_reachable(system)
-        return system, shares_of(system, arguments.ssh_config)
+        every = shares_of(system, arguments.ssh_config)
+        return system, every if needs_all else {**every, **former(path, every, arguments.ssh_config)}
     shares = {} if needs_all else _known_shares(path, system, arguments.ssh_config)
     if not shares:
         write_report(system.report, system.sources)
@@ -256,11 +259,17 @@ def recalled(path: str, config: Path | None) -> dict[tuple[str, str], Remote]:
         return {}
 
 
-def remember(path: str, shares: Shares) -> None:
-    """Keep where shares of a system are brought up, for `compiled`."""
+def former(path: str, every: Shares, config: Path | None) -> Shares:
+    """Return the shares that were brought up from here and that a system with `every` of these has no longer."""
+    gone = {key: remote for key, remote in recalled(path, config).items() if key not in every}
+    return {key: Remote(remote.name, remote.model, config, is_former=True) for key, remote in gone.items()}
+
+
+def remember(path: str, shares: Shares, gone: Collection[tuple[str, str]] = ()) -> None:
+    """Keep where shares of a system are brought up, for `compiled`, without those that are `gone`."""
     with suppress(OSError), alone_in(made_base()):  # without it they are stopped by their names
-        models = {key: share.model.model_dump() for key, share in (recalled(path, None) | dict(shares)).items()}
-        text = json.dumps([(*key, model) for key, model in models.items()])
+        kept = {key: share for key, share in (recalled(path, None) | dict(shares)).items() if key not in gone}
+        text = json.dumps([(*key, share.model.model_dump()) for key, share in kept.items()])
         replace_file(system_record(path), text.encode(), mode=0o600)
 
 
@@ -324,18 +333,24 @@ def follow_all(shares: Shares, words: Callable[[str], Sequence[str]]) -> int:
         label_of(shares, host, robot): remote.rbxcompose(words(robot), has_terminal=True)
         for (host, robot), remote in shares.items()
     }
-    return follow_commands(commands)
+    return follow_commands(commands, [label_of(shares, *key) for key, share in shares.items() if share.is_former])
 
 
 def ask_all(shares: Shares, words: Callable[[str], Sequence[str]], *, in_json: bool, tolerates: str = "") -> int:
     """Run a verb for each share, and show what each says; return the highest exit code.
 
-    A finding of the code that it `tolerates` does not count if the verb succeeds on another host.
+    A finding of the code that it `tolerates` does not count if the verb succeeds on another host, nor that a share is
+    not up which the system has no longer.
     """
     done = on_all({f"{host} {robot}": share.rbxcompose(words(robot)) for (host, robot), share in shares.items()})
     codes = {label: abs(entry.wait()) for label, entry in done.items()}
-    if tolerates and 0 in codes.values():
-        done = {label: entry for label, entry in done.items() if not any(tolerates in line for line in entry.lines)}
+    if 0 in codes.values():
+        counts = {" ".join(key): NOT_UP.code if share.is_former else tolerates for key, share in shares.items()}
+        done = {
+            label: entry
+            for label, entry in done.items()
+            if not (code := counts[label]) or not any(code in line for line in entry.lines)
+        }
     if in_json:
         emit(json.dumps({"hosts": [_data(label, entry) for label, entry in done.items()]}))
     else:

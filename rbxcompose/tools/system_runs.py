@@ -4,6 +4,7 @@ import argparse
 import json
 import os
 import socket
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 from rbxcompose.base.findings import Finding, Report, kind
 from rbxcompose.commands import hosts
 from rbxcompose.commands.console import FINDINGS, NotDoneError, ReportedError, emit, misused, refuse, write_report
-from rbxcompose.commands.lookup import ALREADY_UP
+from rbxcompose.commands.lookup import ALREADY_UP, NOT_UP
 from rbxcompose.commands.targets import system_without_errors
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
@@ -202,8 +203,19 @@ def apply_system(path: str, arguments: argparse.Namespace) -> int:
     if arguments.host is not None:
         return _apply_here(system, arguments)
     hosts.require_reachable(system)
-    shares = _shares(system, arguments)
-    return _SystemChange(path, system, shares, arguments).run()
+    exit_code = _SystemChange(path, system, _shares(system, arguments), arguments).run()
+    _warn_of_former(path, system, arguments)
+    return exit_code
+
+
+def _warn_of_former(path: str, system: System, arguments: argparse.Namespace) -> None:
+    """Report what was brought up from here, may still run, and is no longer of the system."""
+    former = hosts.former(path, hosts.shares_of(system, arguments.ssh_config), arguments.ssh_config)
+    asked = hosts.on_all({" ".join(key): share.rbxcompose(["ps", key[1]]) for key, share in former.items()})
+    for host, robot in former:
+        if not any(NOT_UP.code in line for line in asked[f"{host} {robot}"].lines):
+            text = f"'{host}' may still run '{robot}', which the system no longer has there"
+            sys.stderr.write(f"{text}: 'rbxcompose down {robot}' on that host ends it\n")
 
 
 def _apply_here(system: System, arguments: argparse.Namespace) -> int:

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.commands.hosts import Remote
+from rbxcompose.commands.hosts import Remote, remember
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.manifest.system_file import HostModel
 from rbxcompose.testing.golden import Golden
@@ -109,3 +109,15 @@ def test_json_is_one_document(
     applied(tmp_path, monkeypatch, [_Host(tmp_path, "a")], json=True)
     (host,) = json.loads(capsys.readouterr().out)["hosts"]
     assert (host["host"], host["answer"]["generation"]) == ("a", 3)
+
+
+@pytest.mark.parametrize("is_up", [True, False])
+def test_what_the_system_no_longer_has_is_named_while_it_may_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *, is_up: bool
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "run"))
+    remember("s.yaml", {("tablet", "r"): Remote("tablet", HostModel())})
+    script = [sys.executable, "-c", "import sys; sys.exit(0)" if is_up else "print('error[RBX9002]'); exit(1)"]
+    monkeypatch.setattr(Remote, "rbxcompose", lambda self, words, **options: script)
+    assert applied(tmp_path, monkeypatch, [_Host(tmp_path, "a")])[0] == 0
+    assert ("'tablet' may still run 'r'" in capsys.readouterr().err) is is_up

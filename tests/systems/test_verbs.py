@@ -194,3 +194,44 @@ def test_of_a_system_that_cannot_be_read_only_what_was_brought_up_from_here_is_k
     Path("other.yaml").write_text(SYSTEM + HALF, encoding="utf-8")
     assert main(["stop", "--robot", "other.yaml"]) == 1
     assert "error[RBX1102]" in capfd.readouterr().err
+
+
+ONE = SYSTEM.replace(", b: {robot: r2.yaml}", "")
+
+
+def test_what_an_edit_takes_away_is_stopped_with_the_system_until_it_has_been_brought_down(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    up(monkeypatch)
+    Path("s.yaml").write_text(ONE, encoding="utf-8")
+    assert shares(needs_all=False) == BOTH
+    assert shares() == {("here", "a")}
+    for verb, after in (("stop --robot", BOTH), ("down", {("here", "a")})):
+        capfd.readouterr()
+        assert main([*verb.split(), "s.yaml"]) == 0
+        out = capfd.readouterr().out
+        assert all(f"here {verb} {robot}" in out for robot in "ab")
+        assert shares(needs_all=False) == after
+
+
+def answer_like_a_host_without(monkeypatch: pytest.MonkeyPatch, absent: str) -> None:
+    """Have each host do what it is asked, but for one robot, which is not up there."""
+    code = f"import sys; print('error[RBX9002]' if '{absent}' in sys.argv else ''); sys.exit('{absent}' in sys.argv)"
+    script = [sys.executable, "-S", "-c", code]
+    monkeypatch.setattr(Remote, "rbxcompose", lambda self, words, **options: [*script, *words])
+
+
+@pytest.mark.parametrize("verb", ["stop --robot", "ps", "logs", "fleet ls"])
+def test_what_an_edit_takes_away_need_not_be_up(
+    verb: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    up(monkeypatch)
+    answer_like_a_host_without(monkeypatch, "b")
+    if verb == "ps":
+        assert main(["ps", "s.yaml"]) == 1
+        assert "here b:" in capfd.readouterr().out
+    Path("s.yaml").write_text(ONE, encoding="utf-8")
+    assert main([*verb.split(), "s.yaml"]) == (verb == "fleet ls")  # whose host gives no answer for the other one
+    out = capfd.readouterr().out
+    assert "here b:" not in out
+    assert "down" not in out

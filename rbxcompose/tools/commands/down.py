@@ -47,7 +47,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 def run_on_system(command: SystemCommand) -> int:
     """End robots of a system; the end on one host may end a robot on the others before they do."""
-    return command.ask(tolerates=NOT_UP.code)
+    from rbxcompose.commands.hosts import remember
+
+    if (exit_code := command.ask(tolerates=NOT_UP.code)) == 0:
+        remember(command.path, {}, gone=command.shares)
+    return exit_code
 
 
 def _end(folder: RobotFolder) -> list[str]:

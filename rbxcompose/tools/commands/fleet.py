@@ -35,6 +35,7 @@ ShareFacts = tuple[
     str, str, dict[str, Any]
 ]  # robot, host, and what `top` reports about the share, or its `state` alone
 _UP = "up"
+_DOWN = {"state": "down"}
 _STATES = {NOT_UP.code: "down", NO_SUPERVISOR: "supervisor dead", NO_ANSWER.code: "no answer"}  # by what `top` says
 
 
@@ -112,7 +113,8 @@ def _list(fleet: Fleet, arguments: argparse.Namespace) -> int:
     """List the robots; return the exit code, which is that of findings if a share cannot be reached or is down."""
     commands = {" ".join(key): share.rbxcompose(["top", key[1], "--json"]) for key, share in fleet.shares.items()}
     asked = hosts.on_all(commands)
-    found = sorted((robot, host, _facts(asked[f"{host} {robot}"])) for host, robot in fleet.shares)
+    known = [(*key, _facts(asked[" ".join(key)]), share.is_former) for key, share in fleet.shares.items()]
+    found = sorted((robot, host, facts) for host, robot, facts, is_former in known if facts != _DOWN or not is_former)
     rows = [_row(robot, list(shares)) for robot, shares in groupby(found, key=lambda row: row[0])]
     shown = table([_COLUMNS, *([row[column] for column in _COLUMNS] for row in rows)])
     emit(json.dumps({"robots": rows}) if arguments.json else shown)
