@@ -135,15 +135,17 @@ def _node(token: NodeToken) -> str:
     return f"{token.namespace}/{token.name}"
 
 
+_MOST_GONE = 1000  # publishers that are gone and remembered
 SILENCE = 5.0  # [s] after which a publisher of a state or a latched topic should have published
 
 
 @dataclass(frozen=True, slots=True)
 class TopicWriter:
-    """A publisher in another process, and since when it is known [s]."""
+    """A publisher in another process, since when it is known [s], and when it was known first, before links were cut."""
 
     token: EndpointToken
     since: float
+    first: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,6 +166,7 @@ class Writers:
     def __init__(self, session: str) -> None:
         self._session = session
         self._by_topic: dict[str, dict[str, TopicWriter]] = {}
+        self._gone: dict[str, float] = {}  # [s] when those were known first that a link may bring back
 
     def apply(self, key: str, now: float, *, is_there: bool) -> None:
         """Apply a token that appeared or went."""
@@ -174,9 +177,11 @@ class Writers:
             return
         known = self._by_topic.setdefault(token.name, {})
         if is_there:
-            known.setdefault(key, TopicWriter(token, now))
-        else:
-            known.pop(key, None)
+            known.setdefault(key, TopicWriter(token, now, self._gone.pop(key, now)))
+        elif (writer := known.pop(key, None)) is not None:
+            self._gone[key] = writer.first
+            if len(self._gone) > _MOST_GONE:
+                del self._gone[next(iter(self._gone))]
         if not known:
             del self._by_topic[token.name]
 
@@ -197,8 +202,10 @@ class Writers:
             return ""
         known = min(writer.since for writer in writers)
         since = max(started, known)
-        # The only message of a latched topic may come while the robot starts, and before the token of its publisher.
-        if reader.arrived >= (known - SILENCE if reader.is_latched else since) or now - since <= SILENCE:
+        # The only message of a latched topic may come while the robot starts, and before the token of its publisher. It
+        # does not come again when the link to its publisher does.
+        latched = min(writer.first for writer in writers) - SILENCE
+        if reader.arrived >= (latched if reader.is_latched else since) or now - since <= SILENCE:
             return ""
         names = " and ".join(dict.fromkeys(f"'{_name(writer)}'" for writer in writers))
         return f"'{reader.owner}' has received nothing on {topic} for {now - since:.0f} s, though {names} publishes it"

@@ -87,6 +87,17 @@ def test_the_only_message_of_a_latched_topic_may_come_while_the_robot_starts() -
         assert bool(writers.trouble(reader, 60.0, 3.0)) is is_told
 
 
+def test_the_only_message_of_a_latched_topic_counts_when_a_cut_link_brings_its_publisher_back() -> None:
+    reader = TopicReader("charger", READER.route, Float32.HASH, 1.0, expects_speech=True, is_latched=True)
+    writers = Writers(HERE)
+    for time, is_there in ((1.0, True), (50.0, False), (60.0, True)):
+        writers.apply(token(), time, is_there=is_there)
+    assert writers.trouble(reader, 100.0, 0.0) == ""
+    writers.apply(token(), 100.0, is_there=False)
+    writers.apply(token(session="c3"), 101.0, is_there=True)
+    assert writers.trouble(reader, 200.0, 0.0), "another process, whose message has not come"
+
+
 @given(st.text() | st.sampled_from([token(), "@ros2_lv/0/b2/1/2/MP/%/%/x/%level/a/b/c"]), st.booleans())
 def test_no_token_breaks_it(key: str, is_there: bool) -> None:
     writers = Writers(HERE)
