@@ -141,7 +141,7 @@ SILENCE = 5.0  # [s] after which a publisher of a state or a latched topic shoul
 
 @dataclass(frozen=True, slots=True)
 class TopicWriter:
-    """A publisher in another process, since when it is known [s], and when it was known first, before links were cut."""
+    """A publisher in another process, since when it is known [s], and since when but for cuts of a link."""
 
     token: EndpointToken
     since: float

@@ -11,6 +11,7 @@ from rbxcompose.runtime.supervision import launch
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED
 from rbxcompose.tools.commands import up
 from rbxcompose.tools.run_view import run_plan
+from tests.conftest import ROOT
 
 
 def parse(*words: str) -> argparse.Namespace:
@@ -56,6 +57,14 @@ def test_a_duration_that_is_none_is_wrong_usage(text: str) -> None:
 def test_real_devices_keep_their_own_time(capsys: pytest.CaptureFixture[str]) -> None:
     assert up.run(parse("--real", "--rate", "max")) == 2
     assert "--rate" in capsys.readouterr().err
+
+
+def test_a_run_in_real_time_is_not_recorded_by_up_whether_of_a_robot_or_a_system(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for path in ("robots/turtlebot/robot.yaml", "systems/two_house_robots.yaml"):
+        assert up.run(parse_robot(str(ROOT / path), "--record", "new.mcap", "--for", "1s")) == 2
+        assert "--record needs --rate" in capsys.readouterr().err
 
 
 def test_profiles_and_values_come_in_their_order() -> None:

@@ -49,6 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.watch and (arguments.detach or arguments.rate.is_stepped):
         other = "-d" if arguments.detach else "--rate"
         return misused("up", f"--watch is for the foreground in real time, without {other}")
+    if arguments.record and not arguments.rate.is_stepped:
+        return misused("up", "--record needs --rate; a run in real time is recorded by 'rbxcompose record'")
     path = targets.robot_path(arguments.path, may_run=False)
     if is_system(path):
         from rbxcompose.tools.system_runs import run_share  # only needed for systems
@@ -65,8 +67,6 @@ def run(arguments: argparse.Namespace) -> int:
         words = ", ".join(f"'{name}'" for name in names)
         return misused("up", f"{words} {runs} real time, so --rate cannot be given")
     options = _options(arguments)
-    if options.record is not None and not options.is_stepped:
-        return misused("up", "--record needs --rate; a run in real time is recorded by 'rbxcompose record'")
     if options.record is not None and (problem := _write_problem(options.record)):
         return refuse(UNWRITABLE.at(None, problem))
     if options.is_stepped and options.rate is None and options.duration is None and plan.start is None:
