@@ -32,6 +32,7 @@ WHICH_HOST = kind("RBX6110")
 OTHER_MACHINE = kind("RBX6111")
 WHICH_ROBOT = kind("RBX6112")
 REFUSED_THERE = kind("RBX6128")
+Key = tuple[str, str]  # host and robot
 
 
 def _bundle(system: System) -> Bundle:
@@ -48,6 +49,12 @@ def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> i
     bundle = _bundle(system)
     folders = hosts.reached(shares, bundle)
     shares = {key: share for key, share in shares.items() if share.is_here or share.name in folders}
+    if arguments.detach and (up := _already_up(shares)):
+        names = ", ".join(f"'{robot}' on '{host}'" for host, robot in up)
+        if len(up) == len(shares):
+            return refuse(ALREADY_UP.at(None, f"already up: {names}", help=f"rbxcompose down {path}"))
+        emit(f"already up: {names}")
+        shares = {key: share for key, share in shares.items() if key not in up}
     options = [*(["-d"] if arguments.detach else []), *(["--real"] if arguments.real else [])]
     options += [word for name in system.profiles for word in ("--profile", name)]
     options += ["--for", f"{arguments.duration} s"] if arguments.duration else []
@@ -62,6 +69,13 @@ def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> i
     return hosts.follow_commands(
         commands, [hosts.label_of(shares, *key) for key, share in shares.items() if share.model.optional]
     )
+
+
+def _already_up(shares: hosts.Shares) -> list[Key]:
+    """Return the shares whose supervisors live."""
+    asked = hosts.on_all({" ".join(key): share.rbxcompose(["ps", key[1], "--json"]) for key, share in shares.items()})
+    answers = {key: asked[" ".join(key)].answer for key in shares}
+    return [key for key, answer in answers.items() if answer and (answer.get("supervisor") or {}).get("pid")]
 
 
 def _shares(system: System, arguments: argparse.Namespace) -> hosts.Shares:
@@ -190,9 +204,6 @@ def _address_problem(plan: Plan, host: str) -> Finding | None:
             message = f"this machine cannot listen at {address}, the address of '{host}': {reason}"
             return OTHER_MACHINE.at(None, message, help="check 'hosts' of the system, and --host")
     return None
-
-
-Key = tuple[str, str]  # host and robot
 
 
 def apply_system(path: str, arguments: argparse.Namespace) -> int:

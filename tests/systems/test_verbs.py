@@ -141,6 +141,28 @@ def test_over_ssh_only_the_robot_that_is_named_is_started(
     assert "error[RBX6121]: the system has no robot 'c'" in capfd.readouterr().err
 
 
+def test_shares_that_are_down_are_started_beside_those_that_are_up(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    code = """import sys
+words = sys.argv[1:]
+if words[0] == "up":
+    print("starts", words[words.index("--robot") + 1]); sys.exit("a" in words)
+print('{"supervisor": {"pid": 7}}' if words[1] in NAMES else '{"error": "no robot is up"}')
+"""
+    monkeypatch.setattr(hosts, "reached", lambda *_: {"far": ""})
+    Path("s.yaml").write_text(SYSTEM.replace("here: {}", "far: {ssh: far, address: 10.0.0.2}"), encoding="utf-8")
+    for names, result in (("a", 0), ("ab", 1), ("", 1)):
+        script = [sys.executable, "-S", "-c", code.replace("NAMES", repr(names))]
+        monkeypatch.setattr(Remote, "rbxcompose", lambda self, words, script=script, **options: [*script, *words])
+        assert main(["up", "-d", "s.yaml"]) == result
+        out, error = capfd.readouterr()
+        assert ("starts b" in out) is (names != "ab")
+        assert ("starts a" in out) is (names == "")
+        assert ("already up: 'a' on 'far'\n" in out) is (names == "a")
+        assert ("error[RBX9001]: already up: 'a' on 'far', 'b' on 'far'" in error) is (names == "ab")
+
+
 def shares(**options: bool) -> set[tuple[str, str]]:
     """Return the host and the robot of each share that is asked."""
     return set(compiled("s.yaml", argparse.Namespace(profile=[], ssh_config=None), **options)[1])
