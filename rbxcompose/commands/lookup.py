@@ -10,7 +10,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, kind, suggest
 from rbxcompose.base.requests import Command, Refused, Request
 from rbxcompose.commands.console import NotDoneError, emit
-from rbxcompose.commands.options import add_system_options
+from rbxcompose.commands.options import add_system_options, system_and_robot
 from rbxcompose.runtime.control import ANSWER, NoAnswerError, ask
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, UnsafeFolderError, all_folders
 from rbxcompose.runtime.requests import RobotStatus
@@ -44,7 +44,7 @@ def add_robot_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def find_robot(wanted: str | None) -> RobotFolder:
-    """Return the folder of the robot with a given name or path, or of the only one.
+    """Return the folder of the robot with a given name or path, or of the only one; `SYSTEM:NAME` is a name, too.
 
     Raises:
         NotDoneError: if there is none or more than one.
@@ -63,7 +63,17 @@ def find_robot(wanted: str | None) -> RobotFolder:
     for path in map(os.path.realpath, (wanted, os.path.join(wanted, "robot.yaml"))):
         if path in files:
             return files[path]
-    raise NotDoneError(NOT_UP.at(None, f"no robot '{wanted}' is up", help=suggest(wanted, found, "robots that are up")))
+    system, robot = system_and_robot(wanted) or ("", wanted)
+    if robot in found:
+        return found[robot]
+    if not robot:
+        message = f"'{system}' is a system, and this command is for one robot, which is up on this machine"
+        raise NotDoneError(WHICH.at(None, message, help=f"name it with '--robot {system}:NAME'"))
+    where = " on this machine" if system else ""
+    if wanted.endswith((".yaml", ".yml")) and not wanted.startswith("rbx:") and not os.path.exists(wanted):
+        where = ", and there is no such file"
+    help_text = suggest(robot, found, "robots that are up")
+    raise NotDoneError(NOT_UP.at(None, f"no robot '{robot}' is up{where}", help=help_text))
 
 
 def robots_up() -> list[RobotFolder]:

@@ -90,3 +90,20 @@ def test_up_takes_the_only_robot_of_the_folder(folder: Path) -> None:
     add_robot(folder / "robot.yaml")
     done = run_command(("up", "--rate", "max", "--for", "1s"), os.environ, 30.0, folder)
     assert (done.returncode, "one is up" in done.stdout) == (0, True), done.stderr
+
+
+@pytest.mark.parametrize("verb", ["record --for 1s", "console"])
+def test_verbs_for_one_robot_take_one_of_a_system_and_say_so(
+    verb: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "s.yaml").write_text("rbx: 1\nkind: System\n", encoding="utf-8")
+    start("one", folder / "robot.yaml")
+    words = verb.split()
+    for robot, message in (
+        ("s.yaml", "error[RBX9003]: 's.yaml' is a system, and this command is for one robot"),
+        ("s.yaml:two", "error[RBX9002]: no robot 'two' is up on this machine"),
+        ("s.yaml:one", "'one' does not answer"),
+        ("nope.yaml", "error[RBX9002]: no robot 'nope.yaml' is up, and there is no such file"),
+    ):
+        assert command.main([*words, "--robot", robot]) == 1
+        assert message in capsys.readouterr().err
