@@ -76,7 +76,7 @@ class HostModel(Config):
     labels: tuple[Name, ...] = ()
     """What robots may call it by in `on` and `place`, such as `gpu`."""
     devices: tuple[str, ...] = ()
-    """Serial ports that are connected here, as components name them: `/dev/ttyUSB0`, `usb:0403:6014`."""
+    """Serial ports that are connected here, as components name them: `/dev/ttyUSB0`, `usb:0403:6014`, `dev:NAME`."""
     optional: bool = False
     """Whether the others start without it."""
 

@@ -220,19 +220,27 @@ class PutsThings(Capability):
 
 
 @dataclass(frozen=True, slots=True)
-class OpensPort(Capability):
-    """It opens a serial port of this machine, which `up` looks at before anything starts."""
-
-    port: Setting[str]
-    """A path, or `usb:VENDOR:PRODUCT` with `:SERIAL` behind it if there is one."""
-
-
-@dataclass(frozen=True, slots=True)
 class ConnectedBy(Capability):
     """Its hardware is at a serial port, which it alone can open; also declared when a twin stands in for it."""
 
     port: Setting[str]
-    """As in `OpensPort`."""
+    """A path, or `usb:VENDOR:PRODUCT` with `:SERIAL` behind it if there is one; for a device of the robot with
+    `dev:NAME=` before it."""
+
+    @property
+    def name(self) -> str:
+        """Return the port as manifests name it: a path, `dev:NAME`, or `usb:VENDOR:PRODUCT`."""
+        port = self.port.value
+        return port.partition("=")[0] if port.startswith("dev:") else port
+
+    def is_among(self, devices: Iterable[str]) -> bool:
+        """Return whether these `devices` of a host have it, by its name or by what a device of the robot is."""
+        return not {self.name, self.port.value.removeprefix(f"{self.name}=")}.isdisjoint(devices)
+
+
+@dataclass(frozen=True, slots=True)
+class OpensPort(ConnectedBy):
+    """It opens a serial port of this machine, which `up` looks at before anything starts."""
 
 
 @dataclass(frozen=True, slots=True)

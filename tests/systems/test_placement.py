@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.compiler.systems.model import HostOffer, Wishes, hosts_called, place
+from rbxcompose.compiler.systems.reader import compile_system
 
 NAMES = st.sampled_from([f"c{number}" for number in range(8)])
 HOSTS = ("robot", "desk", "cloud")
@@ -63,3 +68,41 @@ def test_the_smallest_part_around_a_component_counts_and_a_label_goes_where_leas
         "finger": "two",
         "thumb": "one",
     }
+
+
+CART = """rbx: 1
+kind: Robot
+name: cart
+devices: {arduino: {vendor: 2341, product: "0043"}, receiver: {vendor: 1546, product: 01a7}}
+components:
+  base: {type: serial_base, port: dev:arduino, ticks_per_metre: 4200, wheel_distance: 24 cm, max_speed: 0.4 m/s}
+  gps: {type: gps, port: dev:receiver}
+  lidar: {type: lidar, port: /dev/ttyUSB0, frame: base_link}
+"""
+SYSTEM = """rbx: 1
+kind: System
+name: carts
+hosts:
+  robot: {address: 10.0.0.1, devices: [dev:arduino, /dev/ttyUSB0]}
+  desk: {address: 10.0.0.2, devices: ["usb:1546:01a7"]}
+robots: {cart: {robot: cart.yaml, on: desk}}
+"""
+
+
+def test_whatever_opens_a_port_goes_where_that_is_connected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("cart.yaml").write_text(CART, encoding="utf-8")
+    Path("s.yaml").write_text(SYSTEM, encoding="utf-8")
+    cart = compile_system("s.yaml", environment={}).robots["cart"]
+    assert {name: cart.hosts[name] for name in ("base", "gps", "lidar")} == {
+        "base": "robot",
+        "gps": "desk",
+        "lidar": "robot",
+    }
+    assert cart.placed["base"].reason == "has dev:arduino"
+    Path("s.yaml").write_text(SYSTEM.replace("on: desk", "place: {base: desk, gps: robot}"), encoding="utf-8")
+    found = [finding for finding in compile_system("s.yaml", environment={}).report if finding.code == "RBX6103"]
+    assert [re.findall("'[a-z]+'|dev:[a-z]+", finding.message) for finding in found] == [
+        ["'base'", "'desk'", "dev:arduino", "'robot'"],
+        ["'gps'", "'robot'", "dev:receiver", "'desk'"],
+    ]

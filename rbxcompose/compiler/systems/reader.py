@@ -333,8 +333,12 @@ def _placed_robot(member: _Member, out: System, compiling: _Compiling) -> Placed
     out.report.extend(problems)
     if problems:
         return None
-    devices = {component.name: {connected.port.value} for component, connected in robot.declared(ConnectedBy)}
-    facts = {key: HostOffer(frozenset(host.labels), frozenset(host.devices)) for key, host in out.hosts.items()}
+    ports = robot.declared(ConnectedBy)
+    devices = {component.name: {connected.name} for component, connected in ports}
+    facts = {
+        key: HostOffer(frozenset(host.labels), frozenset(one.name for _, one in ports if one.is_among(host.devices)))
+        for key, host in out.hosts.items()
+    }
     placed = place(names, facts, Wishes(model.on, model.place), parts, devices)
     share_port = model.share_port or (link_port + _APART) % PORTS or _APART
     version = _version(compilation, out)

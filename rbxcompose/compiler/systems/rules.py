@@ -174,10 +174,9 @@ def _place(system: System, robot: PlacedRobot, component: str) -> Span:
 def _devices(system: System, robot: PlacedRobot) -> Iterator[Finding]:
     for component, connected in robot.robot.declared(ConnectedBy):
         host = robot.hosts[component.name]
-        port = connected.port.value
-        having = [name for name, model in system.hosts.items() if port in model.devices]
+        having = [name for name, model in system.hosts.items() if connected.is_among(model.devices)]
         if having and host not in having:
-            message = f"'{component.name}' runs on '{host}', but {port} is connected to '{having[0]}'"
+            message = f"'{component.name}' runs on '{host}', but {connected.name} is connected to '{having[0]}'"
             span = value_span(system.root, ("hosts", having[0], "devices"))
             yield DEVICE_ELSEWHERE.at(
                 _place(system, robot, component.name),

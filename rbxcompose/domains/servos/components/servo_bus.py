@@ -274,9 +274,9 @@ class ServoBusDriver(Component[ServoBusConfig]):
         kind, has_bytes = bus_type(config.kind), config.twin in ("", "pty")
         packages = (NeedsExtra(Setting(kind.package), Setting(kind.extra)),) if kind.package and has_bytes else ()
         port = Setting(config.port, "port")
-        ports = () if config.twin else (OpensPort(port),)
+        ports = (OpensPort(port),) if not config.twin else (ConnectedBy(port),) if config.port else ()
         turned = (TurnsJoints(Setting(config.efforts)),) if config.by_physics else ()
-        return (*led, *packages, *turned, *((ConnectedBy(port),) if config.port else ()), *ports)
+        return (*led, *packages, *turned, *ports)
 
     def __init__(self, name: str, config: ServoBusConfig, context: Context) -> None:
         """Give the ports of joints and controllers their methods."""
