@@ -29,6 +29,14 @@ from tests.third_party.places import put, see
 
 PATH = "systems/patrol_two_hosts.yaml"
 WITH_DEVICE = ExportedShare("lab", "arm", "bench", ("up", "{file}", "--host", "bench"), ("/dev/ttyUSB0",), 1.0)
+WITH_USB = dataclasses.replace(WITH_DEVICE, robot="cart", devices=(), has_usb=True)
+CART = """rbx: 1
+kind: Robot
+name: cart
+devices: {receiver: {vendor: 1546, product: 01a7}}
+components: {gps: {type: gps, port: dev:receiver}, lidar: {type: lidar, port: /dev/ttyS0, frame: base_link}}
+"""
+CARTS = "rbx: 1\nkind: System\nname: carts\nhosts: {here: {}}\nrobots: {cart: {robot: cart.yaml}}\n"
 SECRET = ExportedShare("lab", "arm", "bench", ("up", "{file}"), (), 1.0, has_certificates=True, secrets=("api_key",))
 OVERLAY = """
 apiVersion: kustomize.config.k8s.io/v1beta1
@@ -64,7 +72,7 @@ def test_a_unit_runs_one_share_in_a_sandbox_and_opens_only_its_devices(
 
 def test_systemd_accepts_the_units(found: list[ExportedShare], tmp_path: Path) -> None:
     analyze = tool("systemd-analyze")
-    for share in (*found, WITH_DEVICE):
+    for share in (*found, WITH_DEVICE, WITH_USB):
         path = tmp_path / shares.unit_name(share)
         path.write_text(shares.unit(share, program="/bin/true", file="/srv/system.yaml", user="root"))
         done = subprocess.run([analyze, "verify", path], capture_output=True, text=True, check=False)
@@ -77,6 +85,27 @@ def test_a_compose_file_has_a_service_for_each_share_in_the_profile_of_its_host(
     golden.check("compose.yaml", shares.compose_file(found, system="patrol_two_hosts", file=PATH))
     services = yaml.safe_load(shares.compose_file([WITH_DEVICE], system="lab", file=PATH))["services"]
     assert services["arm-bench"]["devices"] == ["/dev/ttyUSB0:/dev/ttyUSB0"]
+
+
+def test_a_device_that_is_looked_up_may_be_any_serial_port_on_usb(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("cart.yaml").write_text(CART, encoding="utf-8")
+    Path("s.yaml").write_text(CARTS, encoding="utf-8")
+    (share,) = shares.shares(compile_system("s.yaml", environment={}))
+    lines = shares.unit(share, program="/bin/true", file="/srv/s.yaml", user="pi").splitlines()
+    assert [line for line in lines if line.startswith(("DeviceAllow", "Supplementary"))] == [
+        "DeviceAllow=/dev/ttyS0 rw",
+        "DeviceAllow=char-ttyACM rw",
+        "DeviceAllow=char-ttyUSB rw",
+        "SupplementaryGroups=dialout",
+    ]
+    service = yaml.safe_load(shares.compose_file([share], system="carts", file="s.yaml"))["services"]["cart-here"]
+    assert "/dev:/dev" in service["volumes"]
+    assert service["device_cgroup_rules"] == ["c 166:* rw", "c 188:* rw"]
+    assert service["devices"] == ["/dev/ttyS0:/dev/ttyS0"]
+    assert service["group_add"] == ["dialout"]
 
 
 def composer(text: str) -> tuple[list[str], str]:
@@ -92,7 +121,7 @@ def composer(text: str) -> tuple[list[str], str]:
 def test_compose_accepts_the_file_and_would_refuse_a_key_that_it_does_not_know(
     found: list[ExportedShare], tmp_path: Path, soak: Soak
 ) -> None:
-    given = [*found, dataclasses.replace(SECRET, devices=WITH_DEVICE.devices)]
+    given = [*found, WITH_USB, dataclasses.replace(SECRET, devices=WITH_DEVICE.devices)]
     command, text = composer(shares.compose_file(given, system="lab", file=PATH))
     profiles = [word for share in given for word in ("--profile", share.host)]
     path = tmp_path / "compose.yaml"
@@ -118,9 +147,9 @@ def k8s(found: list[ExportedShare]) -> dict[str, str]:
 def test_what_a_pod_of_kubernetes_mounts_is_there_and_the_files_are_those_of_the_system(
     found: list[ExportedShare],
 ) -> None:
-    made = {name: yaml.safe_load(text) for name, text in k8s([*found, WITH_DEVICE]).items()}
+    made = {name: yaml.safe_load(text) for name, text in k8s([*found, WITH_DEVICE, WITH_USB]).items()}
     data = made["files.yaml"]["data"]
-    for share in (*found, WITH_DEVICE):
+    for share in (*found, WITH_DEVICE, WITH_USB):
         pod: dict[str, Any] = made[f"{share.name}.yaml"]["spec"]["template"]["spec"]
         volumes = {volume["name"] for volume in pod["volumes"]}
         assert {mount["name"] for mount in pod["containers"][0]["volumeMounts"]} == volumes
@@ -196,7 +225,7 @@ def test_each_robot_of_a_fleet_is_an_overlay(found: list[ExportedShare], tmp_pat
 
 def test_the_schemas_of_kubernetes_accept_the_manifests(found: list[ExportedShare]) -> None:
     validator = pytest.importorskip("kubernetes_validate", reason="needs kubernetes-validate")
-    for text in k8s([*found, WITH_DEVICE, SECRET]).values():
+    for text in k8s([*found, WITH_DEVICE, WITH_USB, SECRET]).values():
         if (one := yaml.safe_load(text))["kind"] != "Kustomization":
             validator.validate(one, validator.latest_version(), strict=True)
 

@@ -30,6 +30,8 @@ CONFIGURATION = "/run/config"  # in a container: where `CERTIFICATES` are, as in
 FILE = "{file}"
 LONGEST = 63  # characters of a label in Kubernetes, or of a name there
 _DIGITS = 8
+_ALL = "/dev"
+_USB_DRIVERS = {"ttyACM": 166, "ttyUSB": 188}  # of serial ports on USB, with their numbers in the kernel
 WATCHDOG = 10  # [s]
 _SANDBOX = """
 NoNewPrivileges=yes
@@ -82,7 +84,10 @@ def joined_name(*names: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ExportedShare:
-    """The share of a host of a robot; `devices` are paths of serial ports, `rest_time` [s] is until it stands still."""
+    """The share of a host of a robot; `devices` are paths of serial ports, `rest_time` [s] is until it stands still.
+
+    `has_usb` says that it also opens ports that it looks up by the device, so each serial port on USB may be the one.
+    """
 
     system: str
     robot: str
@@ -92,11 +97,17 @@ class ExportedShare:
     rest_time: float
     has_certificates: bool = False
     secrets: tuple[str, ...] = ()  # that its manifest refers to
+    has_usb: bool = False
 
     @property
     def name(self) -> str:
         """Return a name that no other share of the system has."""
         return joined_name(self.robot, self.host)
+
+    @property
+    def mounted(self) -> tuple[str, ...]:
+        """Return what of `/dev` a container has."""
+        return (_ALL,) if self.has_usb else self.devices
 
     @property
     def certificates(self) -> str:
@@ -113,23 +124,24 @@ def shares(system: System, host: str | None = None) -> Iterator[ExportedShare]:
                 real = () if plan.is_simulated else ("--real",)
                 profiles = tuple(word for name in system.profiles for word in ("--profile", name))
                 words = ("up", FILE, "--host", other, "--robot", robot.name, *profiles, *real)
+                ports = _ports(plan)
                 is_linked = plan.share is not None or exchange_of(system, robot, other) is not None
                 yield ExportedShare(
                     system.name,
                     robot.name,
                     other,
                     words,
-                    tuple(_devices(plan)),
+                    tuple(port for port in ports if port.startswith("/dev/")),
                     _rest_time(plan),
                     is_linked and system.security != NO_SECURITY,
                     tuple(sorted({name for each in plan.instances for name in _secrets(each.config)})),
+                    has_usb=not all(port.startswith("/") for port in ports),
                 )
 
 
-def _devices(plan: Plan) -> list[str]:
+def _ports(plan: Plan) -> list[str]:
     opened = (component_type(instance.type).capabilities(instance.config) for instance in plan.instances)
-    paths = {each.port.value for capabilities in opened for each in capabilities if isinstance(each, OpensPort)}
-    return sorted(path for path in paths if path.startswith("/dev/"))
+    return sorted({each.port.value for capabilities in opened for each in capabilities if isinstance(each, OpensPort)})
 
 
 def _secrets(value: object) -> Iterator[str]:
@@ -194,7 +206,9 @@ def _lines(share: ExportedShare, program: str, file: str, user: str) -> Iterator
     yield _SANDBOX.strip()
     for device in share.devices:
         yield f"DeviceAllow={device} rw"
-    if share.devices:
+    for driver in _USB_DRIVERS if share.has_usb else ():
+        yield f"DeviceAllow=char-{driver} rw"
+    if share.mounted:
         yield "SupplementaryGroups=dialout"
     yield ""
     yield "[Install]"
@@ -258,8 +272,13 @@ def _service(share: ExportedShare, file: str) -> dict[str, Any]:
             "start_period": "30s",
         },
     }
+    if share.has_usb:  # what is plugged in later appears in the folder, and the rules say what may be opened there
+        service["volumes"].append(f"{_ALL}:{_ALL}")
+        service["device_cgroup_rules"] = [f"c {major}:* rw" for major in _USB_DRIVERS.values()]
+    if share.mounted:
+        service["group_add"] = ["dialout"]
     if share.devices:
-        service |= {"devices": [f"{device}:{device}" for device in share.devices], "group_add": ["dialout"]}
+        service["devices"] = [f"{device}:{device}" for device in share.devices]
     if share.has_certificates:
         service["secrets"] = [{"source": name, "target": target} for name, _, target in _certificates(share)]
     if share.secrets:
@@ -364,7 +383,7 @@ def _pod(share: ExportedShare, system: str, file: str, files: Mapping[str, Bundl
     if share.has_certificates:
         secret = {"secretName": f"{share.name}-certificates", "defaultMode": 0o440}
         volumes.append({"name": "certificates", "secret": secret})
-    volumes += [{"name": f"device-{n}", "hostPath": {"path": path}} for n, path in enumerate(share.devices)]
+    volumes += [{"name": f"device-{n}", "hostPath": {"path": path}} for n, path in enumerate(share.mounted)]
     return {
         "nodeSelector": {HOST: _label(share.host)},
         "hostNetwork": True,  # its router listens at the address of the host
@@ -375,7 +394,7 @@ def _pod(share: ExportedShare, system: str, file: str, files: Mapping[str, Bundl
             "runAsNonRoot": True,
             "runAsUser": USER,
             "fsGroup": USER,  # may read its secrets
-            "supplementalGroups": [DIALOUT] if share.devices else [],
+            "supplementalGroups": [DIALOUT] if share.mounted else [],
             "seccompProfile": {"type": "RuntimeDefault"},
         },
         "containers": [_container(share, file, image)],
@@ -389,7 +408,7 @@ def _container(share: ExportedShare, file: str, image: str) -> dict[str, Any]:
     mounts.append(("state", STATE))
     if share.has_certificates:
         mounts.append(("certificates", f"{CONFIGURATION}/{share.certificates}"))
-    mounts += [(f"device-{n}", path) for n, path in enumerate(share.devices)]
+    mounts += [(f"device-{n}", path) for n, path in enumerate(share.mounted)]
     return {
         "name": "share",
         "image": image,
@@ -404,10 +423,10 @@ def _container(share: ExportedShare, file: str, image: str) -> dict[str, Any]:
         "livenessProbe": {**probe, "periodSeconds": 10, "failureThreshold": 3},
         "resources": {"requests": {"cpu": "100m", "memory": "128Mi"}, "limits": {"memory": f"{MEMORY}i"}},
         "securityContext": {
-            "privileged": bool(share.devices),  # devices of the host are open to nobody else
-            "allowPrivilegeEscalation": bool(share.devices),
+            "privileged": bool(share.mounted),  # devices of the host are open to nobody else
+            "allowPrivilegeEscalation": bool(share.mounted),
             "readOnlyRootFilesystem": True,
-            **({} if share.devices else {"capabilities": {"drop": ["ALL"]}}),
+            **({} if share.mounted else {"capabilities": {"drop": ["ALL"]}}),
         },
         "volumeMounts": [{"name": name, "mountPath": path} for name, path in mounts],
     }
