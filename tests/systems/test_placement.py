@@ -70,6 +70,15 @@ def test_the_smallest_part_around_a_component_counts_and_a_label_goes_where_leas
     }
 
 
+def test_a_robot_whose_host_is_a_label_runs_on_one_host_with_it_where_most_of_it_is_already() -> None:
+    hosts = {key: HostOffer(frozenset({"floor"}), frozenset(ports)) for key, ports in (("a", ()), ("b", ("/dev/a",)))}
+    names = ["base", "go_to", "mission"]
+    for devices, host in (({}, "a"), ({"base": {"/dev/a"}}, "b")):
+        placed = place(names, hosts, Wishes("floor"), {}, devices)
+        assert [placed[name].host for name in names] == [host] * 3
+        assert placed["mission"].reason == "the robot's host, by label 'floor'"
+
+
 CART = """rbx: 1
 kind: Robot
 name: cart

@@ -176,7 +176,8 @@ def place(
     """Place each component on exactly one host; there is at least one, and each wish names one.
 
     A wish for the component itself counts most, then that for the smallest part with it, then the host that its
-    devices are connected to, then `on`. `parts` are the components of each part, `devices` those that each opens.
+    devices are connected to, then `on`: of hosts with that label, the one with most of the robot. `parts` are the
+    components of each part, `devices` those that each opens.
     """
     found: dict[str, Placement] = {}
     open_ = list(components)
@@ -187,15 +188,14 @@ def place(
     for name in open_:
         if name not in found and (there := _hosts_with(devices.get(name, ()), hosts)):
             found[name] = Placement(name, there[0], f"has {' and '.join(sorted(devices[name]))}")
+    if wishes.on is not None:
+        by_label = "" if wishes.on in hosts else f", by label '{wishes.on}'"
+        main, why = _main_host(hosts_called(wishes.on, hosts), found), f"the robot's host{by_label}"
+    else:
+        main, why = _main_host(hosts, found), "the only host" if len(hosts) == 1 else "has most of the robot"
     for name in open_:
-        if name in found:
-            continue
-        if wishes.on is not None:
-            found[name] = _chosen(name, wishes.on, hosts, found, "the robot's host")
-        elif len(hosts) == 1:
-            found[name] = Placement(name, next(iter(hosts)), "the only host")
-        else:
-            found[name] = Placement(name, _main_host(hosts, found), "has most of the robot")
+        if name not in found:
+            found[name] = Placement(name, main, why)
     return {name: found[name] for name in open_}
 
 
@@ -224,7 +224,7 @@ def _hosts_with(devices: Collection[str], hosts: Mapping[str, HostOffer]) -> lis
     return [name for name, facts in hosts.items() if devices and facts.devices.issuperset(devices)]
 
 
-def _main_host(hosts: Mapping[str, HostOffer], found: Mapping[str, Placement]) -> str:
+def _main_host(hosts: Iterable[str], found: Mapping[str, Placement]) -> str:
     load = Counter(placement.host for placement in found.values())
     return max(hosts, key=lambda name: load[name])
 
