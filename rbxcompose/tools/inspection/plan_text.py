@@ -185,7 +185,8 @@ def _system_lines(system: System, with_keys: bool) -> Iterator[str]:
             )
         for _, stop in every_stop(robot):
             yield ""
-            yield f"after the link is cut, {stop.text}; it may take {format_quantity(robot.model.stop_within, TIME)}"
+            allowed = format_quantity(robot.model.stop_within, TIME)
+            yield f"after a link of {robot.name} is cut, {stop.text}; it may take {allowed}"
     if shared := [*shared_crossings(system)]:
         yield ""
         yield "between robots"
