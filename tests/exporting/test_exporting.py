@@ -70,6 +70,20 @@ def test_a_unit_runs_one_share_in_a_sandbox_and_opens_only_its_devices(
     assert "DeviceAllow=/dev/ttyUSB0 rw" in shares.unit(WITH_DEVICE, **words)
 
 
+def test_a_unit_runs_the_program_that_its_host_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("cart.yaml").write_text(CART, encoding="utf-8")
+    Path("s.yaml").write_text(CARTS.replace("here: {}", "here: {command: /opt/venv/bin/rbxcompose}"), encoding="utf-8")
+    for number, (options, program) in enumerate(
+        (([], "/opt/venv/bin/rbxcompose"), (["--command", "/opt/own"], "/opt/own"))
+    ):
+        assert main(["export", "systemd", "s.yaml", "-o", f"units{number}", *options]) == 0
+        text = Path(f"units{number}/rbxcompose-cart-here.service").read_text(encoding="utf-8")
+        assert f"ExecStart={program} up " in text
+
+
 def test_systemd_accepts_the_units(found: list[ExportedShare], tmp_path: Path) -> None:
     analyze = tool("systemd-analyze")
     for share in (*found, WITH_DEVICE, WITH_USB):

@@ -52,7 +52,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--real", action="store_true", help="use the real devices; without it, they are simulated")
     parser.add_argument("--user", metavar="NAME", help="systemd: the user that runs it (default: you)")
     parser.add_argument("--file", metavar="PATH", help="systemd: the system's file on the host (default: as here)")
-    parser.add_argument("--command", metavar="PATH", help="systemd: rbxcompose on the host (default: as here)")
+    parser.add_argument(
+        "--command", metavar="PATH", help="systemd: rbxcompose on the host (default: the host's, or as here)"
+    )
     parser.add_argument("--image", metavar="NAME", default=f"rbxcompose:{__version__}", help="k8s: the image")
 
 
@@ -124,12 +126,11 @@ def _made(system: System, arguments: argparse.Namespace) -> tuple[dict[str, str]
     found, (file, files) = list(shares.shares(system, arguments.host)), files_of(system)
     match arguments.program:
         case "systemd":
-            words = {
-                "program": arguments.command or shutil.which("rbxcompose") or "/usr/local/bin/rbxcompose",
-                "file": arguments.file or str(system.path),
-                "user": arguments.user or getpass.getuser(),
-            }
-            return {shares.unit_name(item): shares.unit(item, **words) for item in found}, {}
+            words = {"file": arguments.file or str(system.path), "user": arguments.user or getpass.getuser()}
+            return {
+                shares.unit_name(item): shares.unit(item, program=_program(system, item.host, arguments), **words)
+                for item in found
+            }, {}
         case "compose":
             text = shares.compose_file(found, system=system.name, file=file)
             needed = requirements([placed.robot for placed in system.robots.values()], __version__)
@@ -137,6 +138,13 @@ def _made(system: System, arguments: argparse.Namespace) -> tuple[dict[str, str]
             return {"Dockerfile": shares.dockerfile(needed), "compose.yaml": text}, beside
     name, image = system.name, arguments.image
     return shares.kubernetes_manifests(found, system=name, file=file, files=files, image=image), {}
+
+
+def _program(system: System, host: str, arguments: argparse.Namespace) -> str:
+    """Return the path of rbxcompose on a host."""
+    own = system.hosts[host].command
+    there = own if own.startswith("/") else shutil.which("rbxcompose")
+    return arguments.command or there or "/usr/local/bin/rbxcompose"
 
 
 def _write(folder: Path, made: Mapping[str, BundledFile]) -> Finding | None:
