@@ -336,7 +336,7 @@ def _placed_robot(member: _Member, out: System, compiling: _Compiling) -> Placed
     ports = robot.declared(ConnectedBy)
     devices = {component.name: {connected.name} for component, connected in ports}
     facts = {
-        key: HostOffer(frozenset(host.labels), frozenset(one.name for _, one in ports if one.is_among(host.devices)))
+        key: HostOffer(frozenset(host.labels), frozenset(port.name for _, port in ports if port.is_among(host.devices)))
         for key, host in out.hosts.items()
     }
     placed = place(names, facts, Wishes(model.on, model.place), parts, devices)
