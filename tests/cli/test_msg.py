@@ -164,7 +164,7 @@ def test_a_new_type_can_be_used_at_once(robot: Path, name: str) -> None:
         ("my_msgs/foo", "a capital letter"),
         ("My/Foo", "small letters"),
         ("my_msgs/what/Foo", "no name of a type"),
-        ("images/Foo", "is ours"),
+        ("poses/Foo", "is ours"),
         ("my_msgs/msg/a/Foo", "no name of a type"),
         ("class/Foo", "a package cannot be named 'class', a word of Python"),
         ("my_msgs/srv/None", "a type cannot be named 'None', a word of Python"),

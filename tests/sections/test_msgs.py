@@ -112,7 +112,7 @@ def test_an_unknown_type_is_found_as_any_other(tmp_path: Path, name: str) -> Non
         ("std_msgs/msg/String.msg", "int32 data\n", "RBX3029 String.msg:1:1"),
         ("Upper/msg/A.msg", "bool a\n", "RBX1322 robot.yaml:6:8"),
         ("class/msg/A.msg", "bool a\n", "RBX1322 robot.yaml:6:8"),
-        ("images/msg/A.msg", "bool a\n", "RBX1322 robot.yaml:6:8"),
+        ("poses/msg/A.msg", "bool a\n", "RBX1322 robot.yaml:6:8"),
     ],
 )
 def test_a_mistake_is_told_at_its_line_and_once(tmp_path: Path, file: str, text: str, found: str) -> None:
