@@ -22,14 +22,20 @@ from mcap.reader import SeekingReader, make_reader
 from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.zenoh_session import open_router
 from rbxcompose.commands import main as command
+from rbxcompose.commands.guest import Guest
+from rbxcompose.commands.lookup import BusPlace
+from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.runtime.processes import titled
 from rbxcompose.runtime.recording.reader import RecordingReader
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.tools.commands.record import Tap
 from tests.commands import command as at_once
 from tests.forked import RBXCOMPOSE, Forked, run_command
 from tests.loops import for_all
-from tests.recording.samples import some, written
+from tests.recording.samples import recorded, some, written
+from tests.recording.samples import topic as recorded_topic
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 20.0  # [s]
@@ -146,6 +152,27 @@ def test_a_loop_goes_on_until_it_is_interrupted_and_commands_are_left_out(shell:
     found, _ = shell.messages("b.mcap")
     assert len([item for item in found if item.topic.name == "/odom"]) > 10
     assert {item.topic.name for item in found} == {"/odom", "/map"}
+
+
+def test_what_would_move_a_robot_is_left_out_whoever_sent_it(
+    shell: Shell, router: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sent = [
+        recorded(recorded_topic("/cmd_vel/teleop", Twist), Twist(), 0.0),
+        recorded(recorded_topic("/lift", Float64), Float64(), 0.0),
+        recorded(recorded_topic("/height", Float64), Float64(), 0.0),
+    ]
+    path = shell.folder / "a.mcap"
+    path.write_bytes(written(sent))
+    with Guest(BusPlace(router, 0), stays=True) as robot:
+        robot.bus().subscribe("lift", "/lift", Float64, Qos.COMMAND, lambda message: None)
+        robot.bus().subscribe("lift", "/height", Float64, Qos.STATE, lambda message: None)
+        assert command.main(["replay", str(path), "--router", router]) == 0
+        shown = capsys.readouterr()
+        assert re.findall(r"topics that make a robot move: (.*)", shown.err) == ["/cmd_vel/teleop", "/lift"]
+        assert "replayed 1 messages" in shown.out
+        assert command.main(["replay", str(path), "--router", router, "--topics", "cmd_vel/*", "lift"]) == 0
+        assert "replayed 2 messages" in capsys.readouterr().out
 
 
 def test_without_a_robot_it_is_replayed_on_a_router_of_its_own_below_a_namespace(shell: Shell) -> None:

@@ -1,8 +1,9 @@
 """Publish a recording again on a robot's bus, or show what is in it.
 
-Messages come at the recorded intervals. Topics of the class `command` make a robot move: they are
-left out unless `--topics` names them. So are topics that are being published now, unless `--over` mixes them, or
-`--namespace` keeps them apart. With --alone, or if no robot is up, it brings a router of its own.
+Messages come at the recorded intervals. Velocities, trajectories, topics of the class `command`, and what somebody on
+the bus takes as commands make a robot move: they are left out unless `--topics` names them. So are topics that are
+being published now, unless `--over` mixes them, or `--namespace` keeps them apart. With --alone, or if no robot is up,
+it brings a router of its own.
 
 With --into, nothing is published: it runs one component of a run that `up --rate max --record` has recorded again, with
 its recorded inputs, and compares its outputs with the recording. The settings are those of the run, or those of
@@ -22,6 +23,7 @@ from rbxcompose.base.findings import MOST_NAMES, Finding, Severity, suggest
 from rbxcompose.base.printable import plain
 from rbxcompose.base.requests import to_data
 from rbxcompose.bus.endpoints import tcp_endpoint
+from rbxcompose.bus.graph import GraphName
 from rbxcompose.bus.names import Attachment, data_key, dds_type, resolve
 from rbxcompose.bus.tokens import EntityKind, NodeToken, gid
 from rbxcompose.bus.transport import RemotePublisher
@@ -34,6 +36,8 @@ from rbxcompose.commands.options import seconds, speed_up
 from rbxcompose.commands.targets import add_layer_options, compiled
 from rbxcompose.compiler.plan.dump import PlanTextError, dump, load
 from rbxcompose.compiler.plan.model import Instance, Plan
+from rbxcompose.msgs.geometry_msgs import Twist, TwistStamped
+from rbxcompose.msgs.trajectory_msgs import JointTrajectory
 from rbxcompose.runtime.recording import topics as codes
 from rbxcompose.runtime.recording.files import PART, Recorder, write_problem
 from rbxcompose.runtime.recording.reader import RecordingReader, RecordingSummary, playlist, summary_of
@@ -48,6 +52,7 @@ GROUP = "data"
 _MATCHING = 1.0  # [s] maximum wait until subscribers have found a new publisher
 _MATCH_PAUSE = 0.01  # [s] between two checks for them
 _PAUSE = 0.05  # [s] before a recording restarts
+_MOTION = (Twist.TYPE, TwistStamped.TYPE, JointTrajectory.TYPE)  # which move a robot whoever sends them
 _PORT, _TRIES = 7447, 20  # the port at which ROS 2 looks for a router, and those behind it
 HOW = "'rbxcompose up PATH --rate max --record FILE' records everything that is needed"
 
@@ -145,22 +150,29 @@ def _look_through(path: Path) -> tuple[RecordingReader, RecordingSummary]:
 
 
 def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary) -> int:
-    topics = _chosen(summary, selection_of(arguments))
-    if not topics or arguments.start > summary.duration:
-        why = "none of the chosen topics can be replayed" if not topics else f"it lasts {summary.duration:.1f} s"
-        return refuse(codes.NOTHING.at(None, f"nothing of '{plain(str(path))}' is replayed: {why}"))
+    wanted = selection_of(arguments)
+    topics, namespace = _chosen(summary, wanted), arguments.namespace or ""
+    why = f"it lasts {summary.duration:.1f} s" if arguments.start > summary.duration else ""
+    if not topics or why:
+        return _nothing(path, why)
     with replay_bus(arguments) as place:
+        with Guest(place) as looking:  # its router knows all; a guest that stays has to make its own links first
+            found = [topic for topic in looking.graph().topics if topic.name.startswith(namespace)]
+        there = {topic.name.removeprefix(namespace): topic for topic in found}
+        if not wanted.patterns:
+            topics = _without_motion(topics, lambda topic: topic.name in there and _is_commanded(there[topic.name]))
         if not arguments.over:
-            with Guest(place) as looking:  # its router knows all; a guest that stays has to make its own links first
-                sent = _sent_already(looking, topics, arguments.namespace or "")
+            sent = _names(topic for topic in topics if topic.name in there and there[topic.name].givers)
             topics = [topic for topic in topics if topic.name not in sent]
             if sent:
                 finding = _left_out(sent)
                 if not topics:
                     return refuse(finding)
                 warn(replace(finding, severity=Severity.WARNING))
+        if not topics:
+            return _nothing(path)
         with Guest(place, stays=True) as guest, guest.interruptible():
-            player = Player(guest, topics, arguments.namespace or "")
+            player = Player(guest, topics, namespace)
             player.wait_for_subscribers()
             emit(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
             count = _play(path, player, topics, arguments, guest)
@@ -170,10 +182,26 @@ def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary
         return 0
 
 
-def _sent_already(guest: Guest, topics: list[RecordedTopic], namespace: str) -> list[str]:
-    """Return the recorded names of topics that somebody publishes now."""
-    given = {topic.name for topic in guest.graph().topics if topic.givers}
-    return list(dict.fromkeys(topic.name for topic in topics if f"{namespace}{topic.name}" in given))
+def _nothing(path: Path, why: str = "") -> int:
+    words = why or "none of the chosen topics can be replayed"
+    return refuse(codes.NOTHING.at(None, f"nothing of '{plain(str(path))}' is replayed: {words}"))
+
+
+def _names(topics: Iterable[RecordedTopic]) -> list[str]:
+    return list(dict.fromkeys(topic.name for topic in topics))
+
+
+def _is_commanded(topic: GraphName) -> bool:
+    """Return whether somebody takes the messages of a topic as commands."""
+    return any(end.qos == ros_qos(Qos.COMMAND) for end in topic.takers)
+
+
+def _without_motion(topics: list[RecordedTopic], moves: Callable[[RecordedTopic], bool]) -> list[RecordedTopic]:
+    """Return the topics that make no robot move, and report the others."""
+    if names := _names(filter(moves, topics)):
+        words = f"topics that make a robot move: {plain(', '.join(names))}"
+        warn(codes.NOT_REPLAYED.at(None, words, help="'--topics NAME' replays them"))
+    return [topic for topic in topics if topic.name not in names]
 
 
 def _left_out(names: list[str]) -> Finding:
@@ -188,15 +216,12 @@ def _chosen(summary: RecordingSummary, wanted: Selection) -> list[RecordedTopic]
     warn_of_unmatched((one for one in wanted.patterns if not any(matches(name, one) for name in known)), known)
     topics = sorted((topic for topic in summary.counts if wanted.takes(topic)), key=lambda topic: topic.name)
     unfit = [topic.name for topic in topics if not is_replayable(topic)]
-    commands = [topic.name for topic in topics if topic.qos is Qos.COMMAND and not wanted.patterns]
     if unfit:
         warn(codes.NOT_REPLAYED.at(None, f"topics that the bus cannot carry: {plain(', '.join(unfit))}"))
-    if commands:
-        names = plain(", ".join(commands))
-        warn(
-            codes.NOT_REPLAYED.at(None, f"topics that make a robot move: {names}", help="'--topics NAME' replays them")
-        )
-    return [topic for topic in topics if topic.name not in {*unfit, *commands}]
+    topics = [topic for topic in topics if topic.name not in unfit]
+    if wanted.patterns:
+        return topics
+    return _without_motion(topics, lambda topic: topic.qos is Qos.COMMAND or topic.type in _MOTION)
 
 
 def _play(path: Path, player: Player, topics: list[RecordedTopic], arguments: argparse.Namespace, guest: Guest) -> int:
