@@ -181,6 +181,27 @@ def test_a_lock_by_hand_stops_is_told_everywhere_and_outlives_a_restart() -> Non
     assert out[-1] == SLOW
 
 
+def test_an_input_that_must_come_to_rest_after_a_release_must_do_so_after_a_restart() -> None:
+    robot = bench()
+    out = robot.collect("/cmd_vel", Twist)
+    robot.publish("/cmd_vel/navigation", SLOW)
+    robot.host.stop()
+    robot.host.release()
+    robot.host.failed("cmd_vel", RuntimeError("planted"))
+    for _ in range(20):
+        robot.publish("/cmd_vel/navigation", SLOW)
+        robot.advance(0.1)
+    assert SLOW not in out[1:]
+    assert [one.state for one in look(robot).inputs] == ["silent", "must rest"]
+    robot.publish("/cmd_vel/navigation", ZERO)
+    robot.publish("/cmd_vel/navigation", SLOW)
+    assert out[-1] == SLOW
+    robot.host.failed("cmd_vel", RuntimeError("planted"))
+    robot.advance(2.0)
+    robot.publish("/cmd_vel/navigation", SLOW)
+    assert out[-1] == SLOW
+
+
 def test_a_lock_by_hand_with_a_time_ends_by_itself() -> None:
     robot = bench()
     robot.host.ask("cmd_vel", LockMuxInputs("cmd_vel", (), 2.0))

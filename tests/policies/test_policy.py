@@ -254,6 +254,21 @@ def test_it_is_off_until_it_is_switched_on_and_after_a_stop(tmp_path: Path) -> N
     assert driving.wish(0.2, 0.5) == [(0.0, 0.0)], "it rests once"
 
 
+@pytest.mark.parametrize("is_replaced", [False, True])
+def test_after_a_failure_or_another_plan_it_is_off_until_it_is_switched_on(tmp_path: Path, is_replaced: bool) -> None:
+    driving = Driving(tmp_path)
+    assert (0.2, 0.1) in driving.wish(0.2, 0.5)
+    if is_replaced:
+        driving.bench.host.prepare(driving.bench.plan.instances)
+        driving.bench.host.activate(["steer"])
+    else:
+        driving.bench.host.failed("steer", RuntimeError("planted"))
+    driving.bench.advance(1.0)
+    assert driving.wish(0.2, 0.5) == []
+    assert driving.switch(on=True).success
+    assert (0.2, 0.1) in driving.wish(0.2, 0.5)
+
+
 def test_without_a_network_it_says_so_and_cannot_be_switched_on(tmp_path: Path) -> None:
     driving = Driving(tmp_path, model=str(tmp_path / "nowhere.onnx"))
     assert driving.wish(0.2, 0.5) == []

@@ -578,6 +578,13 @@ class MuxCore(Generic[M]):
             self._must_rest(self.inputs, now)
         self._settle(now)
 
+    def rest(self, names: Iterable[str], now: float) -> None:
+        """Have inputs come to rest once, also those of which nothing has been heard yet."""
+        known = self.inputs.keys() & names
+        self.sending_until |= dict.fromkeys(known, math.inf)
+        self._must_rest(known, now)
+        self._settle(now)
+
     def hold(self, now: float) -> M | None:
         """Let nothing through until `resume`; return the zero to send immediately."""
         self.is_held = True

@@ -6,10 +6,11 @@ import math
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import ValidationError
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.requests import Command, Refused, answers
 from rbxcompose.base.units import MOST
@@ -25,10 +26,19 @@ from rbxcompose.sdk import Capability, Component, ComponentNoted, Forwards, In, 
 from rbxcompose.sdk.capabilities import LocksInSilence, Setting
 
 
+@dataclass(frozen=True, slots=True)
+class RestMuxInputs(Command):
+    """Have inputs come to rest once before they count again, for a mux that starts again."""
+
+    about: ClassVar[str] = requests.MUX
+    inputs: tuple[str, ...]
+
+
 class MuxOrders:
     """The orders that still hold, in an order in which they can be repeated."""
 
     def __init__(self) -> None:
+        self.resting: tuple[RestMuxInputs, ...] = ()
         self.added: dict[str, AddMuxInput] = {}
         self._deleted: dict[str, DeleteMuxInput] = {}
         self._locked: dict[str, LockMuxInputs] = {}
@@ -66,7 +76,7 @@ class MuxOrders:
         """Return all that hold; what was deleted first, since what was added may have its name, topic or priority."""
         selected = (self._selected,) if self._selected else ()
         free = [SelectMuxInput(order.component, requests.NONE) for order in selected]  # what is selected stays
-        return (*free, *self._deleted.values(), *self.added.values(), *selected, *self._locked.values())
+        return (*free, *self._deleted.values(), *self.added.values(), *selected, *self._locked.values(), *self.resting)
 
 
 def input_at(text: str, topics: Mapping[str, str]) -> str | None:
@@ -308,6 +318,13 @@ class Mux(Component[MuxConfig]):
         limit = "until they are unlocked" if request.seconds is None else f"for {request.seconds:g} s"
         return self.log(f"locked by hand {limit}: {', '.join(names)}")
 
+    @answers(RestMuxInputs)
+    def rest(self, request: RestMuxInputs) -> str:
+        """Have inputs come to rest once, as before a restart; nobody knows what they have sent meanwhile."""
+        self.core.rest(request.inputs, self.now)
+        self.settle()
+        return self.log(f"{' and '.join(request.inputs)} must come to rest once, as before the restart")
+
     @answers(requests.UnlockMuxInputs)
     def unlock(self, request: requests.UnlockMuxInputs) -> str:
         """End what was locked by hand; an input that still commands motion must come to rest once."""
@@ -464,9 +481,11 @@ class Mux(Component[MuxConfig]):
             self.bound[ANNOUNCED](String(data=text))
 
     def note(self) -> None:
-        """Tell the supervisor what is locked by hand, and forget the orders of locks that have ended."""
+        """Tell the supervisor what is locked by hand or must rest, and forget the orders of locks that have ended."""
         by_hand = self.core.locks.by_hand
-        if self.orders.forget_locks(by_hand):
+        resting = (RestMuxInputs(tuple(sorted(self.core.waiting))),) if self.core.waiting else ()
+        if self.orders.forget_locks(by_hand) or resting != self.orders.resting:
+            self.orders.resting = resting
             self.context.repeat(self.orders.all)
         text = noted(by_hand.items())
         if text != self.noted:

@@ -325,7 +325,7 @@ class PolicyConfig(sdk.Config):
     switch: TopicName = "policy/enable"
     """The service that switches it on and off."""
     starts: bool = False
-    """Whether it is on as soon as the robot is up; after a stop it is off in any case."""
+    """Whether it is on as soon as the robot is up; after a stop, a failure, or `apply` of other settings it is off."""
 
     @field_validator("deadline")
     @classmethod
@@ -411,6 +411,7 @@ class Policy(sdk.Component[PolicyConfig]):
         self.observations = _observed(config)
         self.newest: dict[str, tuple[float, Any]] = {}
         self.is_on, self.problem = False, ""
+        self.begins = config.starts and not self.context.is_again
         self.network: PolicyNetwork | None = None
         try:
             self.network = PolicyNetwork(Path(config.model))
@@ -420,7 +421,11 @@ class Policy(sdk.Component[PolicyConfig]):
 
     def start(self) -> None:
         """Begin if it is to begin by itself."""
-        self.is_on = self.config.starts and not self.context.is_stopped
+        self.is_on = self.begins and not self.context.is_stopped
+
+    def take_over(self, old: Policy) -> None:
+        """Be off: the old one may have been."""
+        self.begins = False
 
     def received(self, port: str, message: Any) -> None:
         """Keep the newest message of each topic."""
