@@ -14,7 +14,7 @@ from rbxcompose.base.files import alone_in
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import INTERRUPTED, NotDoneError, ReportedError, emit, noted_interrupts, refuse
-from rbxcompose.domains.policies.episode import Episode, NoEpisodeError, Sample, features_of, role_of, sample_of
+from rbxcompose.domains.policies.episode import ACTION, Episode, NoEpisodeError, Sample, features_of, role_of, sample_of
 from rbxcompose.domains.policies.lerobot import Dataset, DatasetError
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.cdr import CdrError, decode
@@ -146,5 +146,8 @@ def _samples(path: Path, topics: EpisodeTopics, interrupts: Sequence[int], *, wa
             latest = max(latest, message.log_time)
             if (sample := sample_of(latest, topic.name, role, decoded)) is not None:
                 yield sample
+        for topic in filter(topics.takes, reader.topics):
+            if (role := role_of(topic.name, topic.type)) is not None and role.feature == ACTION:
+                yield Sample(latest, topic.name, role, {})
         if reader.damage and warns:
             warn(DAMAGED.at(None, f"'{plain(str(path))}' is damaged: {reader.damage}"))

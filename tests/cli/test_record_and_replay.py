@@ -96,6 +96,16 @@ def router() -> Iterator[str]:
     session.close()  # type: ignore[no-untyped-call]
 
 
+def test_a_topic_that_was_silent_is_in_the_file(shell: Shell, router: str) -> None:
+    with Guest(BusPlace(router, 0), stays=True) as sender:
+        sender.bus().publisher("base", "/cmd_vel", Twist, Qos.COMMAND)
+        shell.do("record", "--router", router, "-o", "silent.mcap", "--for", "0.3s")
+    with (shell.folder / "silent.mcap").open("rb") as file:
+        reader = RecordingReader(file)
+        assert list(reader.messages()) == []
+        assert [topic.name for topic in reader.topics] == ["/cmd_vel"]
+
+
 @pytest.fixture
 def robot(shell: Shell) -> Iterator[Shell]:
     text = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")

@@ -22,14 +22,18 @@ BEGIN = 1_795_000_000 * NANOSECONDS + 1  # [ns since 1970] of all times
 SIZE = 64, 48  # [pixels] of pictures, width and height
 
 
-def write_recording(path: Path, messages: Iterable[Timed], *, is_sorted: bool = True) -> Path:
-    """Write messages in the order of their times, or as they come."""
+def write_recording(
+    path: Path, messages: Iterable[Timed], *, is_sorted: bool = True, silent: Iterable[RecordedTopic] = ()
+) -> Path:
+    """Write messages in the order of their times, or as they come, and declare topics without any."""
     with path.open("wb") as file:
         writer = RecordingWriter(file)
         for time, name, message in sorted(messages, key=lambda each: each[0]) if is_sorted else messages:
             stamp = BEGIN + round(time * NANOSECONDS)
             topic = RecordedTopic(name, message.TYPE, "RIHS01_00", definition=definition_of(message.TYPE))
             writer.add(Recorded(topic, stamp, stamp, 0, encode(message)))
+        for topic in silent:
+            writer.declare(topic)
         writer.finish()
     return path
 

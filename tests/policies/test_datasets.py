@@ -29,9 +29,10 @@ from rbxcompose.domains.policies.episode import (
     role_of,
     sample_of,
 )
-from rbxcompose.msgs.geometry_msgs import Twist, Vector3
+from rbxcompose.msgs.geometry_msgs import Twist, TwistStamped, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.sensor_msgs import CompressedImage, Image
+from rbxcompose.runtime.recording.topics import RecordedTopic, definition_of
 from rbxcompose.tools import datasets
 from rbxcompose.tools.commands import record
 from tests.commands import command
@@ -95,12 +96,36 @@ def test_joints_of_all_buses_and_the_base_are_in_it_and_a_base_that_nobody_comma
     assert [frame.action for frame in frames] == [(3.0, 0.0, 0.0, 0.0), (3.0, 0.5, 0.0, -1.0), (3.0, 0.5, 0.0, -1.0)]
 
 
+def test_commands_of_a_base_may_have_a_stamp_and_are_not_made_up_where_none_were_recorded() -> None:
+    odometry: Timed = 0.0, "/odom", Odometry()
+    stamped = TwistStamped(twist=Twist(linear=Vector3(x=0.5), angular=Vector3(z=-1.0)))
+    made = samples([odometry, (0.1, "/cmd_vel", stamped), (1.0, "/odom", Odometry())])
+    features = features_of(made)
+    assert features.action == ("x.vel", "y.vel", "theta.vel")
+    assert [frame.action for frame in Episode(features, 2).frames(made)] == [(0.5, 0.0, -1.0)]
+    arm: list[Timed] = [odometry, (0.0, "/joint_states", joints(a=1.0)), (0.0, "/joint_commands", joints(a=1.0))]
+    assert features_of(samples(arm)).action == ("a.pos",)
+
+
+def test_a_topic_of_commands_without_messages_is_a_base_that_rests(tmp_path: Path) -> None:
+    command_topic = RecordedTopic("/cmd_vel", Twist.TYPE, "RIHS01_00", definition=definition_of(Twist.TYPE))
+    messages = [*arm_with_cameras(), *((10 + turn / 10, "/odom", Odometry()) for turn in range(20))]
+    write_recording(tmp_path / "r.mcap", messages, silent=[command_topic])
+    made(tmp_path, "-o", "rests", "--topics", "joint_*", "odom", "cmd_vel", "--from", "r.mcap")
+    info = json.loads((tmp_path / "rests/meta/info.json").read_text())
+    assert info["features"]["action"]["names"] == ["lift.pos", "pan.pos", "x.vel", "y.vel", "theta.vel"]
+    made(tmp_path, "-o", "arm", "--topics", "joint_*", "odom", "--from", "r.mcap")
+    info = json.loads((tmp_path / "arm/meta/info.json").read_text())
+    assert info["features"]["action"]["names"] == ["lift.pos", "pan.pos"]
+
+
 @pytest.mark.parametrize(
     ("messages", "said"),
     [
         ([], "nothing on 'joint_states' or 'odom'"),
         ([(0.0, "/joint_commands", joints(a=1.0))], "nothing on 'joint_states' or 'odom'"),
         ([(0.0, "/joint_states", joints(a=1.0))], "nothing on 'joint_commands' or 'cmd_vel'"),
+        ([(0.0, "/odom", Odometry())], "nothing on 'joint_commands' or 'cmd_vel'"),
         ([(0.0, "/joint_states", joints(a=float("nan")))], "nothing on 'joint_states'"),
     ],
 )

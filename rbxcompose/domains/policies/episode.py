@@ -14,7 +14,7 @@ from typing import Any
 
 from rbxcompose.base.clock import NANOSECONDS
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.msgs.geometry_msgs import Twist, TwistStamped
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.sensor_arrays import DEPTHS
 from rbxcompose.msgs.sensor_msgs import CompressedImage, Image, JointState
@@ -31,12 +31,16 @@ class SampleRole(Enum):
     JOINT_COMMANDS = ACTION, JointState.TYPE, "joint_commands"
     MOTION = STATE, Odometry.TYPE, "odom"
     MOTION_COMMANDS = ACTION, Twist.TYPE, "cmd_vel"
+    STAMPED_MOTION_COMMANDS = ACTION, TwistStamped.TYPE, "cmd_vel"
     PICTURE = PICTURES, Image.TYPE, ""
     JPEG = PICTURES, CompressedImage.TYPE, ""
 
     def __init__(self, feature: str, type: str, topic: str) -> None:
         self.feature, self.type, self.topic = feature, type, topic
         """`topic` is the last word of the topic's name; empty for any."""
+
+
+_DRIVING = (SampleRole.MOTION_COMMANDS, SampleRole.STAMPED_MOTION_COMMANDS)
 
 
 def role_of(topic: str, type: str) -> SampleRole | None:
@@ -61,7 +65,7 @@ class Sample:
     topic: str
     role: SampleRole
     numbers: Mapping[str, float]
-    """By name: `JOINT.pos` [rad or m], `x.vel` [m/s], `theta.vel` [rad/s]."""
+    """By name: `JOINT.pos` [rad or m], `x.vel` [m/s], `theta.vel` [rad/s]; none of a silent topic of commands."""
     picture: Any = None
     """The message of a picture: it is decoded when a frame needs it."""
 
@@ -74,7 +78,9 @@ def sample_of(time: int, topic: str, role: SampleRole, message: Any) -> Sample |
     if role in (SampleRole.JOINTS, SampleRole.JOINT_COMMANDS):
         found = {f"{name}{POSITION}": float(at) for name, at in zip(message.name, message.position, strict=False)}
     else:
-        twist = message.twist.twist if role is SampleRole.MOTION else message
+        twist = message
+        while hasattr(twist, "twist"):  # with a stamp or a covariance
+            twist = twist.twist
         found = dict(zip(VELOCITIES, map(float, (twist.linear.x, twist.linear.y, twist.angular.z)), strict=True))
     return Sample(time, topic, role, {name: value for name, value in found.items() if math.isfinite(value)})
 
@@ -103,7 +109,9 @@ def features_of(samples: Iterable[Sample]) -> Features:
     """
     first: dict[str, dict[str, int]] = {STATE: {}, ACTION: {}, PICTURES: {}}
     began: int | None = None
+    is_driven = False
     for sample in samples:
+        is_driven |= sample.role in _DRIVING
         began = sample.time if began is None else began
         if sample.role.feature == PICTURES:
             first[PICTURES].setdefault(sample.topic, sample.time)
@@ -111,11 +119,11 @@ def features_of(samples: Iterable[Sample]) -> Features:
             first[sample.role.feature].setdefault(name, sample.time)
     if began is None or not first[STATE]:
         raise NoEpisodeError("nothing on 'joint_states' or 'odom': there is no state to learn from")
-    if set(VELOCITIES) & first[STATE].keys():
-        # That a base rests while nobody commands it is a command, too.
-        first[ACTION] |= dict.fromkeys(VELOCITIES, began)
     if not first[ACTION]:
         raise NoEpisodeError("nothing on 'joint_commands' or 'cmd_vel': there is no command to learn")
+    if is_driven and set(VELOCITIES) & first[STATE].keys():
+        # That a base rests while nobody commands it is a command, too.
+        first[ACTION] |= dict.fromkeys(VELOCITIES, began)
     cameras: dict[str, str] = {}
     for topic in sorted(first[PICTURES], key=len):  # the shortest name of a camera is the raw picture
         cameras.setdefault(camera_of(topic), topic)

@@ -163,6 +163,8 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: b
             for message in tap.take():
                 recorder.add(message)
             recorder.keep(guest.clock.now())
+        for topic in tap.topics.values():
+            recorder.declare(topic)
         recorder.finish()
     except OSError as error:
         recorder.abandon()
@@ -245,7 +247,8 @@ def _class(text: str) -> Qos:
 class Tap:
     """Receives the messages of all selected topics, including those that appear while it runs.
 
-    `unmatched` are the patterns that no topic has matched so far, and `others` the names of topics that none matches.
+    `topics` are those by their keys on the bus, `unmatched` the patterns that no topic has matched so far, and `others`
+    the names of topics that none matches.
     """
 
     def __init__(self, guest: Guest, wanted: Selection) -> None:
@@ -254,7 +257,7 @@ class Tap:
         self._waiting: deque[Callable[[], Recorded]] = deque(maxlen=MOST_WAITING)
         self._arrivals = count(1)
         self._arrived = self._taken = 0
-        self._keys: set[str] = set()
+        self.topics: dict[str, RecordedTopic] = {}
         self.unmatched = list(dict.fromkeys(wanted.patterns))
         self.others: set[str] = set()
         guest.transport.watch(f"{SPACE}/{guest.domain}/**", self._noticed)
@@ -284,13 +287,12 @@ class Tap:
         self.unmatched = [pattern for pattern in self.unmatched if not matches(topic.name, pattern)]
         if not self._wanted.names(topic) and len(self.others) < MOST_TOPICS:
             self.others.add(topic.name)
-        if not self._wanted.takes(topic) or len(self._keys) >= MOST_TOPICS:
+        if not self._wanted.takes(topic) or len(self.topics) >= MOST_TOPICS:
             return
         data = data_key(self._guest.domain, topic.name, topic.type, topic.hash)
-        if data in self._keys:
+        if data in self.topics:
             return
-        self._keys.add(data)
-        whole = replace(topic, definition=definition_of(topic.type))
+        whole = self.topics[data] = replace(topic, definition=definition_of(topic.type))
         self._guest.transport.subscribe(data, topic.qos, lambda arrival: self._arrive(whole, arrival))
 
     def _arrive(self, topic: RecordedTopic, arrival: Arrival) -> None:
