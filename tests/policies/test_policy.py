@@ -354,6 +354,32 @@ def test_it_moves_joints_and_an_empty_trajectory_brings_them_to_rest(tmp_path: P
     assert not sent[-1].points
 
 
+def test_joints_that_somebody_else_has_led_away_are_not_jerked_back(tmp_path: Path) -> None:
+    path = network(tmp_path / "look.onnx", [[0]], [0.4])  # the same place whatever it sees
+    config = {
+        "model": str(path),
+        "starts": True,
+        "observes": [{"topic": "joint_states", "joints": ["pan"], "fields": ["position"]}],
+        "commands": {"topic": "stream/policy", "outputs": {"pan": {"least": -1, "most": 1, "jump": 0.1}}},
+    }
+    bench = Bench(instance("look", "policy", config))
+    sent, statuses = bench.collect("/stream/policy", JointTrajectory), bench.statuses("look")
+
+    def at(position: float, seconds: float) -> int:
+        """How often it leads the joint while that is at a position."""
+        sent.clear()
+        for _ in range(round(seconds * 10)):
+            bench.publish("/joint_states", JointState(name=("pan",), position=np.array([position])))
+            bench.advance(0.1)
+        return len([one for one in sent if one.points])
+
+    assert at(0.38, 1.0) > 5
+    assert at(0.38 - 0.3, 0.5) > 3, "a joint may be behind"
+    assert at(-0.4, 2.0) == 0
+    assert (statuses[-1].level, statuses[-1].message) == (Level.ERROR, "'pan' jumps from -0.4 to 0.4, by more than 0.1")
+    assert at(0.35, 1.0) > 5
+
+
 HEAD = """
 rbx: 1
 kind: Robot

@@ -127,7 +127,7 @@ class PolicyOutputConfig(sdk.Config):
     most: float
     """The greatest value."""
     jump: float = Field(gt=0)
-    """How far it may be from the value before; the first one from where the joint is, or from 0."""
+    """How far it may be from the value before. At first from 0; a joint from where it is, also when others have led it."""
 
     @field_validator("most")
     @classmethod
@@ -145,6 +145,8 @@ class PolicyCore:
     """By the name of each number of an answer, in its order."""
     deadline: float
     """[s] from an observation to its command, and from the last command until rest."""
+    lag: float = math.inf
+    """How many jumps a joint may be away from what was sent: if it is farther, somebody else leads it."""
     counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(("sent", "late", "refused", "unseen"), 0))
     """What became of answers since the policy was configured; `unseen` are times with nothing to observe."""
     last: tuple[float, ...] | None = None
@@ -154,19 +156,27 @@ class PolicyCore:
     def judge(self, answer: Sequence[float], start: Sequence[float], began: float, ended: float) -> str:
         """Return why an answer must not be sent, or nothing: then `last` is to be sent.
 
-        `start` is where the first answer begins; times [s] are those of the observation and of the answer.
+        `start` is where the first answer begins, and where joints are; times [s] are those of the observation and of
+        the answer.
         """
         took = ended - began
         if took > self.deadline:
             self.counts["late"] += 1
             return f"an answer took {took * 1e3:.0f} ms, and is late after {self.deadline * 1e3:.0f} ms"
-        if problem := self._problem(answer, start if self.last is None else self.last):
+        if problem := self._problem(answer, self._before(start)):
             self.counts["refused"] += 1
             return problem
         pairs = zip(self.limits.values(), answer, strict=True)
         self.last, self.sent_at = tuple(min(max(value, limits.least), limits.most) for limits, value in pairs), ended
         self.counts["sent"] += 1
         return ""
+
+    def _before(self, start: Sequence[float]) -> Sequence[float]:
+        """Return what an answer must be near to."""
+        if self.last is None:
+            return start
+        triples = zip(self.limits.values(), self.last, start, strict=True)
+        return [last if abs(last - at) <= self.lag * limits.jump else at for limits, last, at in triples]
 
     def _problem(self, answer: Sequence[float], before: Sequence[float]) -> str:
         if len(answer) != len(self.limits):
@@ -404,10 +414,17 @@ class Policy(sdk.Component[PolicyConfig]):
         speed, turn_rate = (_greatest(config, name) for name in ("linear.x", "angular.z"))
         return needed, sdk.CommandsMotion("commands", sdk.Setting(speed), sdk.Setting(turn_rate))
 
+    @property
+    def within(self) -> float:
+        """Return in which time joints arrive [s]."""
+        return self.config.commands.within or PERIODS / self.config.rate
+
     def configure(self) -> None:
         """Load the network; if it is none, that is reported."""
         config = self.config
-        self.core = PolicyCore(config.commands.outputs, config.deadline)
+        is_of_joints = config.commands.message == JOINTS
+        lag = (self.within + config.deadline) * config.rate if is_of_joints else math.inf
+        self.core = PolicyCore(config.commands.outputs, config.deadline, lag)
         self.observations = _observed(config)
         self.newest: dict[str, tuple[float, Any]] = {}
         self.is_on, self.problem = False, ""
@@ -490,7 +507,7 @@ class Policy(sdk.Component[PolicyConfig]):
         return parts
 
     def beginning(self, parts: list[list[float]]) -> list[float]:
-        """Return what the first answer must be near to: where joints are, else 0."""
+        """Return where joints are, and 0 for other numbers: what the first answer must be near to."""
         known = positions_in(self.config.observes) if self.config.commands.message == JOINTS else {}
         places = [known.get(name) for name in self.core.limits]
         return [parts[place[0]][place[1]] if place else 0.0 for place in places]
@@ -499,8 +516,7 @@ class Policy(sdk.Component[PolicyConfig]):
         """Return an answer as a message."""
         commands = self.config.commands
         if commands.message == JOINTS:
-            within = commands.within or PERIODS / self.config.rate
-            point = JointTrajectoryPoint(positions=filled("float64", answer), time_from_start=to_duration(within))
+            point = JointTrajectoryPoint(positions=filled("float64", answer), time_from_start=to_duration(self.within))
             return JointTrajectory(joint_names=tuple(commands.outputs), points=(point,))
         if commands.message == NUMBERS:
             return Float64MultiArray(data=filled("float64", answer))
