@@ -104,6 +104,8 @@ def test_numbers_are_observed_in_the_order_in_which_they_are_written() -> None:
         ({"message": "nav_msgs/Odometry", "fields": ["pose.pose"]}, "not numbers"),
         ({"message": "nav_msgs/Odometry", "joints": ["a"], "fields": ["pose.pose.position.x"]}, "has joints"),
         ({"joints": ["a"], "fields": ["name"]}, "a joint has no field 'name'"),
+        ({"message": "nav_msgs/Odometry", "fields": ["pose.covariance"]}, "has 36 numbers, and not 1"),
+        ({"message": "std_msgs/Float32", "fields": ["data"], "size": 2}, "has 1 numbers, and not 2"),
         ({"joints": ["a", "a"]}, "a joint is there twice"),
     ],
 )
@@ -436,6 +438,15 @@ def test_check_compares_the_sizes_of_the_network_with_what_is_written(tmp_path: 
         ("these are 1 numbers, and 'steer.onnx' takes 2", 11, 15),
         ("these are 1 numbers, and 'steer.onnx' gives 3", 15, 16),
     }
+
+
+@pytest.mark.parametrize("fields", ["[datum]", "[data.first]"])
+def test_nothing_that_follows_from_a_wrong_field_is_reported_beside_it(tmp_path: Path, fields: str) -> None:
+    network(tmp_path / "steer.onnx", [[1, 0], [0, 1], [0, 0]], [0, 0])
+    text = BASE.replace("fields: [data]", f"fields: {fields}").replace("topic: wish", "topic: battery_level")
+    text = text.replace("components:\n", "components:\n  battery: {type: battery_sim, runtime: 5 min}\n")
+    _, findings = compiled(tmp_path, text)
+    assert [one.code for one in findings if one.severity == "error"] == ["RBX1004"]
 
 
 def test_check_tells_which_file_is_missing(tmp_path: Path) -> None:

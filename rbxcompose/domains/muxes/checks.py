@@ -27,7 +27,7 @@ from rbxcompose.domains.muxes.requests import NONE
 from rbxcompose.domains.muxes.sections.muxes import MuxModel, muxes
 from rbxcompose.missions.analysis.facts import published
 from rbxcompose.sdk.capabilities import CommandsMotion, Drives, Forwards, Setting
-from rbxcompose.sdk.ports import In, Looks, Out, Qos
+from rbxcompose.sdk.ports import In, Looks, Out, Port, Qos
 
 _MOST_SHOWN = 8  # inputs that are pointed at
 ENDINGS = ("on_idle", "on_lock")
@@ -542,6 +542,7 @@ def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
         if mux_input.source  # a type that does not fit there is reported where the mux names its source
     }
     ends = [end for end in robot.ends if not isinstance(end.port, Looks) and (end.topic, end.instance) not in taken]
+    ends = [end for end in ends if not _is_doubtful(robot.components.get(end.instance), end)]
     for topic, group in groupby(sorted(ends, key=lambda end: end.topic), key=lambda end: end.topic):
         first, *others = sorted(group, key=robot.end_span)
         for other in others:
@@ -558,6 +559,11 @@ def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
                     help=_cure(robot, first, other),
                     related=[Related(robot.end_span(first), f"its port '{first.name}'")],
                 )
+
+
+def _is_doubtful(made: RobotComponent | None, end: PortEnd) -> bool:
+    """Return whether a port follows from a configuration with mistakes: not if all components of the type have it."""
+    return made is not None and not made.is_sound and not isinstance(getattr(made.cls, end.name, None), Port)
 
 
 def _cure(robot: Robot, *ends: PortEnd) -> str:

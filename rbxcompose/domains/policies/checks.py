@@ -37,7 +37,7 @@ def _examined(robot: Robot, made: RobotComponent) -> Iterator[Finding]:
             where = robot.value(*made.place("model"))
             yield unusable_policy.at(where, str(error).replace(str(path), written))
         return
-    if network is None:
+    if network is None or not made.is_sound:
         return
     takes, gives = sum(seen.length for seen in config.observes), len(config.commands.outputs)
     if network.takes not in (None, takes):

@@ -21,6 +21,7 @@ from rbxcompose.base.levels import Level
 from rbxcompose.manifest.fields import FieldPath, TopicName
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.arrays import filled
+from rbxcompose.msgs.definitions import FieldShape
 from rbxcompose.msgs.fields import NoFieldError, field_type
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.stamps import to_duration
@@ -127,7 +128,7 @@ class PolicyOutputConfig(sdk.Config):
     most: float
     """The greatest value."""
     jump: float = Field(gt=0)
-    """How far it may be from the value before. At first from 0; a joint from where it is, also when others have led it."""
+    """How far from the value before, at first from 0; a joint from where it is at first, or if others have led it."""
 
     @field_validator("most")
     @classmethod
@@ -244,7 +245,7 @@ class ObservationConfig(sdk.Config):
             if info.data.get("joints") and path not in OF_JOINTS:
                 context = {"name": path, "valid": OF_JOINTS, "what": "fields of joints"}
                 raise PydanticCustomError("field", "a joint has no field '{name}'", context)
-            _require_numbers(str(message), path)
+            _require_numbers(str(message), path, info.data.get("size"))
         return fields
 
     @property
@@ -253,7 +254,7 @@ class ObservationConfig(sdk.Config):
         return len(self.fields) * (len(self.joints) or self.size)
 
 
-def _require_numbers(message: str, path: str) -> None:
+def _require_numbers(message: str, path: str, size: int | None) -> None:
     try:
         found = field_type(message, path)
     except NoFieldError as error:
@@ -261,6 +262,11 @@ def _require_numbers(message: str, path: str) -> None:
         raise PydanticCustomError("field", f"{error.message} has no field '{{name}}'", context) from None
     if found.is_message or found.base in ("string", "wstring"):
         raise PydanticCustomError("field", "'{path}' is a {type}, not numbers", {"path": path, "type": str(found)})
+    length = {FieldShape.SINGLE: 1, FieldShape.ARRAY: found.length}.get(found.shape, size)
+    if size is not None and length != size:
+        help_text = f"an observation of its own with 'size: {length}' has all of them" if length != 1 else ""
+        lengths = {"path": path, "length": length, "size": size, "help": help_text}
+        raise PydanticCustomError("field", "'{path}' has {length} numbers, and not {size}", lengths)
 
 
 def observed(config: ObservationConfig, message: Any) -> list[float]:
