@@ -34,7 +34,7 @@ from rbxcompose.tools.commands.record import Tap
 from tests.commands import command as at_once
 from tests.forked import RBXCOMPOSE, Forked, run_command
 from tests.loops import for_all
-from tests.recording.samples import recorded, some, written
+from tests.recording.samples import recorded, some, unfinished, written
 from tests.recording.samples import topic as recorded_topic
 
 ROOT = Path(__file__).parents[2]
@@ -401,6 +401,16 @@ def test_without_a_router_nothing_is_left_behind(tmp_path: Path, capsys: pytest.
     assert "error[RBX9020]" in refused(["record", "--router", "tcp/127.0.0.1:1", "-o", wanted], capsys)
     assert "error[RBX9020]" in refused(["record", "--router", "nonsense", "-o", wanted], capsys)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("form", ["mcap", "lerobot"])
+def test_the_next_recorder_in_a_folder_recovers_what_a_killed_one_has_left(
+    form: str, tmp_path: Path, router: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "cut.mcap.part").write_bytes(unfinished(MESSAGES))
+    command.main(["record", "--format", form, "--router", router, "--for", "0.01s", "-o", f"{tmp_path}/next"])
+    assert "cut.mcap' was unfinished" in capsys.readouterr().err
+    assert (tmp_path / "cut.mcap").exists()
 
 
 @pytest.mark.parametrize(

@@ -247,6 +247,11 @@ def test_what_does_not_fit_is_refused_and_nothing_is_lost(data_set: Path, tmp_pa
             ("--from", "blind.mcap", "other.mcap", "-o", "new"),
             "'other.mcap' is no episode: nothing on 'joint_commands'",
         ),
+        (
+            ("--from", "blind.mcap", "wide.mcap", "-o", "new"),
+            "'wide.mcap' is not added: 'observation.images.front' is a video of 80 x 48 here, and missing in the episodes "
+            "before",
+        ),
         (("--from", "missing.mcap", "-o", "new"), "error[RBX9201]: 'missing.mcap' cannot be read"),
         (("--from", "text.mcap", "-o", "new"), "error[RBX9201]: 'text.mcap' is not a recording"),
         (("--append", "--from", "other.mcap", "-o", "new"), "'new' is no data set of LeRobot"),
@@ -254,7 +259,7 @@ def test_what_does_not_fit_is_refused_and_nothing_is_lost(data_set: Path, tmp_pa
         (("--append", "--from", "wide.mcap", "-o", "picks"), "'picks' has 10 frames per second, not 15"),
         (
             ("--append", "--fps", "10", "--from", "wide.mcap", "-o", "picks"),
-            "'observation.images.front' is a video of 80 x 48 here, and a video of 64 x 48 in the episodes of 'picks'",
+            "'observation.images.front' is a video of 80 x 48 here, and a video of 64 x 48 in the episodes before",
         ),
         (
             ("--append", "--fps", "10", "--from", "grows.mcap", "-o", "picks"),

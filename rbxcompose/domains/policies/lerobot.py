@@ -159,7 +159,7 @@ class Dataset:
         for name in {**known, **described}:
             if known.get(name) != described.get(name):
                 there, here = (_words(each.get(name)) for each in (known, described))
-                raise DatasetError(f"'{name}' is {here} here, and {there} in the episodes of '{self.folder}'")
+                raise DatasetError(f"'{name}' is {here} here, and {there} in the episodes before")
 
     def _write(
         self,

@@ -86,10 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.format == LEROBOT:
         return _record_dataset(arguments)
     place = find_place(arguments)
-    path = _path(arguments)
-    if path.parent.is_dir():
-        recover_in(path.parent)
-    return _record(arguments, place, path, selection_of(arguments))
+    return _record(arguments, place, _path(arguments), selection_of(arguments))
 
 
 def _problem(arguments: argparse.Namespace) -> str:
@@ -142,6 +139,8 @@ def _write_dataset(wanted: WantedDataset, recordings: list[Path]) -> int:
 
 
 def _record(arguments: argparse.Namespace, place: BusPlace, path: Path, topics: Selection) -> int:
+    if path.parent.is_dir():
+        recover_in(path.parent)
     with Guest(place, stays=True) as guest, guest.interruptible():
         start = guest.clock.now()
         try:
