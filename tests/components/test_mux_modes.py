@@ -202,6 +202,21 @@ def test_an_input_that_must_come_to_rest_after_a_release_must_do_so_after_a_rest
     assert out[-1] == SLOW
 
 
+def test_after_a_restart_nothing_is_let_through_before_orders_have_come_again() -> None:
+    robot = bench()
+    robot.host.is_restart = True  # as in a process that has started again: its supervisor sends them a little later
+    robot.host.prepare(robot.plan.instances)
+    robot.host.activate(["cmd_vel"])
+    out = robot.collect("/cmd_vel", Twist)
+    robot.publish("/cmd_vel/navigation", SLOW)
+    robot.host.ask("cmd_vel", LockMuxInputs("cmd_vel", ("navigation",)))
+    robot.advance(0.3)
+    robot.publish("/cmd_vel/navigation", SLOW)
+    assert SLOW not in out
+    robot.publish("/cmd_vel/teleop", FAST)
+    assert out[-1] == FAST
+
+
 def test_a_lock_by_hand_with_a_time_ends_by_itself() -> None:
     robot = bench()
     robot.host.ask("cmd_vel", LockMuxInputs("cmd_vel", (), 2.0))

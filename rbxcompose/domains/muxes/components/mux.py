@@ -98,6 +98,7 @@ def noted(locked: Iterable[tuple[str, float]]) -> str:
 LOCK = "lock_"  # prefix of the ports of locks
 ANNOUNCED = "announced"  # the port at which it publishes who holds the output
 KEPT = 200  # changes that can be read later
+PATIENCE = 0.2  # [s] after a restart, in which orders from before it come again and nothing is let through
 _WORD = "lower-case letters, digits and '_', starting with a letter"
 NEEDED = {
     "name": f"it has {_WORD}, at most 60 of them",
@@ -163,6 +164,7 @@ class Mux(Component[MuxConfig]):
         self.received_at: dict[str, float] = {}  # when an input last sent
         self.changes: deque[requests.MuxChange] = deque(maxlen=KEPT)
         self.orders = MuxOrders()
+        self.knows_from = math.inf if self.context.is_again else -math.inf  # when all orders have come again
         self.listening = set(self.config.inputs)
         self.listen()
 
@@ -172,6 +174,10 @@ class Mux(Component[MuxConfig]):
             self.context.wake_at(self.now + max(beats))
         self.send(self.core.tick(self.now))
         self.announce()
+
+    def start(self) -> None:
+        """Let nothing through until orders from before a restart have come again."""
+        self.knows_from = min(self.knows_from, self.now + PATIENCE)
 
     def reconfigure(self, old: MuxConfig) -> None:
         """Follow other limits of a hand-over."""
@@ -202,6 +208,8 @@ class Mux(Component[MuxConfig]):
 
     def take(self, name: str, message: Message) -> None:
         """Forward a message if its input holds the output; drop one with a number that is none, as if never sent."""
+        if self.now < self.knows_from:
+            return
         if not is_finite(message):
             if name not in self.broken:
                 self.broken.add(name)
