@@ -9,6 +9,7 @@ from rbxcompose.base.geometry import Pose2
 from rbxcompose.missions.analysis.examined import check_program
 from rbxcompose.missions.engine.world import Settings
 from rbxcompose.missions.language.reader import read_program
+from rbxcompose.testing import compile_mission
 from tests.missions.simulated import ROBOT, Simulated, simulate, tree
 from tests.missions.test_composites import fails, skills
 
@@ -165,13 +166,54 @@ def test_run_does_the_nodes_that_stand_in_the_data() -> None:
     assert skills(simulated) == ["0 a", "1 b", "2 c", "3 say hi", "4 say hi"]
 
 
-def test_run_of_what_is_no_node_fails_with_words() -> None:
-    simulated = simulate(
-        "data:\n  steps: [a]\n  words: [nothing]\ndo:\n"
-        "  - set: {steps: $words}\n  - for: one\n    in: $steps\n    do:\n      run: $one"
-    )
-    assert simulated.advance(5) == "failure"
-    assert "'run' needs a node from the data, not nothing" in simulated.told[-1]
+def test_run_does_a_step_that_was_chosen_earlier_wherever_it_stands_and_whatever_its_kind() -> None:
+    simulated = simulate("""
+        data: {next: a, jobs: [b, {wait: 3 s}], other: {log: Another}, chosen: a}
+        do:
+        - repeat: 2
+          do:
+          - run: $next  # the second time, the last job
+          - {for: job, in: $jobs, do: {set: {next: $job}}}
+        - set: {next: '$jobs[0]'}
+        - run: $next
+        - set: {chosen: $other}
+        - set: {next: $chosen}
+        - run: $next
+    """)
+    assert simulated.advance(20) == "success"
+    assert simulated.told == [
+        "0 a", "1 a: success (1 s)", "4 b", "5 b: success (1 s)", "5 Another", "5 mission test: success",
+    ]  # fmt: skip
+
+
+def test_steps_that_are_given_to_each_other_in_a_circle_are_found() -> None:
+    simulated = simulate("data: {x: a, y: b}\ndo: [set: {x: $y, y: $x}, run: $x, run: $y]")
+    assert simulated.advance(5) == "success"
+    assert skills(simulated) == ["0 b", "1 a"]
+
+
+NO_STEP = "this must be a step from the data"
+WRITE_IT = "write its name with '$', such as '$chore'"
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "help_text"),
+    [
+        ("do: {run: '\"foo\"'}", f"{NO_STEP}; it is a text", ""),
+        ("do: {run: 5 m + 2 m}", f"{NO_STEP}; it is a length", ""),
+        ("do: {run: $battery}", f"{NO_STEP}; it is a ratio", ""),
+        ("do: {run: foo}", f"{NO_STEP}; nothing is named 'foo'", WRITE_IT),
+        ("do: {run: kitchen}", f"{NO_STEP}; 'kitchen' is a place", WRITE_IT),
+    ],
+)
+def test_run_of_what_is_no_step_is_found(text: str, message: str, help_text: str) -> None:
+    _, findings = compile_mission(text, ROBOT)
+    assert [(finding.message, finding.help) for finding in findings] == [(message, help_text)]
+
+
+def test_only_a_step_may_follow_a_step() -> None:
+    _, findings = compile_mission("data: {next: a}\ndo: [run: $next, set: {next: 5}]", ROBOT)
+    assert [finding.message for finding in findings] == [f"{NO_STEP}; it is a count"]
 
 
 CHOOSE = """

@@ -12,6 +12,7 @@ from rbxcompose.base.expressions.types import (
     COUNT,
     FLAG,
     POSE,
+    STEP,
     TEXT,
     UNKNOWN,
     Type,
@@ -220,7 +221,7 @@ class _Checker:
         elif expected.choices:
             return self.choice(node, expected)
         else:
-            known = list(self.scope.words())
+            known = [] if expected == STEP else list(self.scope.words())
             fix, meant = suggest(node.name, known, "places"), surely_meant(node.name, known) or ""
             if expected == UNKNOWN and not fix.startswith(DID_YOU_MEAN):
                 fix = clauses(quotes_needed(node.name), fix)

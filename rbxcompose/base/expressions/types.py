@@ -26,6 +26,7 @@ class TypeKind(Enum):
     CHOICE = "a choice"
     LIST = "a list"
     MAP = "a map"
+    STEP = "a step from the data"
     ONE_OF = "one of several"
     UNKNOWN = "unknown"
 
@@ -89,6 +90,7 @@ TEXT = Type(TypeKind.TEXT)
 FLAG = Type(TypeKind.FLAG)
 PLACE = Type(TypeKind.PLACE)
 POSE = Type(TypeKind.POSE)
+STEP = Type(TypeKind.STEP)
 UNKNOWN = Type(TypeKind.UNKNOWN)
 
 
@@ -187,12 +189,13 @@ TYPES: Mapping[str, Type] = MappingProxyType(
 
 PLACED, STRUCTURED = (TypeKind.PLACE, TypeKind.POSE), (TypeKind.LIST, TypeKind.MAP)
 
-# A text becomes a place where one is expected, and a place a pose.
+# A text becomes a place where one is expected, and a place a pose; a step is shown as a text.
 _STANDS_FOR = {
     (TypeKind.TEXT, TypeKind.PLACE),
     (TypeKind.TEXT, TypeKind.POSE),
     (TypeKind.PLACE, TypeKind.POSE),
     (TypeKind.CHOICE, TypeKind.TEXT),
+    (TypeKind.STEP, TypeKind.TEXT),
 }
 _EQUAL_ACROSS = {frozenset({TypeKind.TEXT, TypeKind.PLACE}), frozenset({TypeKind.TEXT, TypeKind.CHOICE})}
 

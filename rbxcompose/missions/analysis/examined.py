@@ -35,7 +35,12 @@ from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, FAILS, SU
 from rbxcompose.missions.program.parts import MachineStates, expression_of, inner_span
 from rbxcompose.missions.program.program import END, MissionNode, Program, RobotNames
 
-_MEASURED = (TypeKind.QUANTITY, TypeKind.COUNT, TypeKind.FLAG)  # types that no place can have
+_PLACELESS = {  # types that no place can have, each with the help for a word that nothing has as its name
+    TypeKind.QUANTITY: "",
+    TypeKind.FLAG: "",
+    TypeKind.COUNT: "write a number such as 2",
+    TypeKind.STEP: "write its name with '$', such as '$chore'",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,11 +161,11 @@ def findings_of(
         unknown_word = _at(problem, ((word.name, word.start) for word in expression.words))
         if unknown_word and scope.word(unknown_word) is None and problem.meant.startswith("$"):
             yield codes.UNKNOWN_NAME.at(span, problem.message, help=problem.help, fix=fix)
-        elif unknown_word and wanted.kind in _MEASURED and isinstance(expression.tree, Word):
+        elif unknown_word and wanted.kind in _PLACELESS and isinstance(expression.tree, Word):
             is_place = scope.word(unknown_word) is not None
             named = f"'{unknown_word}' is a place" if is_place else f"nothing is named '{unknown_word}'"
             message = f"this must be {wanted.phrase}; {named}"
-            help_text = "write a number such as 2" if wanted.kind is TypeKind.COUNT else problem.help
+            help_text = _PLACELESS[wanted.kind] or problem.help
             yield kind.at(span, message, help=help_text, fix=fix, about=[unknown_word])
         elif unknown_word and wanted == TEXT and unknown_word not in scope.removed:
             yield _no_text(unknown_word, span, scope, kind)

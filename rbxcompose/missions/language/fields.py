@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Self
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.types import COUNT, UNKNOWN
+from rbxcompose.base.expressions.types import COUNT, STEP, UNKNOWN
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.language.grammar import HISTORIES, KeySlot, Takes
 from rbxcompose.missions.language.node_reader import FOREVER, NodeReader
@@ -142,7 +142,7 @@ def value(what: str, help: str = "", *, holds_nodes: bool = False) -> Any:
     """Declare an expression of any type; nodes in the data that it may yield become children if it `holds_nodes`."""
 
     def read(reader: NodeReader, key: str) -> Any:
-        expression = reader.expression(key, UNKNOWN, what)
+        expression = reader.expression(key, STEP if holds_nodes else UNKNOWN, what)
         if holds_nodes:
             reader.held(expression)
         return expression

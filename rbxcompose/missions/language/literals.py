@@ -1,7 +1,7 @@
 """Literal values in a manifest: of the type that is wanted, poses that are written out, nodes in the data."""
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Container, Iterator, Mapping
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions import types
@@ -38,15 +38,23 @@ class WrongValue(ValueError):  # noqa: N818 - a user's mistake, told apart from 
         return kind.at(span, f"{what} {self.message}", label=self.label, help=self.help)
 
 
-def literal(node: TreeNode) -> Datum:
-    """Return the literal in a node: a number in SI, a flag, a text, a list or a map of these."""
+NodeKey = tuple[str, ...]  # where a node is in the data: ("chores", "kitchen", "0")
+
+
+def literal(node: TreeNode, held: Container[NodeKey] = (), key: NodeKey = ()) -> Datum:
+    """Return the literal in a node: a number in SI, a flag, a text, a list or a map of these.
+
+    In the data, at this key, those that are `held` become a `HeldNode`.
+    """
+    if key in held:
+        return Datum(HeldNode(key, brief(node)), types.STEP, node.span)
     match node:
         case MappingNode(entries=entries):
-            values = {name: literal(entry.value) for name, entry in entries.items()}
+            values = {name: literal(entry.value, held, (*key, name)) for name, entry in entries.items()}
             found = types.map_with({name: datum.type for name, datum in values.items()})
             return Datum({name: datum.value for name, datum in values.items()}, found, node.span)
         case SequenceNode(items=items):
-            read = [literal(item) for item in items]
+            read = [literal(item, held, (*key, str(index))) for index, item in enumerate(items)]
             return Datum([datum.value for datum in read], types.list_with([datum.type for datum in read]), node.span)
         case ScalarNode():
             value = node.filled if node.filled is not None else _measured(node)
@@ -66,6 +74,8 @@ def typed(node: TreeNode, wanted: types.Type) -> Datum:
             said = (wanted.phrase, found.type.phrase) if is_other else (wanted.detail, found.type.detail)
             raise WrongValue(f"must be {said[0]}", label=f"this is {said[1]}")
         return found
+    if wanted == types.STEP:
+        raise WrongValue("is a step from the data, which only the mission sets")
     if not isinstance(node, ScalarNode):
         raise WrongValue(f"must be {wanted.phrase}", label=describe([] if isinstance(node, SequenceNode) else {}))
     return Datum(_scalar(node, wanted), wanted, node.span)
@@ -184,7 +194,6 @@ def _coordinates(nodes: Mapping[str, TreeNode]) -> Iterator[tuple[str, str]]:
 
 ANY_ENTRY = None  # matches any entry of a list or a map
 ITEM = ""  # matches any item of a list in a loop; over a map, a loop iterates over the keys
-NodeKey = tuple[str, ...]  # where a node is in the data: ("chores", "kitchen", "0")
 PathPattern = tuple[str | None, ...]
 
 
@@ -252,17 +261,6 @@ def brief(node: TreeNode) -> str:
         case SequenceNode(items=items):
             return ", ".join(brief(item) for item in items[:3])
     return ""
-
-
-def with_held(value: Value, nodes: Mapping[NodeKey, TreeNode], key: NodeKey) -> Value:
-    """Return a value of the data, at this key, with its nodes replaced by `HeldNode`s."""
-    if key in nodes:
-        return HeldNode(key, brief(nodes[key]))
-    if isinstance(value, dict):
-        return {name: with_held(entry, nodes, (*key, name)) for name, entry in value.items()}
-    if isinstance(value, list):
-        return [with_held(entry, nodes, (*key, str(index))) for index, entry in enumerate(value)]
-    return value
 
 
 def range_trouble(declared: Input, given: Datum) -> str:

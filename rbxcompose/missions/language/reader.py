@@ -1,15 +1,30 @@
 """From the located tree of a mission file to its program; every error becomes a finding with its place."""
 
-from collections.abc import Collection
+from collections import defaultdict
+from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.tree import Expression
+from rbxcompose.base.expressions.tree import Expression, ExpressionError
 from rbxcompose.base.expressions.types import STRUCTURED, TYPES, UNKNOWN, Type, choice_of
 from rbxcompose.base.findings import Finding, Related, Report, Span
 from rbxcompose.manifest.arguments import CHOICE, unknown_type
 from rbxcompose.manifest.documents import misspelt_keys, with_keys
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, count, scalars
+from rbxcompose.manifest.tree import (
+    Entry,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+    all_nodes,
+    at,
+    count,
+    entries_of,
+    scalars,
+    text_at,
+)
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.world import show
 from rbxcompose.missions.language import literals
@@ -17,19 +32,13 @@ from rbxcompose.missions.language.grammar import BODIES, LEVELS, STATE_KEYS, is_
 from rbxcompose.missions.language.node_reader import NAME, NAME_HELP, NodeReader, Nodes, invalid_name, unknown_keys
 from rbxcompose.missions.program import program
 from rbxcompose.missions.program.linker import TOO_MUCH
-from rbxcompose.missions.program.parts import STATE, Asked, Datum, Input
+from rbxcompose.missions.program.parts import STATE, Asked, Datum, Input, expression_of
 from rbxcompose.missions.program.program import AFTERWARDS, RATE, RESTART, Interrupt, Program, Target
 from rbxcompose.missions.program.registry import SKILL, StepType, all_kinds, anywhere, kinds, modifier_keys, modifiers
 from rbxcompose.missions.slips import Repairs
 
 INPUT_KEYS = ("type", "default", "min", "max", "choices", "about")
 FASTEST = 1000.0  # [Hz]
-
-
-def read_data(node: TreeNode | None, report: Report) -> dict[str, Datum]:
-    """Return the initial values under `data:`."""
-    entries = _named(node, "data", report)
-    return {name: replace(literals.literal(entry.value), span=entry.key.span) for name, entry in entries.items()}
 
 
 def read_inputs(node: TreeNode | None, report: Report) -> dict[str, Input]:
@@ -197,7 +206,7 @@ def read_program(
     report.extend(unknown_keys(root, KEYS, "a mission"))
     is_open = _is_open(root)
     root = with_keys(root, misspelt_keys(root, KEYS))
-    inputs, data = read_inputs(root.get("inputs"), report), read_data(root.get("data"), report)
+    inputs, written = read_inputs(root.get("inputs"), report), _named(root.get("data"), "data", report)
     reader = _Reader(report, root, repairs, budget)
     body = _body(root, report)
     if body is None:
@@ -207,8 +216,8 @@ def read_program(
     interrupts = reader.interrupts(root.get("interrupts"))
     nodes = tuple(node for node in reader.nodes if node)
     data = {
-        name: replace(datum, value=literals.with_held(datum.value, reader.found, (name,)))
-        for name, datum in data.items()
+        name: replace(literals.literal(entry.value, reader.found, (name,)), span=entry.key.span)
+        for name, entry in written.items()
     }
     return Program(
         _text(root, "name"),
@@ -269,12 +278,13 @@ class _Reader:
 
     def __init__(self, report: Report, root: MappingNode, repairs: Repairs, budget: Budget) -> None:
         self.report = report
+        self.root = root
         self.repairs = repairs
         self.budget = budget
         data = root.get("data")
         self.data = {name: entry.value for name, entry in data.entries.items()} if isinstance(data, MappingNode) else {}
         self.patterns: dict[str, literals.PathPattern] = {}  # where in the data the items of loops are
-        self.found: dict[tuple[str, ...], TreeNode] = {}  # the nodes in the data
+        self.found: set[literals.NodeKey] = set()  # the nodes in the data
         self.nodes: list[program.MissionNode | None] = []
         self.names: dict[str, Span] = {}
         self.paths: list[str] = []  # of the nodes being read, outermost first
@@ -322,18 +332,42 @@ class _Reader:
 
     def held(self, expression: Expression, parent: int, span: Span) -> list[int]:
         """Read the nodes in the data that an expression may yield."""
-        pattern = literals.pattern_of(expression, self.patterns)
         numbers: list[int] = []
-        for key, node in literals.matching(self.data, pattern) if pattern else ():
+        for key, node in self.yielded(expression).items():
             if not self.affords(node, span):
                 break
-            self.found[key] = node
+            self.found.add(key)
             number = self.child(self.repairs.step(node, len(self.paths)), ".".join(key), parent)
             read = self.nodes[number]
             if read:
                 self.nodes[number] = replace(read, held=key)
             numbers.append(number)
         return numbers
+
+    def yielded(self, expression: Expression) -> dict[literals.NodeKey, TreeNode]:
+        """Return what an expression may yield of the data, by key: what is written there, or put there by `set`."""
+        pattern = literals.pattern_of(expression, self.patterns)
+        patterns, sources = [pattern] if pattern else [], dict(self.sources)
+        found: dict[literals.NodeKey, TreeNode] = {}
+        for first, *rest in patterns:
+            found.update(literals.matching(self.data, (first, *rest)))
+            patterns += [(*source, *rest) for source in sources.pop(first or "", ())]
+        return found
+
+    @cached_property
+    def sources(self) -> Mapping[str, list[literals.PathPattern]]:
+        """Return where in the data the values come from that `set` and loops anywhere give to each name."""
+        found: defaultdict[str, list[literals.PathPattern]] = defaultdict(list)
+        for node in all_nodes(self.root):
+            given = [(name, entry.value) for name, entry in entries_of(at(node, ("set",))).items()]
+            item, listed = text_at(node, ("for",)), at(node, ("in",))
+            given += [(item, each) for each in (listed.items if isinstance(listed, SequenceNode) else [listed]) if each]
+            for name, value in given:
+                with suppress(ExpressionError):
+                    expression = expression_of(value) if isinstance(value, ScalarNode) else None
+                    if expression and (pattern := literals.pattern_of(expression, {})):
+                        found[name].append((*pattern, literals.ITEM) if value is listed else pattern)
+        return found
 
     def affords(self, node: TreeNode, span: Span) -> bool:
         """Return whether a node in the data may be read once more; the first that may not is a finding."""
