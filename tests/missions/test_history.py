@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from rbxcompose.missions.program.outcomes import NAMES
 from tests.missions.simulated import Simulated, simulate
 from tests.missions.test_composites import fails, skills
 
@@ -44,6 +45,40 @@ def test_a_sequence_starts_again_at_the_child_in_which_it_was_halted(history: st
     simulated = tour(f"sequence: [a, b]\nhistory: {history}")
     assert simulated.advance(20) == "success"
     assert skills(simulated) == ["0 a", "1 b", "1.5 recharge", *after]
+
+
+def shown(simulated: Simulated, *skills: str) -> list[str]:
+    """Return the statuses of the nodes of these skills, in the order of the text."""
+    engine = simulated.engine
+    return [NAMES[engine.statuses[node.number]] for node in engine.program.nodes if node.skill in skills]
+
+
+def test_a_new_attempt_shows_no_results_of_the_last_one() -> None:
+    simulated = simulate("do: {sequence: [a, {sequence: [b, c]}, d], attempts: 2}", fails={"c": fails(1)})
+    simulated.advance(2.5)
+    assert shown(simulated, "a", "b", "c", "d") == ["success", "success", "running", "idle"]
+    simulated.advance(3.5)  # c has failed
+    assert shown(simulated, "a", "b", "c", "d") == ["running", "idle", "idle", "idle"]
+
+
+def test_an_interrupt_that_acts_again_shows_no_results_of_last_time() -> None:
+    simulated = simulate("do: hold\ninterrupts: {opened: {when: $door, do: [a, b]}}", takes={"hold": 30.0})
+    for time, is_open in ((1.0, True), (4.0, False), (5.0, True)):
+        simulated.at(time, lambda is_open=is_open: simulated.set("door", is_open))  # type: ignore[misc]
+    simulated.advance(4.5)
+    assert shown(simulated, "a", "b") == ["success", "success"]
+    simulated.advance(5.5)
+    assert shown(simulated, "a", "b") == ["running", "idle"]
+
+
+def test_what_starts_again_where_it_was_halted_shows_what_it_had_done() -> None:
+    work = "{sequence: [a, b], history: last, optional: true}"
+    simulated = simulate(f"do: {{sequence: [wait_for: $door, {work}], reactive: true}}")
+    for time, is_open in ((0.0, True), (1.5, False), (2.0, True)):
+        simulated.at(time, lambda is_open=is_open: simulated.set("door", is_open))  # type: ignore[misc]
+    simulated.advance(2.5)
+    assert skills(simulated) == ["0 a", "1 b", "2 b"]
+    assert shown(simulated, "a", "b") == ["success", "running"]
 
 
 def test_a_fallback_starts_again_at_the_child_in_which_it_was_halted() -> None:

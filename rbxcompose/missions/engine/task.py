@@ -263,6 +263,8 @@ class Task(ABC):
         """Begin, and return the status after the first tick."""
         if self.engine.reasons:
             self.engine.reasons.pop(self.number, None)  # of an earlier run
+        if self.end - self.number > 1 and self not in self.engine.places.kept:
+            self.forget()
         try:
             status = self.begin()
         except (Exception, SystemExit) as error:  # whatever a leaf does wrong ends its node, not the engine

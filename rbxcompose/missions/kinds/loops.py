@@ -267,7 +267,6 @@ class RepeatTask(sdk.Task):
                 return RUNNING
             self.is_between = False
             self.due = self.engine.time + self.period
-            self.forget()
         status = self.advance(self.body)
         if status == RUNNING:
             return RUNNING

@@ -135,7 +135,6 @@ class MachineTask(sdk.WithHistory):
                 start = self.engine.settings.start_at.get(self.number, start)
             self.index = self.machine.names.index(start)
         self.is_first = False
-        self.forget()
         return self.proceed()
 
     def proceed(self) -> int:

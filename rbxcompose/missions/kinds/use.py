@@ -32,7 +32,6 @@ class UseTask(sdk.WithHistory):
             self.inner.begin_again()
         else:
             self.inner.begin(self._inputs())
-        self.forget()
         return self.proceed()
 
     def proceed(self) -> int:

@@ -471,6 +471,9 @@ class Decorator(Task):
         super().__init__(site)
         self.inner = inner
 
+    def forget(self) -> None:
+        """Leave this to the task inside, which may resume where it was halted."""
+
     def begin(self) -> int:
         """Start the task inside."""
         return self.proceed()
