@@ -45,5 +45,6 @@ it("knows the machine of a state", () => {
   const machine = drawn(1, "machine", state, step);
   const picture: Picture = { name: "", about: "", main: drawn(0, "after", machine), interrupts: [], count: 4 };
   expect(machineOf(state, picture)).toBe(machine);
+  expect(machineOf(structuredClone(state), picture)).toBe(machine);
   expect(machineOf(step, picture)).toBeNull();
 });

@@ -63,11 +63,11 @@ export function byHandText(count: number): string {
     : `Changed by hand ${count} times: this run cannot be reproduced without these changes.`;
 }
 
-/** Returns the machine whose state this is; null for every other node. */
+/** Returns the machine whose state this is, by its number: a picture that came later has others; null for every other node. */
 export function machineOf(state: Drawn, picture: Picture): Drawn | null {
   if (state.form !== "state") return null;
   const within = (node: Drawn): Drawn | null => {
-    if (node.children.includes(state)) return node;
+    if (node.children.some(({ number }) => number === state.number)) return node;
     for (const child of node.children) {
       const found = within(child);
       if (found) return found;

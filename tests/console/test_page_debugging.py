@@ -156,6 +156,8 @@ def test_a_step_is_ended_by_hand_and_a_machine_is_brought_into_a_state(
     assert forced == [("2", "failure"), ("2", "lost")]
     page.keyboard.press("Escape")
     expect(actions).to_have_count(0)
+    show(patrol, "running", by_hand=1)  # the same picture comes again
+    expect(page.get_by_text("Changed by hand once")).to_be_visible()
     page.keyboard.press("ArrowDown")
     page.keyboard.press("Enter")
     actions = page.get_by_role("group", name="What can be done with home")
