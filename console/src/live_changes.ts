@@ -1,6 +1,7 @@
 /** Brings what was saved to the robot that runs, as `rbxcompose apply` does, and takes it back. */
 import { fetchConfig, whyNot } from "./config";
 import { askInDialog, disable, h, icon } from "./dom";
+import { RefusedError } from "./edited";
 import type { Robot } from "./page";
 import { askRobotEditor } from "./robot_edits";
 import { LostError } from "./rosbridge";
@@ -38,20 +39,22 @@ export class LiveChanges {
   /** Compares the robot that runs with its files; `done` was done just before. */
   async look(done = "", applied: number | null = null): Promise<void> {
     const number = ++this.#newest;
-    let found: LiveDifference | string;
+    let found: LiveDifference | Error;
     try {
       found = await askRobotEditor<LiveDifference>(this.#robot.link, "compare", {});
     } catch (error) {
-      found = (error as Error).message;
+      found = error as Error;
     }
     if (number === this.#newest) this.#show(found, done, applied);
   }
 
-  #show(found: LiveDifference | string, done: string, applied: number | null): void {
+  #show(found: LiveDifference | Error, done: string, applied: number | null): void {
     const words: Node[] = done ? [h("span", {}, icon("check"), ` ${done}`)] : [];
     if (applied !== null) words.push(this.#button("undo", "Take it back", () => this.#revert(applied)));
-    if (typeof found === "string") words.push(h("span", {}, icon("warning"), ` What is saved cannot run: ${found}`));
-    else if (!found.is_empty) {
+    if (found instanceof Error) {
+      const what = found instanceof RefusedError ? "What is saved cannot run" : "It is not known whether the robot runs what is saved";
+      words.push(h("span", {}, icon("warning"), ` ${what}: ${found.message}`));
+    } else if (!found.is_empty) {
       words.push(h("span", {}, icon("warning"), ` The robot runs without what is saved: ${fates(found)}.`));
       if (found.why_not) words.push(h("span", { class: "label" }, `Not now: ${found.why_not}.`));
       words.push(this.#button("play", "Change the running robot\u2026", () => this.#offer(found)));

@@ -97,6 +97,7 @@ export class MissionEditor {
   #timer: ReturnType<typeof setTimeout> | undefined;
   #version = 0;
   #isAsking = false;
+  #isUnchecked = false; // it was asked, and not answered
   #isLost = false; // while it was saved
   #isClosed = false;
 
@@ -106,8 +107,15 @@ export class MissionEditor {
     this.#mission = mission;
     this.#done = done;
     this.element.append(emptyCard("wait", "Reading the mission\u2026"));
-    this.#closers.push(robot.link.state.watch((state) => void (state.is === "open" && this.#isLost && this.#learnSaved())));
+    this.#closers.push(robot.link.state.watch(({ is }) => is === "open" && this.#isBack()));
     void this.#open();
+  }
+
+  /** Asks again what was not answered, since the connection is back. */
+  #isBack(): void {
+    if (this.#isLost) void this.#learnSaved();
+    if (this.#isUnchecked) void this.#ask("look");
+    if (this.#text) void this.#live.look();
   }
 
   close(): void {
@@ -259,8 +267,10 @@ export class MissionEditor {
     const version = this.#version;
     try {
       const looked = await askEditor<Looked>(this.#robot.link, what, this.#mission, { text: this.#text!.text });
+      this.#isUnchecked = false;
       if (version === this.#version && !this.#isClosed) this.#show(looked);
     } catch (error) {
+      this.#isUnchecked = true;
       setText(this.#verdict, "Not checked");
       setText(this.#says, `It could not be checked: ${(error as Error).message}`);
     }

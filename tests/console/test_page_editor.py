@@ -194,6 +194,27 @@ def test_after_a_connection_was_lost_in_a_save_it_is_told_what_became_of_it(
     assert project.text() == FETCH.replace("2 s", "3 s")
 
 
+def test_after_a_connection_was_lost_it_is_checked_and_compared_again(
+    open_page: Callable[..., Page], project: Project, gateway: FakeGateway
+) -> None:
+    loses = True
+
+    def losing(answer: Callable[[dict[str, Any]], Any], given: dict[str, Any]) -> Any:
+        if loses:
+            gateway.drop()
+        return answer(given)
+
+    for service in ("/console/mission/check", "/console/robot/compare"):
+        gateway.answers[service] = partial(losing, gateway.answers[service])
+    page = edits(open_page(page_name="mission"))
+    expect(page.get_by_text("It is not known whether the robot runs what is saved: the connection")).to_be_visible()
+    expect(page.get_by_text("Not checked")).to_be_visible()
+    loses = False
+    expect(page.get_by_text("No mistakes")).to_be_visible()
+    expect(page.locator(".live-changes")).to_be_empty()
+    expect(page.get_by_text("It could not be checked")).to_have_count(0)
+
+
 @pytest.mark.soak
 def test_what_was_typed_stays_while_another_page_is_shown(open_page: Callable[..., Page], project: Project) -> None:
     page = edits(open_page(page_name="mission"))
