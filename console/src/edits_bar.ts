@@ -37,7 +37,7 @@ export class EditsBar<E extends Entry> {
       edits.says.watch(() => this.#show()),
       edits.isStale.watch(() => this.#show()),
       robot.link.state.watch(({ is }) => {
-        if (is === "open") void edits.open().then(() => this.#live.look());
+        if (is === "open") void edits.open().then(() => this.#live.lookAgain());
         this.#show();
       }),
     ];
@@ -45,6 +45,7 @@ export class EditsBar<E extends Entry> {
 
   close(): void {
     for (const close of this.#closers) close();
+    this.#live.close();
   }
 
   /** Whether this visitor may change and save anything. */
@@ -75,10 +76,7 @@ export class EditsBar<E extends Entry> {
   async #offer(): Promise<void> {
     this.#save.disabled = true;
     const trial = await this.#edits.compare();
-    if (trial && (await confirmed(this.element, trial))) {
-      await this.#edits.save();
-      await this.#live.look();
-    }
+    if (trial && (await confirmed(this.element, trial))) await this.#edits.save();
     this.#show();
   }
 }

@@ -24,16 +24,25 @@ export interface LiveDifference {
 
 const MOST_REASONS = 4; // shown for one component
 
-/** A line that says whether the robot that runs is what its files say; empty as long as it is. */
+/** A line that says whether the robot that runs is what its files say; empty as long as it is. Others may change both. */
 export class LiveChanges {
   readonly element = h("div", { class: "live-changes", role: "status" });
   /** Whether the robot was changed, so that pages show something else when they open. */
   isChanged = false;
   readonly #robot: Robot;
+  /** Follows no more what others change. */
+  readonly close: () => void;
   #newest = 0;
+  #isActing = false; // something is offered or done, after which it looks by itself
 
   constructor(robot: Robot) {
     this.#robot = robot;
+    this.close = robot.link.watch("changes", () => this.lookAgain());
+  }
+
+  /** Compares again, since something may have changed. */
+  lookAgain(): void {
+    if (!this.#isActing) void this.look();
   }
 
   /** Compares the robot that runs with its files; `done` was done just before. */
@@ -66,8 +75,8 @@ export class LiveChanges {
     const made = h("button", { type: "button" }, icon(picture), text);
     disable(whyNot(this.#robot.config, "configure"), made);
     made.onclick = () => {
-      made.disabled = true;
-      void act();
+      made.disabled = this.#isActing = true;
+      void act().finally(() => (this.#isActing = false));
     };
     return made;
   }

@@ -115,7 +115,7 @@ export class MissionEditor {
   #isBack(): void {
     if (this.#isLost) void this.#learnSaved();
     if (this.#isUnchecked) void this.#ask("look");
-    if (this.#text) void this.#live.look();
+    if (this.#text) this.#live.lookAgain();
   }
 
   close(): void {
@@ -125,6 +125,7 @@ export class MissionEditor {
     this.#stopLooking();
     this.#replay?.close();
     for (const close of this.#closers) close();
+    this.#live.close();
     this.#keepDraft();
     this.#text?.close();
   }
@@ -461,7 +462,6 @@ export class MissionEditor {
     this.#saved = text;
     this.#keepDraft();
     setText(this.#says, `Saved in '${done.file}'.`);
-    void this.#live.look();
   }
 
   #notSaved(error: Error): void {

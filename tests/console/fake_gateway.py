@@ -239,6 +239,8 @@ class FakeGateway:
                 return {"success": False, "message": str(refusal), "answer": None}
         if service in self.answers:
             values: dict[str, Any] = self.answers[service](args)
+            if values.get("success") and service.endswith(("/save", "/apply", "/revert")) and not args.get("dry_run"):
+                self.show("changes", self.windows.get("changes", 0) + 1)
             return values
         if service in ("/console/stop", "/console/release"):
             self.show(RUNNING, {"stop": {"by": "the console", "time": 1.0} if service.endswith("stop") else None})

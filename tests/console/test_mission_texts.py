@@ -58,17 +58,22 @@ def test_who_looks_may_read_and_only_who_configures_may_save() -> None:
         ("/console/save", {"names": ["battery", "base.max_speed"]}, "saves battery, base.max_speed"),
     ],
 )
-def test_who_saved_what_is_in_the_log_and_nothing_of_dry_runs(service: str, given: dict[str, Any], done: str) -> None:
+def test_who_saved_what_is_in_the_log_and_shown_to_others_and_nothing_of_dry_runs(
+    service: str, given: dict[str, Any], done: str
+) -> None:
     room = Room()
-    client = room.client(who="10.0.0.7")
+    client, other = room.client(who="10.0.0.7"), room.client(Role.VIEW)
+    assert other.does("subscribe", topic="/console/windows/changes") == []
     for args, refusal in (({**given, "dry_run": True}, ""), (given, "it was changed meanwhile")):
         client.does("call_service", service=service, args=args)
         room.bridge.robot_answered(room.asked()[-1].number, None, refusal)  # type: ignore[attr-defined]
         assert not room.bridge.notes
+        assert other.gets() == []
     client.does("call_service", service=service, args=given)
     client.leaves()
     room.bridge.robot_answered(room.asked()[-1].number, {})  # type: ignore[attr-defined]
     assert list(room.bridge.notes) == [f"10.0.0.7 (configure): {done}"]
+    assert other.gets()[0]["msg"] == {"answer": 1}
 
 
 def test_who_makes_a_mission_is_in_the_log_whatever_else_is_asked() -> None:

@@ -194,6 +194,20 @@ def test_after_a_connection_was_lost_in_a_save_it_is_told_what_became_of_it(
     assert project.text() == FETCH.replace("2 s", "3 s")
 
 
+def test_what_somebody_else_saves_is_compared_with_the_robot_that_runs(
+    open_page: Callable[..., Page], project: Project, gateway: FakeGateway
+) -> None:
+    compare, wrong = gateway.answers["/console/robot/compare"], project.text() + "wrong\n"
+    refused = {"success": False, "message": "its files have 1 error", "answer": None}
+    gateway.answers["/console/robot/compare"] = lambda given: refused if project.text() == wrong else compare(given)
+    project.file.write_text(wrong, encoding="utf-8")
+    page = edits(open_page(page_name="mission"))
+    expect(page.get_by_text("What is saved cannot run: its files have 1 error")).to_be_visible()
+    project.file.write_text(project.live.runs_with, encoding="utf-8")
+    gateway.show("changes", 1)
+    expect(page.locator(".live-changes")).to_be_empty()
+
+
 def test_after_a_connection_was_lost_it_is_checked_and_compared_again(
     open_page: Callable[..., Page], project: Project, gateway: FakeGateway
 ) -> None:

@@ -53,7 +53,8 @@ LEVELS = ("info", "warning", "error", "none")
 WINDOWS = "/console/windows/"
 DRIVE_WINDOW = f"{WINDOWS}drive"  # who holds the drive lease
 CONFIG_WINDOW = f"{WINDOWS}config"  # what the page shows of the robot
-_OWN_WINDOWS = (DRIVE_WINDOW, CONFIG_WINDOW)
+CHANGES_WINDOW = f"{WINDOWS}changes"  # how often the console has changed the robot or its files
+_OWN_WINDOWS = (DRIVE_WINDOW, CONFIG_WINDOW, CHANGES_WINDOW)
 _DRIVES = "/console/drive"
 _QUERY = re.compile(r"(?P<about>\w+)/(?P<name>\w+)(?P<values>(/\w+/\w+)*)", re.ASCII)
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
@@ -474,7 +475,7 @@ class Bridge:
         self._goals: dict[int, _Goal] = {}
         self._pending_notes: dict[int, str] = {}  # notes of what calls will have changed
         self._old_statuses: dict[str, dict[object, tuple[int, str]]] = {}  # by name of an action, then of a goal
-        self._clients_so_far = self._calls_so_far = 0
+        self._clients_so_far = self._calls_so_far = self._changes_so_far = 0
         self._requests: list[BusRequest] = []
         self._config: Mapping[str, object] = {}
         self._now, self._stamp = 0.0, 0
@@ -680,6 +681,8 @@ class Bridge:
         """Pass on what the robot answered to a request, or why it refused."""
         if (note := self._pending_notes.pop(number, "")) and not refusal:
             self.notes.append(note)
+            self._changes_so_far += 1
+            self.seen(CHANGES_WINDOW, self._changes_so_far, self._now)
         message = refusal or (answer if isinstance(answer, str) else "")
         self._respond(number, {"success": not refusal, "message": message, "answer": answer}, is_good=True)
 
