@@ -35,6 +35,8 @@ class Scope:
         "names": ["a", "b"],
         "result": {"count": 3.0, "in": "deep"},
         "missing": NOT_ARRIVED,
+        "key": "count",
+        "at": 1.0,
         "long": "x" * 3000,
     }
 
@@ -67,6 +69,12 @@ def written(name: str, value: Value) -> str:
         ("$names are $ok", "a, b are true"),
         ("$result", "count: 3, in: deep"),
         ("$result.in the end", "deep the end"),
+        ("$names[1], $names[0]!", "b, a!"),
+        ("$result[count] of $result['count'] of $result[$key]$names[$at]", "3 of 3 of 3b"),
+        (
+            "$names [1] $names[ 1] $names[-1] $names[1 $names[] $names[1.5]",
+            "a, b [1] a, b[ 1] a, b[-1] a, b[1 a, b[] a, b[1.5]",
+        ),
         ("it costs $5 or 5 $", "it costs $5 or 5 $"),
         ("$$room is $room", "$room is living room"),
         ("$$$room", "$living room"),

@@ -7,6 +7,7 @@ from rbxcompose.base.expressions.types import TYPES
 from rbxcompose.base.expressions.values import NOT_ARRIVED, Value
 from rbxcompose.missions.engine.world import show, show_briefly
 from tests.loops import for_all
+from tests.missions.simulated import simulate
 
 
 @for_all(
@@ -27,3 +28,12 @@ from tests.loops import for_all
 def test_values_have_the_unit_of_their_type(type_name: str, value: Value, whole: str, brief: str) -> None:
     assert show(TYPES[type_name], value) == whole
     assert show_briefly(TYPES[type_name], value) == brief
+
+
+def test_items_and_entries_in_a_text_have_the_unit_of_their_type() -> None:
+    simulated = simulate(
+        "data: {ways: [5 m, 3 s], rooms: {dock: {level: 20 %}}, room: dock}\n"
+        "do: {log: '$ways[1], $rooms[dock].level, $rooms[\"dock\"].level, $rooms[$room][\"level\"], $ways [1]'}"
+    )
+    assert simulated.advance(1.0) == "success"
+    assert simulated.told[0] == "0 3 s, 20 %, 20 %, 20 %, 5 m, 3 s [1]"

@@ -12,9 +12,10 @@ from rbxcompose.base.expressions.tree import Expression, ExpressionError, Refere
 from rbxcompose.base.expressions.values import LONGEST_TEXT, EvaluationError, Scope, Value
 
 Show: TypeAlias = Callable[[str, Value], str]
-"""Formats the value of a name (`battery`, `result.count`) for people."""
+"""Formats the value of a path (`battery`, `result.count`, `names[0]`) for people."""
 
-_SLOT = re.compile(rf"\$(?:(?P<dollar>\$)|(?P<path>{NAME}(?:\.{NAME})*))")
+_INDEX = rf"""\[(?:[0-9]+|\$?{NAME}|"[^"\[\]]*"|'[^'\[\]]*')\]"""  # any other text in brackets is plain text
+_SLOT = re.compile(rf"\$(?:(?P<dollar>\$)|(?P<path>{NAME}(?:\.{NAME}|{_INDEX})*))")
 
 _FOREIGN = re.compile(r"\{\{-?\s*[A-Za-z_$][^{}]*\}\}")  # of Jinja, as Home Assistant and Ansible have it
 _SHOWN = 60
@@ -41,8 +42,8 @@ class Template:
     def names(self) -> tuple[Reference, ...]:
         """Return the names to fill in, without '$' and fields, with their positions."""
         slots = (part for part in self.parts if isinstance(part, TextSlot))
-        roots = ((slot, slot.path.partition(".")[0]) for slot in slots)
-        return tuple(Reference(root, slot.start, slot.start + 1 + len(root)) for slot, root in roots)
+        found = ((slot.start, name) for slot in slots for name in slot.value.names)
+        return tuple(Reference(name.name, start + name.start, start + name.end) for start, name in found)
 
 
 def parse_template(text: str) -> Template:

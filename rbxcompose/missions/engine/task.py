@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections import ChainMap
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -594,6 +595,7 @@ def since_scope(outer: MissionScope, asked: Sequence[Asked], robot: RobotNames, 
     return SinceScope(outer, names, {name: False if robot.values[name] == FLAG else NOT_ARRIVED for name in events})
 
 
+_STEPS = re.compile(r"""[^]['".]+""")  # of a path such as `result.names[0]`
 STILL_HOLDS = "its condition still holds after its reaction; it can act again once that has been false"
 
 
@@ -643,7 +645,7 @@ class Run:
         types = ChainMap(item_types(scope), self.types)
 
         def shown(path: str, value: Value) -> str:
-            name, *fields = path.split(".")
+            name, *fields = _STEPS.findall(path)
             found = reduce(Type.part, fields, types.get(name, UNKNOWN))
             return show(found, value, briefly=True, places=places)
 
