@@ -10,6 +10,7 @@ from rbxcompose.missions.analysis.examined import check_program
 from rbxcompose.missions.engine.world import Settings
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.testing import compile_mission
+from tests.loops import for_all
 from tests.missions.simulated import ROBOT, Simulated, simulate, tree
 from tests.missions.test_composites import fails, skills
 
@@ -193,22 +194,22 @@ def test_steps_that_are_given_to_each_other_in_a_circle_are_found() -> None:
 
 
 NO_STEP = "this must be a step from the data"
-WRITE_IT = "write its name with '$', such as '$chore'"
+WRITE_IT = "write it under 'data', and its name here, such as '$chore'"
 
 
-@pytest.mark.parametrize(
-    ("text", "message", "help_text"),
+@for_all(
+    "text, what",
     [
-        ("do: {run: '\"foo\"'}", f"{NO_STEP}; it is a text", ""),
-        ("do: {run: 5 m + 2 m}", f"{NO_STEP}; it is a length", ""),
-        ("do: {run: $battery}", f"{NO_STEP}; it is a ratio", ""),
-        ("do: {run: foo}", f"{NO_STEP}; nothing is named 'foo'", WRITE_IT),
-        ("do: {run: kitchen}", f"{NO_STEP}; 'kitchen' is a place", WRITE_IT),
+        ("'\"foo\"'", "it is a text"),
+        ("5 m + 2 m", "it is a length"),
+        ("$battery", "it is a ratio"),
+        ("foo", "nothing is named 'foo'"),
+        ("kitchen", "'kitchen' is a place"),
     ],
 )
-def test_run_of_what_is_no_step_is_found(text: str, message: str, help_text: str) -> None:
-    _, findings = compile_mission(text, ROBOT)
-    assert [(finding.message, finding.help) for finding in findings] == [(message, help_text)]
+def test_run_of_what_is_no_step_is_found(text: str, what: str) -> None:
+    _, findings = compile_mission(f"do: {{run: {text}}}", ROBOT)
+    assert [(finding.message, finding.help) for finding in findings] == [(f"{NO_STEP}; {what}", WRITE_IT)]
 
 
 def test_only_a_step_may_follow_a_step() -> None:

@@ -33,7 +33,7 @@ def test_values_have_the_unit_of_their_type(type_name: str, value: Value, whole:
 def test_items_and_entries_in_a_text_have_the_unit_of_their_type() -> None:
     simulated = simulate(
         "data: {ways: [5 m, 3 s], rooms: {dock: {level: 20 %}}, room: dock}\n"
-        "do: {log: '$ways[1], $rooms[dock].level, $rooms[\"dock\"].level, $rooms[$room][\"level\"], $ways [1]'}"
+        'do: {log: \'$ways[1], $rooms[dock].level, $rooms["dock"].level, $rooms[$room]["level"], $ways [1]\'}'
     )
     assert simulated.advance(1.0) == "success"
     assert simulated.told[0] == "0 3 s, 20 %, 20 %, 20 %, 5 m, 3 s [1]"

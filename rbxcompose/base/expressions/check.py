@@ -191,7 +191,7 @@ class _Checker:
                 self.wrong(node, f"this must be {expected.phrase}; the unit is missing", fix)
             return expected
         what = "true or false" if expected == FLAG else expected.detail
-        self.wrong(node, f"this must be {what}; it is {found.detail}", _WHOLE if expected == COUNT else "")
+        self.wrong(node, f"this must be {what}; it is {found.detail}", _HELP.get(expected.kind, ""))
         return expected
 
     def text(self, node: tree.Text, expected: Type) -> Type:
@@ -222,7 +222,8 @@ class _Checker:
             return self.choice(node, expected)
         else:
             known = [] if expected == STEP else list(self.scope.words())
-            fix, meant = suggest(node.name, known, "places"), surely_meant(node.name, known) or ""
+            fix = suggest(node.name, known, "places") or _HELP.get(expected.kind, "")
+            meant = surely_meant(node.name, known) or ""
             if expected == UNKNOWN and not fix.startswith(DID_YOU_MEAN):
                 fix = clauses(quotes_needed(node.name), fix)
             variable = "" if meant else surely_meant(node.name, self.scope.variables())
@@ -395,7 +396,10 @@ class _Checker:
 
 _NAMES = frozenset({TypeKind.TEXT, TypeKind.CHOICE, TypeKind.PLACE, TypeKind.UNKNOWN})
 _SUMS = {"+": "is added to", "-": "is reduced by"}
-_WHOLE = "write round(...) for a whole number"
+_HELP = {
+    TypeKind.COUNT: "write round(...) for a whole number",
+    TypeKind.STEP: "write it under 'data', and its name here, such as '$chore'",
+}
 _RESULTS = {
     "age": quantity_of(units.TIME),
     "new": FLAG,

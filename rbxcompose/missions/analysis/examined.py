@@ -35,12 +35,7 @@ from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, FAILS, SU
 from rbxcompose.missions.program.parts import MachineStates, expression_of, inner_span
 from rbxcompose.missions.program.program import END, MissionNode, Program, RobotNames
 
-_PLACELESS = {  # types that no place can have, each with the help for a word that nothing has as its name
-    TypeKind.QUANTITY: "",
-    TypeKind.FLAG: "",
-    TypeKind.COUNT: "write a number such as 2",
-    TypeKind.STEP: "write its name with '$', such as '$chore'",
-}
+_PLACELESS = (TypeKind.QUANTITY, TypeKind.COUNT, TypeKind.FLAG, TypeKind.STEP)  # types that no place can have
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +160,7 @@ def findings_of(
             is_place = scope.word(unknown_word) is not None
             named = f"'{unknown_word}' is a place" if is_place else f"nothing is named '{unknown_word}'"
             message = f"this must be {wanted.phrase}; {named}"
-            help_text = _PLACELESS[wanted.kind] or problem.help
+            help_text = "write a number such as 2" if wanted.kind is TypeKind.COUNT else problem.help
             yield kind.at(span, message, help=help_text, fix=fix, about=[unknown_word])
         elif unknown_word and wanted == TEXT and unknown_word not in scope.removed:
             yield _no_text(unknown_word, span, scope, kind)

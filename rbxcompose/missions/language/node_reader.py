@@ -12,6 +12,7 @@ from rbxcompose.base.expressions.text import Template, TextSlot, parse_template,
 from rbxcompose.base.expressions.tree import Expression, ExpressionError, Number
 from rbxcompose.base.expressions.types import COUNT, FLAG, TEXT, UNKNOWN, Type, quantity_of
 from rbxcompose.base.findings import Finding, Fix, Span, surely_meant
+from rbxcompose.base.printable import plain
 from rbxcompose.base.units import NUMBER, TIME, UnitError, parse_quantity
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, plain_value
 from rbxcompose.missions import codes
@@ -97,7 +98,16 @@ def _unit_help(text: str, wanted: Type, error: ExpressionError) -> str:
     return error.help
 
 
-_FLOW_HELP = "inside '{}', commas and colons separate: put quotes around the condition, or write it in block style"
+_VALUE = "a value"
+_HELP = {  # for names with values where something else is needed
+    "a condition": "inside '{}', commas and colons separate: "
+    "put quotes around the condition, or write it in block style",
+    _VALUE: "give it a name under 'data', and write that: '$name'",
+}
+
+
+def _written(item: TreeNode) -> str:
+    return "..." if not isinstance(item, ScalarNode) else item.text if item.plain else f'"{item.text}"'
 
 
 def _part_of(scalar: ScalarNode, slot: TextSlot) -> ScalarNode:
@@ -153,7 +163,9 @@ class NodeReader:
             self.nodes.add(codes.MISSING.at(self.key_span(key), f"'{key}' needs {what}"))
             return None
         found = "a list" if isinstance(value, SequenceNode) else "names with values"
-        help_text = _FLOW_HELP if isinstance(value, MappingNode) and what == "a condition" else ""
+        help_text = _HELP.get(what, "") if isinstance(value, MappingNode) else ""
+        if isinstance(value, SequenceNode) and what == _VALUE:
+            help_text = f"put it in quotes: '[{plain(', '.join(map(_written, value.items)), 60)}]'"
         self.nodes.add(codes.WRONG_SHAPE.at(value.span, f"'{key}' needs {what}, not {found}", help=help_text))
         return None
 
@@ -423,7 +435,7 @@ class NodeReader:
         inner = NodeReader(value, key, self.number, self.nodes)
         read: list[parts.Assignment] = []
         for name, entry in value.entries.items():
-            inner.expression(name, UNKNOWN, "a value")
+            inner.expression(name, UNKNOWN, _VALUE)
             read.extend(parts.Assignment(name, entry.key.span, asked) for asked in inner.asked[len(read) :])
         self.asked.extend(replace(asked, is_assigned=True) for asked in inner.asked)
         return tuple(read)
