@@ -239,6 +239,12 @@ def test_a_state_that_cannot_be_read_is_told_and_cleared(capsys: pytest.CaptureF
     assert list(folder.path.iterdir()) == []
 
 
+def test_a_path_behind_undo_is_wrong_usage_with_a_hint(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        command.main(["apply", "--undo", "robots/tb", "--yes"])
+    assert "a path stands first: 'apply robots/tb --undo'" in capsys.readouterr().err
+
+
 def test_logs_shows_the_last_run_also_when_the_robot_is_down(capsys: pytest.CaptureFixture[str]) -> None:
     folder = RobotFolder.of("a")
     folder.make()

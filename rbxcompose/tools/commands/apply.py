@@ -35,10 +35,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--robot", metavar="NAME", help="of a system: only this robot")
     parser.add_argument("--partial", action="store_true", help="of a system: change the hosts that can, without others")
     undo = "take back the last change, then the one before it; only that of generation N, as --json shows it"
-    parser.add_argument("--undo", nargs="?", type=int, const=_LAST, metavar="N", help=undo)
+    parser.add_argument("--undo", nargs="?", type=_generation, const=_LAST, metavar="N", help=undo)
     parser.add_argument("-y", "--yes", action="store_true", help="do not ask")
     parser.add_argument("--dry-run", action="store_true", help="show the difference and what prevents it")
     parser.add_argument("--json", action="store_true", help="write the difference as JSON")
+
+
+def _generation(text: str) -> int:
+    """Return the number of a generation; the path of a robot may not follow it."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"'{text}' is no generation; a path stands first: 'apply {text} --undo'")
+    return int(text)
 
 
 def run(arguments: argparse.Namespace) -> int:
