@@ -506,7 +506,8 @@ def _mended(model: Any, data: object, error: ErrorDetails, tried: Counter[KeyPat
     path = _place(data, error)
     if not path:
         return _ABSENT
-    if error["type"] == "extra_forbidden" or error["loc"][-1:] == ("[key]",):
+    is_short = error["type"] == "missing" and isinstance(path[-1], int)  # a list that needs another item
+    if is_short or error["type"] == "extra_forbidden" or error["loc"][-1:] == ("[key]",):
         return _without(data, path)
     is_first = path not in tried
     tried[path] += 0

@@ -9,6 +9,7 @@ import pytest
 from rbxcompose.domains.diagnostics.settings import AnalyzerModel
 from rbxcompose.domains.muxes.sections.muxes import MuxModel
 from rbxcompose.domains.power.components.battery_sim import BatterySimConfig
+from rbxcompose.domains.worlds.components.camera_sim import CameraSimConfig
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.section import ComponentOptions
 from rbxcompose.manifest.validate import salvaged
@@ -51,6 +52,12 @@ def test_one_wrong_topic_leaves_the_others_connected() -> None:
     read = left(ComponentOptions, "connect: {odom: wheels/odom, cmd_vel: [x]}")
     assert read is not None
     assert read.connect["odom"] == "wheels/odom"
+
+
+def test_a_list_that_needs_another_item_has_its_default() -> None:
+    read = left(CameraSimConfig, "{frame: base_footprint, size: [320]}")
+    assert read is not None
+    assert (read.frame, read.size) == ("base_footprint", (320, 240))
 
 
 @pytest.mark.parametrize("text", ["word", "[a, b]", "inputs: {}"])

@@ -28,6 +28,8 @@ name: room
 objects: {crate: {box: [20 cm, 20 cm, 20 cm], at: {x: 1 m}, tags: {back: {number: 7, size: 16 cm}}}}
 """
 RATIONAL = (-0.1, 0.02, 0.0, 0.0, 0.0, 0.05, 0.01, 0.002)
+FINDER = "  finder: {type: tabletop_detector, points: front/points, frame: base_footprint_optical_frame}\n"
+DOCK = "  dock_at: {type: tag_docking, frame: base_footprint_optical_frm}\n"
 LENS = Intrinsics(320, 240, 300.0, 310.0, 170.0, 110.0, RATIONAL)
 STRONG = Intrinsics(320, 240, 200.0, 200.0, 159.5, 119.5, (-0.9, 0.0, 0.0, 0.0, 0.0))
 
@@ -82,6 +84,13 @@ def test_without_a_world_it_is_the_real_one_with_the_same_topics(tmp_path: Path)
         ("names: {box: 7}", "names: {box: 587}", "RBX1003", "tag36h11 has the tags 0 to 586, and no 587"),
         ("names: {box: 7}", "boards: {box: {tags: [{number: 587}]}}", "RBX1003", "tag36h11 has the tags 0 to 586"),
         ("names: {box: 7}", "names: {box: 7, dock: 7}", "RBX1003", "the same number"),
+        (
+            "cameras:",
+            f"{FINDER}cameras:",
+            "RBX3010",
+            "'finder' needs '/front/points', which nothing in the robot provides",
+        ),
+        ("cameras:", f"{DOCK}cameras:", "RBX2019", "did you mean 'base_footprint_optical_frame'?"),
     ],
 )
 def test_mistakes_are_findings_at_their_place(tmp_path: Path, old: str, new: str, code: str, said: str) -> None:
@@ -91,6 +100,26 @@ def test_mistakes_are_findings_at_their_place(tmp_path: Path, old: str, new: str
     assert said in checked.text
     assert found[0].span is not None
     assert found[0].span.file.endswith("robot.yaml")
+
+
+def test_all_mistakes_in_tags_are_found_at_once(tmp_path: Path) -> None:
+    tags = "names: {box: 7, big: 999, crate: 7}, sizes: {bxo: 30 cm}, boards: {box: {tags: [{number: 587}]}}"
+    checked = project(tmp_path).check(ROBOT.replace("names: {box: 7}", tags))
+    assert [finding.message for finding in checked.compilation.report] == [
+        "'big': tag36h11 has the tags 0 to 586, and no 999",
+        "'crate': 'box' has the same number",
+        "'names' has no tag 'bxo'",
+        "'box': a tag has the same name: box",
+        "'number': tag36h11 has the tags 0 to 586, and no 587",
+    ]
+
+
+@for_all("wrong", ["size: [320]", "frame: [x]", "calibration: ../../room.yaml", "calibration: ../../back.yaml"])
+@for_all("which", ["", "camera: front, "])
+def test_tags_have_a_camera_that_has_mistakes(tmp_path: Path, wrong: str, which: str) -> None:
+    text = ROBOT.replace("size: [320, 240], rate: 10 Hz", wrong).replace("tags: {", f"tags: {{{which}")
+    [code] = {finding.code for finding in project(tmp_path).check(text).compilation.report} - {"RBX3010"}
+    assert code in ("RBX1003", "RBX1301", "RBX3721")
 
 
 def test_who_needs_to_know_where_tags_are_without_a_size_is_told(tmp_path: Path) -> None:

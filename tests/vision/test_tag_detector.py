@@ -147,7 +147,7 @@ def test_a_camera_that_freezes_is_reported() -> None:
 @pytest.mark.parametrize(
     ("config", "told"),
     [
-        ({"names": {"box": 7}, "sizes": {"bxo": "20 cm"}}, "'names' does not have: bxo"),
+        ({"names": {"box": 7}, "sizes": {"bxo": "20 cm"}}, "'names' has no tag 'bxo'"),
         ({"names": {"box": 7, "dock": 7}}, "the same number"),
         ({"names": {"box": 7}, "boards": {"box": {"tags": [{"number": 1}]}}}, "the same name: box"),
         ({"boards": {"box": {"tags": [{"number": 1}, {"number": 1}]}}}, "each tag once"),

@@ -76,19 +76,17 @@ def cameras(reading: Reading[CameraModel]) -> dict[str, CameraModel]:
           front: {frame: base_footprint, size: [640, 480], view: 70 deg}
     """
     found = dict[str, CameraModel]()
-    for name, model in reading.entries().items():
+    for name, model in reading.readable_entries().items():
         if model.calibration is not None:
             where = reading.value("cameras", name, "calibration")
             node = reading.node
             writer = reading.writer(at(node, (name, "calibration")) or node) if node is not None else Path()
             named = resolve(model.calibration, writer, where)
+            if not isinstance(named, Finding) and (why := _unlike(named, model.size)):
+                named = NO_CALIBRATION.at(where, f"'{model.calibration}' is no calibration of it: {why}")
             if isinstance(named, Finding):
                 reading.report.add(named)
-                continue
-            if why := _unlike(named, model.size):
-                reading.report.add(NO_CALIBRATION.at(where, f"'{model.calibration}' is no calibration of it: {why}"))
-                continue
-            model = model.model_copy(update={"calibration": str(named)})
+            model = model.model_copy(update={"calibration": None if isinstance(named, Finding) else str(named)})
         found[name] = model
     return found
 

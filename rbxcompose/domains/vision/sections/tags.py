@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationError, model_validator
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from rbxcompose.base.config import Angle, Config, Length, Name, Refers
 from rbxcompose.base.findings import kind
@@ -74,24 +75,33 @@ class KnownTags(Config):
     boards: dict[Name, TagBoard] = {}
     """Boards by name."""
 
-    @field_validator("names", "boards")
-    @classmethod
-    def _are_of_family(cls, known: dict[str, int] | dict[str, TagBoard], info: ValidationInfo) -> Any:
-        for one in known.values():
-            for number in (one,) if isinstance(one, int) else one.places:
-                if why := no_tag(number, info.data.get("family", DEFAULT_FAMILY)):
-                    raise ValueError(why)
-        return known
-
     @model_validator(mode="after")
     def _are_told_apart(self) -> KnownTags:
-        if wrong := self.sizes.keys() - self.names:
-            raise ValueError(f"'sizes' names tags that 'names' does not have: {', '.join(sorted(wrong))}")
-        if len({*self.names.values()}) < len(self.names):
-            raise ValueError("two 'names' have the same number")
-        if wrong := self.names.keys() & self.boards.keys():
-            raise ValueError(f"a tag and a board have the same name: {', '.join(sorted(wrong))}")
+        errors = [InitErrorDetails(type=why, loc=place, input=None) for place, why in self._mistakes()]
+        if errors:  # all of them at once, each at its place
+            raise ValidationError.from_exception_data(TAGS, errors)
         return self
+
+    def _mistakes(self) -> Iterator[tuple[tuple[str | int, ...], PydanticCustomError]]:
+        first = dict[int, str]()
+        numbers: dict[tuple[str | int, ...], int] = {("names", name): number for name, number in self.names.items()}
+        for name, board in self.boards.items():
+            numbers |= {("boards", name, "tags", at, "number"): tag.number for at, tag in enumerate(board.tags)}
+            if name in self.names:
+                yield ("boards", name), _mistake(f"a tag has the same name: {name}")
+        for place, number in numbers.items():
+            if why := no_tag(number, self.family):
+                yield place, _mistake(why)
+        for name, number in self.names.items():
+            if first.setdefault(number, name) != name:
+                yield ("names", name), _mistake(f"'{first[number]}' has the same number")
+        for name in (name for name in self.sizes if name not in self.names):
+            context = {"name": name, "valid": tuple(self.names), "what": "'names'"}
+            yield ("sizes", name, "[key]"), PydanticCustomError("tag", "'names' has no tag '{name}'", context)
+
+
+def _mistake(why: str) -> PydanticCustomError:
+    return PydanticCustomError("value_error", "{error}", {"error": why})
 
 
 class TagsModel(KnownTags):
@@ -102,9 +112,8 @@ class TagsModel(KnownTags):
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
-    if (found := contents.of(tags)) is None or found.camera is None:
+    if (found := contents.of(tags)) is None or (camera := contents.of(cameras).get(found.camera or "")) is None:
         return
-    camera = contents.of(cameras)[found.camera]
     config = {
         **{name: getattr(found, name) for name in KnownTags.model_fields},
         "image": f"{found.camera}/image_raw",
@@ -124,9 +133,9 @@ def tags(reading: Reading[TagsModel]) -> TagsModel | None:
     """
     if (read := reading.whole()) is None:
         return None
-    known = reading.contents.of(cameras)
+    known = [*cameras.names_in(reading.contents.root)]
     if read.camera is None and len(known) != 1:
         which = f"one of {', '.join(known)}" if known else "and 'cameras' has none"
         reading.report.add(WHICH_CAMERA.at(reading.key(TAGS), f"'tags' needs a 'camera': {which}"))
         return None
-    return read if read.camera else read.model_copy(update={"camera": next(iter(known))})
+    return read if read.camera else read.model_copy(update={"camera": known[0]})
