@@ -40,18 +40,21 @@ def frame_of_body(robot: Robot) -> Iterator[Finding]:
                 place = setting_span(robot, (component, frame.child.field)) if is_own else mover
                 yield _finding(shape, place, message, _other_root(shape, frame.child))
         for port in (end.port for end in component.ends if isinstance(end.port, Looks)):
-            for name in (port.source, port.target) if description else _mounting(component, port) if is_known else ():
+            named = (port.source, port.target) if description else _mounting(robot, component, port) if is_known else ()
+            for name in named:
                 if name not in placed and name not in shape.links:
                     message = f"'{component.name}' looks up the frame '{name}', which no component publishes"
                     known = suggest(name, [*shape.links, *sorted(placed)], "known frames")
-                    help_text = known if description else "write 'frame: base_footprint', or add a 'body' that has it"
+                    is_mounted = description is None and component.cls.simulated
+                    help_text = "write 'frame: base_footprint', or add a 'body' that has it" if is_mounted else known
                     place = robot.value_span_of(component.name, name) or robot.entry_span(component.name)
                     yield _finding(shape, place, message, help_text, (component.name, name))
 
 
-def _mounting(component: RobotComponent, port: Looks) -> tuple[str, ...]:
-    """Return the frame that a simulated sensor is at, unless that is the base itself: without a body, there is none."""
-    return (port.source,) if component.cls.simulated and port.source != port.target else ()
+def _mounting(robot: Robot, component: RobotComponent, port: Looks) -> tuple[str, ...]:
+    """Return the frame that a simulated sensor is at, or that a user wrote, unless that is the base itself."""
+    is_meant = component.cls.simulated or robot.value_span_of(component.name, port.source) is not None
+    return (port.source,) if is_meant and port.source != port.target else ()
 
 
 def _other_root(body: Body, moved: Setting[str]) -> str:

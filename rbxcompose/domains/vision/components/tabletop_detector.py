@@ -113,7 +113,7 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
     def ports(cls, config: TabletopDetectorConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports: its own, clouds, what is seen, and where the camera is."""
         rate = max(1.0, 2 * config.rate)
-        cloud = sdk.In(PointCloud2, config.points, qos="bulk", is_open=True, max_rate=rate, limits=BULK)
+        cloud = sdk.In(PointCloud2, config.points, qos="bulk", max_rate=rate, limits=BULK)
         found: dict[str, sdk.Port[Any]] = {
             CLOUD: cloud.named(CLOUD),
             SEEN: sdk.Out(vision.Detection3DArray, config.topic).named(SEEN),
