@@ -143,6 +143,15 @@ def test_views_of_one_place_or_one_side_are_not_enough() -> None:
         flat.calibrated()
 
 
+def test_a_file_that_is_not_there_is_no_wrong_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "text.png").write_text("no picture")
+    files = [str(tmp_path / name) for name in ("text.png", "nofile.png")]
+    assert main(["camera", "calibrate", *files, "--chessboard", "8x6", "--square", "25mm"]) == 1
+    said = capsys.readouterr().err
+    assert "text.png is left out: it is no picture\n" in said
+    assert "nofile.png is left out: it cannot be read: No such file or directory\n" in said
+
+
 @pytest.mark.soak
 def test_the_command_writes_a_file_that_cameras_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = chessboard()

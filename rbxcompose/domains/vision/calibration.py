@@ -184,18 +184,21 @@ def _alike(view: BoardView, board: Array, corners: Array, diagonal: float) -> bo
     return bool(moved) and max(moved) < SAME * diagonal
 
 
-def picture_files(paths: Sequence[Any]) -> list[tuple[str, Bytes | None]]:
-    """Return files with their pictures in grey, None for those that are no pictures."""
+def picture_files(paths: Sequence[Any]) -> list[tuple[str, Bytes | str]]:
+    """Return files with their pictures in grey, or with the reason why there is none."""
     import cv2
 
-    found: list[tuple[str, Bytes | None]] = []
+    found: list[tuple[str, Bytes | str]] = []
     for path in paths:
         try:
             data = np.frombuffer(read_regular(path, LARGEST), np.uint8)
             picture = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if len(data) else None
-        except (OSError, cv2.error):
+        except cv2.error:
             picture = None
-        found.append((str(path), None if picture is None else np.asarray(picture, np.uint8)))
+        except OSError as error:
+            found.append((str(path), f"it cannot be read: {error.strerror or error}"))
+            continue
+        found.append((str(path), "it is no picture" if picture is None else np.asarray(picture, np.uint8)))
     return found
 
 

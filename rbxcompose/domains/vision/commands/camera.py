@@ -93,7 +93,7 @@ def _calibrate(arguments: argparse.Namespace) -> int:
         return visit(arguments, lambda guest: _listen(guest, views, arguments))
     names = []
     for name, picture in picture_files([Path(path) for path in arguments.pictures]):
-        if why := "it is no picture" if picture is None else views.take(picture):
+        if why := picture if isinstance(picture, str) else views.take(picture):
             sys.stderr.write(f"{plain(name)} is left out: {why}\n")
         else:
             names.append(name)
