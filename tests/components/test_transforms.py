@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from rbxcompose.base.clock import SteppedClock
 from rbxcompose.domains.body.components.transforms import TransformsConfig, body_of
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_nanoseconds, to_time
@@ -80,6 +81,18 @@ def test_a_link_is_where_it_was_when_the_joint_was_measured_not_when_that_was_he
     listener.stamps.clear()
     listener.move(bite=0.25, stamp=0.125)
     assert listener.stamps == [("jaw", 0.125)]
+
+
+def test_what_was_measured_just_before_the_start_is_not_older_than_what_was_published() -> None:
+    clock = SteppedClock()
+    clock.advance_to(1.0)
+    looking = instance("looking", "frame_target", {"frame": "head"})
+    robot = Bench(instance("transforms", "transforms", {"urdf": URDF}), looking, clock=clock)
+    listener = Listener(robot)
+    listener.move(pan=0.5, bite=0.25, stamp=0.98)
+    robot.advance(0.5)
+    assert min(stamp for name, stamp in listener.stamps if name == "head") == 0.98
+    assert not [text for text in robot.texts() if "went back" in text]
 
 
 @pytest.mark.parametrize("stamp", [0.0, 1e9, float(2**31 - 1)])

@@ -91,7 +91,8 @@ class Transforms(Component[TransformsConfig]):
         time = to_time(self.stamp)
         coinciding = () if self.config.is_localised else (link(time, self.config.map, self.config.odom, Transform3()),)
         self.tf_static(TFMessage(transforms=(*coinciding, *self.links(fixed, time))))
-        self.wake()
+        if self.moving:  # at first, joints are waited for: what is reported was measured a little earlier
+            self.context.wake_at(self.now + PERIOD)
 
     def on_joint_states(self, message: JointState) -> None:
         """Publish the links that joints have moved, at the time at which these were measured.
