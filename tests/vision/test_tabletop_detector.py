@@ -204,6 +204,14 @@ def test_a_goal_that_is_no_time_is_refused_and_one_that_is_cancelled_ends(tmp_pa
     assert [end.outcome for end in ends] == [Outcome.CANCELED]
 
 
+def test_too_few_pictures_are_no_things_that_move_and_silence_is_logged_once(tmp_path: Path) -> None:
+    looker = Looker(tmp_path, extra="rate: 5 Hz, pictures: 9, continuous: true")
+    assert looker.found(duration=0.7).message == "only 2 of 9 pictures have come"
+    silent = Looker(tmp_path / "other", depth=False, extra="rate: 5 Hz, continuous: true")
+    silent.bench.advance(6.0)
+    assert len([text for text in silent.bench.texts() if "no cloud" in text]) == 1
+
+
 @pytest.mark.parametrize("round_", [True, False])
 def test_what_is_round_comes_into_the_planning_scene_as_a_cylinder(round_: bool) -> None:
     where = Pose(position=Point(x=0.8, z=0.79), orientation=Quaternion(w=1.0))

@@ -142,6 +142,7 @@ def test_a_camera_that_freezes_is_reported() -> None:
     level, message = seeing.state()
     assert level == Level.ERROR
     assert message.startswith("no picture for")
+    assert [text for text in seeing.bench.texts() if "no picture" in text] == ["tags: no picture for 3 s"]
 
 
 @pytest.mark.parametrize(

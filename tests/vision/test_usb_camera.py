@@ -38,15 +38,29 @@ def test_pictures_have_the_colours_that_the_camera_saw(tmp_path: Path) -> None:
         assert np.allclose(np.frombuffer(bytes(one.data), np.uint8)[:3], colour, atol=6)
 
 
+def test_a_film_begins_again_without_a_word(tmp_path: Path) -> None:
+    bench = bench_of(film(tmp_path / "film.avi"))
+    pictures, statuses = bench.collect("/front/image", Image), bench.statuses("camera")
+    bench.advance(2.0)
+    assert len(pictures) == 10
+    assert bytes(pictures[3].data) == bytes(pictures[0].data)
+    assert {status.level for status in statuses} <= {Level.OK, Level.STALE}
+    assert not [text for text in bench.texts() if "gives no more" in text]
+
+
 def test_a_camera_that_ends_is_reported_and_opened_again(tmp_path: Path) -> None:
     bench = bench_of(path := film(tmp_path / "film.avi"))
     pictures = bench.collect("/front/image", Image)
     bench.advance(1.0)
     camera = bench.component("camera")
     assert isinstance(camera, UsbCamera)
+    assert camera.camera is not None
+    camera.camera.release()  # as if it were unplugged
+    bench.advance(0.3)
     assert (camera.state.level, camera.state.message) == (Level.ERROR, f"{path} gives no more pictures")
+    count = len(pictures)
     bench.advance(2.0)
-    assert len(pictures) > len(COLOURS)
+    assert len(pictures) > count
 
 
 def test_a_camera_that_is_not_there_is_waited_for(tmp_path: Path) -> None:

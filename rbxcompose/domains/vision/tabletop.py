@@ -440,6 +440,10 @@ class SteadyLook:
         self._still = still
         self._seen = deque[dict[str, Vector3]](maxlen=pictures)
 
+    def __len__(self) -> int:
+        """Return how many pictures have come, at most as many as are wanted."""
+        return len(self._seen)
+
     def take(self, things: Iterable[NamedThing]) -> bool:
         """Take what one more picture shows; return whether the last ones agree."""
         last = {one.name: one.thing.pose.translation for one in things}

@@ -242,7 +242,11 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
         elif len(sure) < least:
             self.outcome, self.why = TOO_FEW, f"{len(sure)} of {least} things stand on the table"
         else:
-            self.outcome, self.why = NOT_STEADY, f"{self.config.pictures} pictures never showed the same"
+            came, wanted = len(self.steady), self.config.pictures
+            self.outcome = NOT_STEADY
+            self.why = f"only {came} of {wanted} pictures have come"
+            if came == wanted:
+                self.why = f"{wanted} pictures never showed the same"
 
     def accept_find(self, goal: FindObjects.Goal) -> str:
         """Refuse what is no time."""
@@ -266,13 +270,13 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
                 outcome = NOT_SEEN if no_cloud else self.outcome
                 self.goal = None
                 goal.aborted(f"{outcome}: {why}", FindObjects.Result(outcome=outcome, message=why))
-        self.report(no_cloud or self.problem)
+        self.report(no_cloud or self.problem, "no cloud" if no_cloud else self.problem)
 
-    def report(self, problem: str) -> None:
-        """Tell diagnostics how it stands, and the log of a new problem."""
-        if problem and problem != self.said and self.is_looking:
+    def report(self, problem: str, kind: str) -> None:
+        """Tell diagnostics how it stands, and the log of a problem of a new kind."""
+        if problem and kind != self.said and self.is_looking:
             self.warn(problem)
-        self.said = problem
+        self.said = kind
         seen = ", ".join(one.name for one in self.found) or "nothing"
         self.status(Level.WARN if problem else Level.OK, problem or f"saw {seen}" + " now" * self.is_looking)
 

@@ -211,7 +211,8 @@ class TagDetector(sdk.Component[TagDetectorConfig]):
         """Report whether pictures come, and whether they can be used."""
         silent = self.now - self.seen_at
         problem = f"no picture for {silent:.0f} s" if silent > SILENCE else self.problem
-        if problem and problem != self.said:
+        kind = "no picture" if silent > SILENCE else problem  # how long it lasts is in diagnostics
+        if kind and kind != self.said:
             self.warn(problem)
-        self.said = problem
+        self.said = kind
         self.status(Level.ERROR if problem else Level.OK, problem or "pictures come")

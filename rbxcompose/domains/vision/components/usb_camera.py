@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import cv2
 
 _AGAIN = 2.0  # [s] between two tries to open it
+_NEXT_PICTURE = 1  # cv2.CAP_PROP_POS_FRAMES, which only films can set
 
 
 class UsbCameraConfig(sdk.Config):
@@ -131,6 +132,8 @@ class UsbCamera(sdk.Component[UsbCameraConfig]):
         if self.camera is None:
             return
         is_there, picture = self.camera.read()
+        if not is_there and self.camera.set(_NEXT_PICTURE, 0):  # a film begins again
+            is_there, picture = self.camera.read()
         if not is_there:
             self.close()
             self.fail(f"{self.config.device} gives no more pictures")
