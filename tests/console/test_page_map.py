@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import math
 import re
 from collections.abc import Callable
@@ -448,11 +449,9 @@ def test_it_fits_the_window_and_the_finger(open_page: Callable[..., Page], rolli
         expect_fit(page)
 
 
-@pytest.mark.soak
-def test_what_a_camera_sees_is_over_its_picture_until_it_is_old(
-    open_page: Callable[..., Page], gateway: FakeGateway
-) -> None:
-    gateway.config = CONFIG | {"camera": "/camera/image_raw"}
+def give_camera(gateway: FakeGateway, **more: Any) -> None:
+    """Give the robot a camera of 640 x 480 pixels, which sees a tag of 50 x 50 in the middle."""
+    gateway.config = CONFIG | {"camera": "/camera/image_raw"} | more
     drawn = io.BytesIO()
     PIL.Image.new("RGB", (64, 48)).save(drawn, "PNG")
     gateway.files["/stream"] = drawn.getvalue()
@@ -466,6 +465,31 @@ def test_what_a_camera_sees_is_over_its_picture_until_it_is_old(
     result = {"hypothesis": {"class_id": "left_box", "score": 0.9}}
     tag = {"id": "left_box", "results": [result], "bbox": {"center": centre, "size": {"x": 0.2, "y": 0.2, "z": 0.001}}}
     gateway.latched["/tags"] = {"header": header, "detections": [tag]}
+
+
+@pytest.mark.parametrize("drive", [CONFIG["drive"], None])
+def test_the_whole_picture_is_seen_and_what_is_found_is_where_it_is_in_that(
+    open_page: Callable[..., Page], gateway: FakeGateway, drive: object
+) -> None:
+    give_camera(gateway, drive=drive)
+    page = open_page(page_name="drive")
+    picture = page.get_by_alt_text("What the robot's camera sees")
+    expect(picture).to_have_css("object-fit", "contain")
+    found = page.locator(".seen polygon").evaluate("element => JSON.stringify(element.getBoundingClientRect())")
+    tag, around = json.loads(found), picture.bounding_box()
+    assert around is not None
+    assert around["width"] > around["height"] * 4 / 3  # beside the picture is nothing
+    assert tag["height"] == pytest.approx(around["height"] * 50 / 480, abs=1)
+    assert tag["width"] == pytest.approx(tag["height"], abs=1)
+    assert tag["x"] + tag["width"] / 2 == pytest.approx(around["x"] + around["width"] / 2, abs=1)
+    assert tag["y"] + tag["height"] / 2 == pytest.approx(around["y"] + around["height"] / 2, abs=1)
+
+
+@pytest.mark.soak
+def test_what_a_camera_sees_is_over_its_picture_until_it_is_old(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    give_camera(gateway)
     page = open_page(page_name="drive")
     overlay = page.locator(".seen")
     expect(overlay).to_have_attribute("data-seen", "left box")

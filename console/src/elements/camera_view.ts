@@ -1,5 +1,7 @@
-/** What a camera of the robot sees, with an arrow that shows where it is being driven. */
+/** What a camera of the robot sees, with what is found in it, and with an arrow that shows where it is being driven. */
 import { h, icon, setText, svg } from "../dom";
+import type { Rosbridge } from "../rosbridge";
+import { SeenOverlay } from "./seen_overlay";
 
 const WIDTH = 640; // [px] that are asked for
 const QUALITY = 60; // of JPEG
@@ -11,13 +13,15 @@ export class CameraView {
   readonly #says = h("p", { class: "label", role: "status" }, "Waiting for a picture\u2026");
   readonly #arrow = svg("path", { class: "motion-arrow", d: "" });
   readonly #url: string;
+  readonly #seen: SeenOverlay;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #tries = 0;
 
-  constructor(topic: string) {
+  constructor(link: Rosbridge, topic: string) {
+    this.#seen = new SeenOverlay(link, topic);
     this.#url = `stream?topic=${encodeURIComponent(topic)}&width=${WIDTH}&quality=${QUALITY}`;
-    const overlay = svg("svg", { viewBox: "0 0 100 75", preserveAspectRatio: "none", "aria-hidden": "true" }, this.#arrow);
-    this.element = h("section", { class: "card camera", "aria-label": "Camera" }, this.#image, overlay, this.#says);
+    const overlay = svg("svg", { viewBox: "0 0 100 75", "aria-hidden": "true" }, this.#arrow);
+    this.element = h("section", { class: "card camera", "aria-label": "Camera" }, this.#image, overlay, this.#says, this.#seen.element);
     this.#image.onload = () => this.#says.replaceChildren();
     this.#image.onerror = () => {
       this.#says.replaceChildren(icon("unlink"), "No picture. Trying again\u2026");
@@ -35,6 +39,7 @@ export class CameraView {
   }
 
   close(): void {
+    this.#seen.close();
     clearTimeout(this.#timer);
     this.#image.onerror = null;
     this.#image.removeAttribute("src"); // ends the stream

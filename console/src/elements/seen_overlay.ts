@@ -17,7 +17,7 @@ interface Shown {
 }
 
 export class SeenOverlay {
-  readonly element = svg("svg", { class: "seen", preserveAspectRatio: "xMidYMid slice", "aria-hidden": "true" });
+  readonly element = svg("svg", { class: "seen", "aria-hidden": "true" });
   readonly #link: Rosbridge;
   readonly #seen = new Map<string, Shown>();
   readonly #open = new Map<string, () => void>();

@@ -5,7 +5,6 @@ import { drive, parked, PERIOD, STILL, wanted, type Direction, type DriveEvent, 
 import { BatteryGauge } from "../elements/battery_gauge";
 import { CameraView } from "../elements/camera_view";
 import { DrivePad } from "../elements/drive_pad";
-import { SeenOverlay } from "../elements/seen_overlay";
 import { formatNumber, formatValue } from "../format";
 import type { Page, Robot } from "../page";
 import { isMessage, type Json, type Message } from "../rosbridge";
@@ -34,7 +33,8 @@ export const page: Page = {
   title: "Drive",
   order: 10,
   open(host, robot) {
-    const { drive: config } = robot.config;
+    const { drive: config, camera: topic } = robot.config;
+    const camera = topic ? new CameraView(robot.link, topic) : null;
     if (!config) {
       const batteries = batteryCard(robot);
       host.append(
@@ -42,16 +42,20 @@ export const page: Page = {
           "div",
           { class: "drive empty" },
           h("section", { class: "card" }, icon("wheel"), h("p", {}, "This robot has no base to drive.")),
+          ...(camera ? [camera.element] : []),
           batteries.element,
         ),
       );
-      return batteries.close;
+      return () => {
+        batteries.close();
+        camera?.close();
+      };
     }
-    return openDrive(host, robot, config);
+    return openDrive(host, robot, config, camera);
   },
 };
 
-function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => void {
+function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig, camera: CameraView | null): () => void {
   const { link } = robot;
   const cleanups: (() => void)[] = [];
   const limits: Motion = { forward: config.maxSpeed, turn: config.maxTurnRate };
@@ -76,9 +80,6 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
   const speeds = speedCard(limits, state.speeds, (next) => dispatch({ is: "speeds", speeds: next }));
   disable(barred, ...speeds.querySelectorAll("input"));
   const velocity = velocityCard(limits);
-  const camera = robot.config.camera ? new CameraView(robot.config.camera) : null;
-  const overlay = robot.config.camera ? new SeenOverlay(link, robot.config.camera) : null;
-  if (overlay) camera?.element.append(overlay.element);
   const batteries = batteryCard(robot);
 
   const dispatch = (event: DriveEvent) => {
@@ -257,7 +258,6 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
 
   const stick = h("section", { class: "card stick", "aria-label": "Pad" }, pad, hint);
   if (camera) cleanups.push(() => camera.close());
-  if (overlay) cleanups.push(() => overlay.close());
   host.append(h("div", { class: "drive" }, lease, ...(camera ? [camera.element] : []), stick, velocity.element, speeds, batteries.element));
   paint();
   return () => {
