@@ -25,6 +25,7 @@ from rbxcompose.msgs.sensor_msgs import Image
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.vision_msgs import Detection2DArray
 from rbxcompose.testing import Bench, instance
+from tests.parts.project import Project
 
 pytest.importorskip("cv2", reason="OpenCV is not installed")
 pytest.importorskip("onnxruntime", reason="onnxruntime is not installed")
@@ -178,3 +179,21 @@ def test_a_network_is_run_with_the_size_that_it_wants(tmp_path: Path) -> None:
     assert made.answers(planes).shape == (1, 20, 7)
     with pytest.raises(NetworkError, match="the network fails"):
         made.answers(planes[:, :, :10])
+
+
+def test_check_finds_a_network_that_cannot_be_used(tmp_path: Path) -> None:
+    robot = "components:\n  eye: {{type: test_picture, topic: camera/image_raw}}\n  it: {{type: detector, model: {}}}\n"
+    network(tmp_path / "good.onnx", np.zeros((1, 6, 8)))
+    network(tmp_path / "grey.onnx", np.zeros((1, 6, 8)), inputs=1)
+    (tmp_path / "text.onnx").write_text("no network")
+    said = {}
+    for model in ("good.onnx", "grey.onnx", "text.onnx", "none.onnx"):
+        for written in (f"../../{model}", str(tmp_path / model)):
+            report = Project(tmp_path).check(robot.format(written)).compilation.report
+            said[written] = next((found.message for found in report if found.code == "RBX3743"), "")
+    for folder in ("../..", str(tmp_path)):
+        assert said[f"{folder}/good.onnx"] == ""
+        assert "and not one picture" in said[f"{folder}/grey.onnx"]
+        assert "'text.onnx' is no network in ONNX" in said[f"{folder}/text.onnx"]
+    assert said["../../none.onnx"] == "there is no file '../../none.onnx'"
+    assert said[f"{tmp_path}/none.onnx"] == ""  # it is one on the computer of the robot

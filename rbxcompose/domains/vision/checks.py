@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from functools import lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +16,13 @@ from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
 from rbxcompose.domains.vision.calibration import CameraFileError, read_calibration
 from rbxcompose.domains.worlds.tag_pictures import FAMILIES
-from rbxcompose.manifest.tree import ScalarNode
+from rbxcompose.manifest.tree import ScalarNode, at
 from rbxcompose.manifest.validate import NOT_A_CHOICE
 from rbxcompose.sdk import CommandsMotion
 from rbxcompose.sdk.ports import In, Out
 
 DETECTOR, SIMULATED, REAL = "tag_detector", "camera_sim", "usb_camera"
+FINDS_BY_NETWORK = "detector"
 FOR_BASES = ("tag_follower", "tag_docking")
 USERS = {
     "tag_follower": ("tags", "tag"),
@@ -113,6 +116,37 @@ def exposure_too_long(robot: Robot) -> Iterator[Finding]:
             message = f"at {turning}, pictures are blurred by {blur:.0f} pixels in {config.exposure * 1e3:g} ms"
             help_text = f"expose them for {longest} at most, with more light, or turn more slowly"
             yield exposure_too_long.at(robot.value(*made.place("exposure")), message, help=help_text)
+
+
+@check("RBX3743", closed=())
+def unusable_network(robot: Robot) -> Iterator[Finding]:
+    """The network of a detector is not there, or is none for pictures."""
+    for made in robot.components.values():
+        if made.type_name != FINDS_BY_NETWORK or not made.is_sound:
+            continue
+        config: Any = made.config
+        path, place = Path(config.model), made.place("model")
+        node = at(robot.manifest.root, place)
+        written = node.text if isinstance(node, ScalarNode) else ""
+        is_there = path.exists()
+        if is_there or not written.startswith("/"):  # a whole path is one on the computer of the robot
+            why = _trouble_with(path, path.stat().st_mtime_ns if is_there else 0)
+            if why:
+                yield unusable_network.at(robot.value(*place), why.replace(str(path), written))
+
+
+@lru_cache(maxsize=8)
+def _trouble_with(path: Path, changed: int) -> str:
+    """Return why a file that has changed last at a time [ns] is no network for pictures, or nothing."""
+    from rbxcompose.domains.vision.components.detector import Network, NetworkError  # few robots have one
+
+    if path.is_file() and find_spec("onnxruntime") is None:
+        return ""
+    try:
+        Network(path)
+    except NetworkError as error:
+        return str(error)
+    return ""
 
 
 def _detector(robot: Robot, made: RobotComponent) -> RobotComponent | None:

@@ -17,6 +17,7 @@ from pydantic import Field
 
 from rbxcompose import sdk
 from rbxcompose.base.arrays import Bytes, Singles, np
+from rbxcompose.base.config import LocalFiles
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.manifest.fields import TopicName
@@ -34,8 +35,8 @@ LARGEST = 4096  # sides of a picture that a network may want [px]
 class DetectorConfig(sdk.Config):
     """The network, the camera, and what counts."""
 
-    model: str = Field(min_length=1)
-    """The whole path of the network, a file in ONNX."""
+    model: LocalFiles = Field(min_length=1)
+    """The network, a file in ONNX: relative to the robot's file, or a whole path on the robot's computer."""
     image: TopicName = "camera/image_raw"
     """The topic of the pictures."""
     labels: list[str] = []
@@ -172,13 +173,13 @@ class Network:
         Raises:
             NetworkError: if the file is no network for pictures.
         """
+        if not path.is_file():
+            raise NetworkError(f"there is no file '{path}'")
         import onnxruntime
 
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
         options.log_severity_level = 4  # what goes wrong is raised
-        if not path.is_file():
-            raise NetworkError(f"there is no file '{path}'")
         try:
             self._session: Any = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
         except Exception as error:  # its errors have no common class
