@@ -216,7 +216,7 @@ def _shared(tries: Sequence[Callable[[], TriedProfile]], processes: int) -> list
     forks = [_forked(tries[share::shares]) for share in range(1, shares)]
     found = [[attempt() for attempt in tries[::shares]]]
     for share, (pid, pipe) in enumerate(forks, 1):
-        with open(pipe, "rb") as file:
+        with os.fdopen(pipe, "rb") as file:
             data = file.read()
         _, status = os.waitpid(pid, 0)
         found.append([attempt() for attempt in tries[share::shares]] if status else pickle.loads(data))  # noqa: S301 - our own
@@ -232,7 +232,7 @@ def _forked(tries: Sequence[Callable[[], TriedProfile]]) -> tuple[int, int]:
     status = 1  # then they are tried again, and what is wrong is seen there
     try:
         data = pickle.dumps([attempt() for attempt in tries])
-        with open(writing, "wb") as file:
+        with os.fdopen(writing, "wb") as file:
             file.write(data)
         status = 0
     finally:
