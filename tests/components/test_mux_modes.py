@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.base.requests import Refused
+from rbxcompose.base.requests import Refused, as_data
 from rbxcompose.domains.muxes.components.mux import Mux
 from rbxcompose.domains.muxes.requests import (
     NONE,
@@ -282,6 +282,15 @@ def test_what_was_deleted_and_added_in_its_place_outlives_a_restart() -> None:
     robot.host.failed("cmd_vel", RuntimeError("planted"))
     robot.advance(1.0)
     assert look(robot).inputs == before
+
+
+def test_an_order_that_comes_again_before_the_mux_is_active_waits_for_it() -> None:
+    robot = bench()
+    robot.host.failed("cmd_vel", RuntimeError("planted"))
+    robot.host.recall("cmd_vel", as_data(LockMuxInputs("cmd_vel", ("teleop",))))
+    assert not any("by hand" in text for text in robot.texts())
+    robot.advance(1.0)
+    assert [(one.name, one.why) for one in look(robot).inputs if one.why] == [("teleop", "by hand")]
 
 
 def test_what_was_selected_first_stays_deleted_after_a_restart() -> None:

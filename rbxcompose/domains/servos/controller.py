@@ -207,6 +207,9 @@ class Controller(ABC, Generic[C]):
     def prepare(self) -> None:
         """Set up what it needs."""
 
+    def start(self) -> None:
+        """Begin: the robot is up, or has been before this started again."""
+
     def recall(self, memory: Any) -> None:
         """Take what it has given its site to keep, as data: it has started again."""
 

@@ -365,6 +365,8 @@ class ProcessGroup:
                 self._is_ending = True
             case messages.Lost(names, cause):
                 self._made_host().lost(names, cause)
+            case messages.Ask(0, instance, request):
+                self._made_host().recall(instance, request)
             case messages.Ask():
                 self._channel.send(self._answer(self._made_host(), message))
             case messages.Consider(number, plan):

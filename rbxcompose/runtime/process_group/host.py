@@ -276,6 +276,17 @@ class Host:
             self._fails_soon(instance, error)
             raise Refused(f"'{instance}' has failed: {type(error).__name__}: {error}") from error
 
+    def recall(self, instance: str, data: Mapping[str, Any]) -> None:
+        """Have a component carry out a request from before a restart of its process, once it is active."""
+        if (hosted := self.hosted.get(instance)) is None:
+            return
+        try:
+            request = self.request(instance, data)
+        except Refused as refusal:
+            hosted.log(Level.WARN, str(refusal))
+        else:
+            self._guarded(instance, partial(hosted.recall, request))
+
     def _is_active(self, name: str) -> bool:
         return name in self.hosted and self.hosted[name].state is Lifecycle.ACTIVE
 
@@ -536,7 +547,7 @@ class Hosted:
         self.worker: Worker | None = None  # the thread of a component that may block
         self._ends: dict[str, Any] = {}  # of the ports, on the bus
         self._claiming: list[Any] = []  # those ports that serve an action which claims a part of the robot
-        self._repeated: Sequence[Command] = ()  # requests that it gets again after a restart in place
+        self._repeated: Sequence[Request[Any]] = ()  # requests that it gets again after a restart in place
         self.is_again = False  # the component was already started since the robot came up
         self._was_started = False
         self._wakes: set[float] = set()  # robot times [s] at which to wake the component
@@ -612,6 +623,12 @@ class Hosted:
             for request in self._repeated:
                 self.do("command", partial(self._repeat, component, request, self._repeated))
         self.host.bus.open(self.instance.name)  # those who found it before it was active have waited
+
+    def recall(self, request: Request[Any]) -> None:
+        """Carry out a request from before a restart of the process, now or when the component has become active."""
+        self._repeated = (*self._repeated, request)
+        if self.state is Lifecycle.ACTIVE:
+            self.do("command", partial(self._repeat, self._made(), request, self._repeated))
 
     def note_start(self) -> None:
         """Note that the component, if it is active, was told of the start."""
@@ -791,7 +808,7 @@ class Hosted:
         self.host.starts_mission &= not isinstance(event, MissionOver)
         self.host.notify(event)
 
-    def repeat(self, requests: Sequence[Command]) -> None:
+    def repeat(self, requests: Sequence[Request[Any]]) -> None:
         """Send these to the component again after it, or its process, was restarted."""
         self._repeated = requests
         self.host.notify(Repeated(self.instance.name, [as_data(request) for request in requests]))
@@ -821,7 +838,7 @@ class Hosted:
         if end is not None:
             self.host.bus.withdraw(self.instance.name, end)
 
-    def _repeat(self, component: Component[Any], request: Command, requests: Sequence[Command]) -> None:
+    def _repeat(self, component: Component[Any], request: Request[Any], requests: Sequence[Request[Any]]) -> None:
         try:
             component.handle(request)
         except Refused as refusal:

@@ -19,6 +19,7 @@ from rbxcompose.msgs.stamps import LONGEST, to_duration, to_time
 from rbxcompose.msgs.std_msgs import Header
 
 MAP = "map"
+UNKNOWN = 2.0  # [s] without a position, as after a restart of the base, after which a goal ends
 FARTHEST = 100_000.0  # [m] from the origin; no map is as large
 ServedPose = sdk.ServedGoal[NavigateToPose.Goal, NavigateToPose.Result, NavigateToPose.Feedback]
 
@@ -61,6 +62,7 @@ class GoTo(BaseDriver[GoToConfig]):
         self.core = GoToCore(settings_of(self.config))
         self.driving: object = None  # the goal that the core drives to
         self.began = 0.0  # [s], when it began to
+        self.blind_since = math.inf  # [s]
 
     def reconfigure(self, old: GoToConfig) -> None:
         """Continue to the current goal with the new settings."""
@@ -79,14 +81,17 @@ class GoTo(BaseDriver[GoToConfig]):
         """Continue towards the goal."""
         goal = self.go_to.current
         if goal is None:
-            self.driving = None
+            self.driving, self.blind_since = None, math.inf
             return
         pose = self.pose.now()
+        self.blind_since = min(self.blind_since, self.now) if pose is None else math.inf
         if goal.cancel_requested:
             self.drive(AT_REST)
             goal.canceled()
         elif pose is None:
-            self.fail(goal, f"the position of the base is unknown in '{MAP}'")
+            self.drive(AT_REST)
+            if self.now - self.blind_since > UNKNOWN:
+                self.fail(goal, f"the position of the base is unknown in '{MAP}'")
         else:
             self.follow(goal, pose, dt)
 

@@ -121,12 +121,16 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
         policy = OdometryPolicy(greatest_speed=JUMP * fastest, resolution=tick, window=AVERAGED)
         self.odometry = WheelOdometry(self.geometry, policy)
         self.kept: OdometryRecord | None = None  # what the supervisor knows of that
-        self.knows_from = self.now + PATIENCE if self.context.is_again else -math.inf  # when it reports its place
+        self.knows_from = math.inf if self.context.is_again else -math.inf  # when it reports its place
         self.has_begun = False  # the board has started since this component has
         self.last: wheel_board.BoardState | None = None
         self.was_alive = False
         self.refused = ""
         self.at_end.callback(self.stand)
+
+    def start(self) -> None:
+        """Report the place soon, also if there was none to recall."""
+        self.knows_from = min(self.knows_from, self.now + PATIENCE)
 
     def take_over(self, old: Self) -> None:
         """Go on where a base with other settings was."""

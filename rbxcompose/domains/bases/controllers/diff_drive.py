@@ -172,7 +172,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
         policy = OdometryPolicy(spread, JUMP * fastest, radius * tick, AVERAGED, OVERRUN * fastest)
         self.odometry = WheelOdometry(rolling, policy, self.site.start)
         self.kept: OdometryRecord | None = None  # what is known of that after a restart
-        self.knows_from = self.site.now + PATIENCE if self.site.is_again else -math.inf  # when it reports its place
+        self.knows_from = math.inf if self.site.is_again else -math.inf  # when it reports its place
         self.seen = -math.inf  # when both wheels had been measured last [s]
         self.refused = self.trouble = ""
 
@@ -236,6 +236,10 @@ class DiffDriveController(Controller[DiffDriveConfig]):
             self.seen = seen
             if reason := self.odometry.update(left.measured.position, right.measured.position, seen):
                 self.site.warn(reason)
+
+    def start(self) -> None:
+        """Report the place soon, also if there was none to recall."""
+        self.knows_from = min(self.knows_from, self.site.now + PATIENCE)
 
     def recall(self, memory: Any) -> None:
         """Go on where the base was before a restart."""

@@ -385,6 +385,11 @@ class ServoBusDriver(Component[ServoBusConfig]):
         drive = self.cycle.drives[name]
         drive.policy = replace(drive.policy, on_start=how)
 
+    def start(self) -> None:
+        """Let controllers begin."""
+        for controller in self.controllers.controllers.values():
+            controller.start()
+
     def wake(self) -> None:
         """Run one cycle, and prepare the next, on a grid."""
         self.context.wake_at((math.floor(self.now / self.period + 1e-6) + 1) * self.period)
