@@ -340,6 +340,39 @@ class Gone:
     reopen = write = read
 
 
+def test_joints_on_a_path_are_relaxed_after_a_port_was_gone(head: Head) -> None:
+    head.follow((0.0, 0.0, 0.1), (1.0, 0.5, 2.0))
+    head.robot.advance(1.0)
+    driver: Any = head.robot.component("servos")
+    bus, driver.cycle.bus = driver.cycle.bus, Gone()
+    head.robot.advance(1.0)
+    driver.cycle.bus = bus
+    head.robot.advance(1.0)
+    assert [bus.line[id_].get("torque_enable") for id_ in (1, 2)] == [0, 0]
+
+
+@pytest.mark.parametrize(("first", "torque", "at"), [("", 0, -1.0), ("stop", 1, 0.5), ("retire", 1, 0.5)])
+def test_joints_hold_that_are_not_parked_since_the_robot_is_stopped_or_its_driver_starts_again(
+    first: str, torque: int, at: float
+) -> None:
+    head = Head(on_shutdown="park", park={"pan": -1.0})
+    head.commands["pan"](Float64(data=0.5))
+    head.robot.advance(2.0)
+    driver: Any = head.robot.component("servos")
+    servo = driver.cycle.bus.line[1]
+    if first == "retire":
+        head.robot.host.retire(["servos"])
+    else:
+        if first:
+            head.robot.host.stop()
+        head.robot.host.brake()
+        head.robot.advance(4.0)
+        assert driver.is_at_rest
+        head.robot.host.shutdown()
+    assert servo.get("torque_enable") == torque
+    assert (servo.get("present_position") - 512) * TICK == pytest.approx(at, abs=0.05)
+
+
 def test_after_a_port_was_gone_joints_are_relaxed_and_move_from_where_they_are(head: Head) -> None:
     head.commands["pan"](Float64(data=1.0))
     head.robot.advance(2.0)

@@ -256,6 +256,26 @@ def test_an_unplugged_board_is_reported_and_driven_again_when_it_is_back(tmp_pat
 
 
 @needs_compiler
+@pytest.mark.parametrize("gap", [0.1, 2.0])
+def test_a_board_that_starts_again_while_it_is_unplugged_moves_nothing(
+    tmp_path: Path, program: Path, gap: float
+) -> None:
+    with wired(tmp_path, program) as robot:
+        robot.speed = (0.2, 0.0)
+        robot.run(3.0)
+        robot.speed = None
+        robot.run(1.0)
+        before = robot.place
+        robot.device.unplug()
+        robot.run(gap)
+        robot.start_board_again()
+        robot.device.plug()
+        robot.run(5.0)
+        assert robot.status == (0, "rests")
+        assert robot.place == pytest.approx(before, abs=1e-3)
+
+
+@needs_compiler
 def test_after_a_stop_the_board_is_told_zero(tmp_path: Path, program: Path) -> None:
     with wired(tmp_path, program) as robot:
         robot.speed = (0.3, 0.0)

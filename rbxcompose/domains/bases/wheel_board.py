@@ -10,9 +10,10 @@ from 0xFFFF) of all but the first byte and itself. Numbers have the lowest byte 
 | 0x81 hello | board | version (u8), silence after which it stops its motors (u16) [ms] |
 | 0x82 state | board | positions of the left and the right wheel (i32 each) [ticks], battery (u16) [mV], flags (u8) |
 
-Both ends repeat theirs, which is the heartbeat: the host `drive` 50 times a second, the board `state`. The board drives
-only after a hello of its own version, and stops its motors when no `drive` has come for its silence. Flags: 1 it was
-greeted, 2 a motor has failed, 4 it stands because of silence.
+Both ends repeat theirs, which is the heartbeat: the host `drive` 50 times a second, the board `state`, also before it
+was greeted. So the host listens first and greets then: a board that has started meanwhile says that it was not greeted.
+The board drives only after a hello of its own version, and stops its motors when no `drive` has come for its silence.
+Flags: 1 it was greeted, 2 a motor has failed, 4 it stands because of silence.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ SILENT = 0.2  # [s] without a state, after which the link is down
 _START, _LONGEST, _FROM = 0x7E, 32, 0xFFFF
 _HEAD, _CRC = 4, 2  # [B]
 _GREET = 0.2  # [s] between two hellos
+_UNHEARD = 3.0  # [s] after which a board is greeted that nothing was heard of: its bootloader takes less
 _DRIVE, _STATE, _HELLO = struct.Struct("<hh"), struct.Struct("<iiHB"), struct.Struct("<BH")
 
 
@@ -112,14 +114,15 @@ class BoardLink:
         self.version: int | None = None  # of the board
         self.is_greeted = False
         self._heard_at = self._greeted_at = -math.inf
+        self._waits_until: float | None = None  # for the first state, before it greets
         self._number = 0
         self._begins = False
         self._next: int | None = None  # number of the next frame of the board
 
     def forget(self) -> None:
-        """Start over: the port was opened."""
+        """Start over: the port was opened, or the board was silent."""
         self._frames.forget()
-        self.version, self.is_greeted, self._next = None, False, None
+        self.version, self.is_greeted, self._next, self._waits_until = None, False, None, None
         self._heard_at = self._greeted_at = -math.inf
 
     @property
@@ -155,7 +158,10 @@ class BoardLink:
     def speak(self, now: float, speeds: WheelSpeeds) -> bytes:
         """Return what to send now: speeds of the wheels [ticks/s], and a hello until the board was greeted."""
         said = b""
-        if not self.is_greeted and now - self._greeted_at >= _GREET - 1e-6:
+        if self._waits_until is None:
+            self._waits_until = now + _UNHEARD
+        may_greet = self._heard_at > -math.inf or now >= self._waits_until
+        if not self.is_greeted and may_greet and now - self._greeted_at >= _GREET - 1e-6:
             self._greeted_at = now
             said += self._frame(HELLO, bytes([VERSION]))
         if self.is_greeted:

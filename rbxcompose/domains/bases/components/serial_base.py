@@ -212,7 +212,7 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
             self.info("the board answers")
             return
         self.last = None
-        self.link.is_greeted = False
+        self.link.forget()
         if self.line.is_open:
             self.complain("the board is not heard: the base rests")
 

@@ -418,9 +418,9 @@ class ServoBusDriver(Component[ServoBusConfig]):
             if self.now - self.lost_at < REOPEN:
                 return
             self.cycle.bus.reopen()
-            for drive in self.cycle.drives.values():  # their servos have no torque now, and may be elsewhere
-                self.start_by(drive.joint.name, "relax")
-                drive.relax()
+            for name in self.cycle.drives:  # their servos have no torque now, and may be elsewhere
+                self.start_by(name, "relax")
+                self.let_go(name)
             self.prepare()
             self.info("the bus of servos is back")
             self.lost_at = -math.inf
@@ -647,9 +647,9 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.is_stopped = False
 
     def brake(self) -> None:
-        """Bring all joints to rest for good; those with torque go where they are parked, if they are."""
+        """Bring all joints to rest for good; those with torque are parked, but hold if the robot is stopped."""
+        self.is_parking = self.config.on_shutdown == "park" and not self.is_stopped
         self.stop()
-        self.is_parking = self.config.on_shutdown == "park"
         for name, position in self.config.park.items() if self.is_parking else ():
             if self.cycle.drives[name].has_torque:
                 self.cycle.drives[name].ask(MoveTo(position))
@@ -661,8 +661,12 @@ class ServoBusDriver(Component[ServoBusConfig]):
                 drive.ask(MoveTo(self.config.park[name]))
 
     def cleanup(self) -> None:
-        """Let go of joints that are parked."""
-        self.keeps_torque = self.config.on_shutdown == "hold"
+        """Let go of joints that are parked; if one is not yet, all hold."""
+        is_parked = self.is_parking and self.is_at_rest
+        has_to_hold = self.config.on_shutdown == "park" and not is_parked
+        self.keeps_torque = self.config.on_shutdown == "hold" or has_to_hold
+        if has_to_hold and any(drive.has_torque for drive in self.cycle.drives.values()):
+            self.warn("joints are not parked: they hold")
 
     def end_torque(self) -> None:
         """Relax the joints; those that are to hold, or are not parked since this driver failed, only stop turning."""
