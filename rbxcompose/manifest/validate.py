@@ -3,6 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import cache
@@ -424,6 +425,9 @@ def label_of(node: tree.TreeNode | None) -> str:
     """Return what a node is, for the label of a finding: "this is text"."""
     if isinstance(node, tree.ScalarNode) and isinstance(node.filled, Quantity):
         return f"this is {node.filled.dimension.phrase}"
+    if isinstance(node, tree.ScalarNode) and node.filled is None and " " in node.text:
+        with suppress(UnitError):
+            return f"this is {parse_quantity(node.text).dimension.phrase}"
     return describe(to_plain(node)) if node is not None else ""
 
 

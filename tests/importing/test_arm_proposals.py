@@ -46,14 +46,26 @@ def test_a_head_an_arm_and_its_gripper_are_told_apart() -> None:
     assert found["right_arm"].gripper.joint == "right_gripper_finger_joint"
 
 
-@pytest.mark.parametrize("text", [urdf, six_joints, lambda: LIFTER], ids=["toy", "six", "lifter"])
-def test_what_is_proposed_passes_check(text: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def porter() -> str:
+    robot, _ = robot_and_plan("porter")
+    return described(robot.manifest).text
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [(urdf, "arm.urdf"), (six_joints, "arm.xacro"), (lambda: LIFTER, "arm.urdf"), (porter, "arm.urdf")],
+    ids=["toy", "six", "lifter", "porter"],
+)
+def test_what_is_proposed_passes_check(
+    text: object, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert callable(text)
-    (tmp_path / "arm.urdf").write_text(text())
-    words = ["arm", "setup", str(tmp_path / "arm.urdf"), "--propose", "--out", str(tmp_path / "robot.yaml")]
+    (tmp_path / name).write_text(text())
+    words = ["arm", "setup", str(tmp_path / name), "--propose", "--out", str(tmp_path / "robot.yaml")]
     assert command.main(words) == 0
     errors = [finding for finding in compile_robot(str(tmp_path), environment={}).report if finding.severity == "error"]
     assert errors == []
+    assert ("sliding" in (tmp_path / "robot.yaml").read_text()) is (text is porter)  # whose fingers do
     assert command.main(words) == 1
     assert "already exists" in capsys.readouterr().err
 

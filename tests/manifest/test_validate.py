@@ -77,6 +77,7 @@ MISTAKES = [
         "this is text",
         "write a number before 'm/s'",
     ),
+    ("is_open: 60 deg", "RBX1003", 10, "'is_open' must be true or false", "this is an angle", ""),
     ("is_open: yes", "RBX1003", 10, "'is_open' must be true or false", "this is text", ""),
     ("count: two", "RBX1003", 8, "'count' must be a whole number", "this is text", ""),
     ("count: 1.5", "RBX1003", 8, "'count' must be a whole number", "this is a number", ""),

@@ -46,8 +46,8 @@ class ArmDraft:
 def manifest_of(
     body: Body, drafts: Sequence[ArmDraft], file: str, pairs: str = "", outer: OuterJoint | None = None
 ) -> str:
-    """Return the sections of a robot with arms; `file` is the URDF, `pairs` that of the pairs of links, if any."""
-    own = {"urdf": key(file)} | ({"collisions": key(pairs)} if pairs else {})
+    """Return the sections of a robot with arms; `file` is URDF or xacro, `pairs` that of the pairs of links, if any."""
+    own = {"xacro" if file.endswith(".xacro") else "urdf": key(file)} | ({"collisions": key(pairs)} if pairs else {})
     if outer is not None:
         names = {"name": word(outer.name), "type": outer.kind, "frame": word(outer.frame)}
         own["virtual_joint"] = flow(names)
@@ -104,10 +104,13 @@ def _controllers(body: Body, drafts: Iterable[ArmDraft], grippers: Iterable[Grip
     for gripper in grippers:
         joint = body.joints[gripper.joint]
         lower, upper = ends_of(joint)
-        span = 2 * (upper - lower) if joint.slides else 0.08
-        ends = ((0.0, lower), (span, upper))
-        points = flow_list([flow({"opening": length(round(gap, 4)), "angle": angle(at)}) for gap, at in ends])
-        entries = {"type": "gripper", "model": "calibrated", "joint": key(gripper.joint), "calibration": points}
+        entries = {"type": "gripper", "model": "sliding" if joint.slides else "calibrated", "joint": key(gripper.joint)}
+        if joint.slides:
+            entries["opening"] = flow_list([length(round(2 * at, 4)) for at in (lower, upper)])
+        else:
+            ends = ((0.0, lower), (0.08, upper))
+            points = [flow({"opening": length(gap), "angle": angle(at)}) for gap, at in ends]
+            entries["calibration"] = flow_list(points)
         yield row(1, f"{gripper.name}_controller: {flow(entries)}", _GUESS)
 
 

@@ -164,7 +164,7 @@ class _Reader:
             )
             raise _RefusedError(self.format.wrong.at(self._tag(name), message))
         if self.format.root and name.startswith(XACRO):
-            help_text = "expand it first: 'xacro FILE.xacro -o FILE.urdf'"
+            help_text = "name it as 'xacro: FILE' below 'body', or expand it first: 'xacro FILE.xacro -o FILE.urdf'"
             raise _RefusedError(NOT_URDF.at(self._tag(name), "xacro must expand this file first", help=help_text))
         if len(self.open) >= DEPTH:
             raise _RefusedError(TOO_LARGE.at(self._tag(name), f"elements are nested more than {DEPTH} levels deep"))
