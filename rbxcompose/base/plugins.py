@@ -16,11 +16,12 @@ import importlib
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache, cached_property
 from types import ModuleType
 from typing import TYPE_CHECKING, TypeVar
 
-from rbxcompose.base.findings import Severity, kind
+from rbxcompose.base.findings import Report, Severity, Span, kind
 from rbxcompose.base.printable import plain
 
 if TYPE_CHECKING:
@@ -85,7 +86,16 @@ def _below(package: str, path: str) -> list[tuple[str, str]]:
 
 
 class BrokenPluginError(Exception):
-    """Raised when a plug-in of another package cannot be used; its text names plug-in, package and reason."""
+    """Raised when a plug-in cannot be used; its text names plug-in, package and reason."""
+
+
+@contextmanager
+def reported(report: Report, span: Span | None) -> Iterator[None]:
+    """Report a plug-in that turns out to be broken in this block, whose rest is left out."""
+    try:
+        yield
+    except BrokenPluginError as error:
+        report.add(BROKEN.at(span, str(error)))
 
 
 class Plugins:
@@ -132,7 +142,7 @@ class Plugins:
 
         Raises:
             KeyError: if there is none.
-            BrokenPluginError: if it belongs to another package and cannot be used.
+            BrokenPluginError: if its module does not declare it, or it belongs to another package and cannot be used.
         """
         if name not in known:
             try:
@@ -160,11 +170,33 @@ class Plugins:
         [entry, *others] = self.third_party[name]
         if others:
             raise self.broken(name, "more than one package announces it")
-        try:
+        with self.guarded(name):
             entry.load()
-        except (Exception, SystemExit) as error:  # third-party code may raise anything while it is imported
-            raise self.broken(name, f"{type(error).__name__}: {error}") from error
         return True
+
+    def problem(self, name: str) -> str:
+        """Import the plug-in of this name of another package; return why it cannot be used, or nothing."""
+        try:
+            self.load_foreign(name)
+        except BrokenPluginError as error:
+            return str(error)
+        return ""
+
+    @contextmanager
+    def guarded(self, name: str) -> Iterator[None]:
+        """Blame what this block raises on the package of a plug-in, unless that is ours.
+
+        Raises:
+            BrokenPluginError: in place of whatever the plug-in raises.
+        """
+        try:
+            yield
+        except BrokenPluginError:
+            raise
+        except (Exception, SystemExit) as error:  # third-party code may raise anything
+            if name in self.shipped or name not in self.third_party:
+                raise
+            raise self.broken(name, f"{type(error).__name__}: {error}") from error
 
     def overshadowed(self, name: str) -> str:
         """Return the message for a name of ours that other packages register as well; empty if none does."""
@@ -175,15 +207,24 @@ class Plugins:
         return f"the {self.family} '{name}' of {self._packages(name)} is left out: rbxcompose has one of this name"
 
     def broken(self, name: str, reason: str) -> BrokenPluginError:
-        """Return the error that reports why a plug-in of another package cannot be used."""
+        """Return the error that reports why a plug-in cannot be used."""
         return BrokenPluginError(
             f"the {self.family} '{plain(name, 60)}' of {self._packages(name)} cannot be used: {plain(reason)}"
         )
 
     def _packages(self, name: str) -> str:
-        entries = self.third_party[name]
+        if not (entries := self.third_party.get(name, ())):
+            return _NAME
         packages = sorted({f"'{plain(entry.dist.name, 60)}'" if entry.dist else entry.module for entry in entries})
         return f"package{'s' if len(packages) > 1 else ''} {' and '.join(packages)}"
+
+
+def load_all_foreign() -> None:
+    """Import all that other packages announce, except what cannot be imported."""
+    for family in dict.fromkeys(entry.name.partition(".")[0] for entry in _entries(tuple(sys.path))):
+        plugins = Plugins(family, "")
+        for name in plugins.third_party:
+            plugins.problem(name)
 
 
 @cache

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import rbxcompose
 from rbxcompose.base.findings import KINDS, FindingKind
+from rbxcompose.base.plugins import load_all_foreign
 from rbxcompose.manifest.files import library_root
 
 FAMILIES = {
@@ -62,13 +63,9 @@ def kind_of(code: str) -> FindingKind | None:
 
 def all_kinds() -> dict[str, FindingKind]:
     """Import every module that declares a kind of finding, including those of plug-ins, and return all by code."""
-    from rbxcompose.compiler.check_runner import all_checks  # which imports the compiler: a page does without
-    from rbxcompose.missions.analysis.examined import mission_checks
-
     for module in dict.fromkeys(module for module, _ in declared()):
         importlib.import_module(module)
-    all_checks()
-    mission_checks()
+    load_all_foreign()
     return dict(sorted(KINDS.items()))
 
 

@@ -2,10 +2,10 @@
 
 import re
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, TypeVar
 
 from rbxcompose.base.findings import OUR_CODES, Finding, FindingKind, Report, Rule, Severity, belonging, declared
-from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins, domain_of, package_of
+from rbxcompose.base.plugins import LEFT_OUT, Plugins, domain_of, package_of
 from rbxcompose.base.printable import plain
 from rbxcompose.compiler.doubts import Doubts, doubts_of, half_read
 from rbxcompose.compiler.model.robot import NOTHING, Robot
@@ -13,6 +13,7 @@ from rbxcompose.manifest.registry import PLUGINS as SECTIONS
 from rbxcompose.manifest.registry import section_named
 from rbxcompose.missions.analysis.examined import Examined, mission_checks
 
+T = TypeVar("T")
 Check = Rule[Robot]
 Find = Callable[[Robot], Iterable[Finding]]
 FindBy = Callable[[Rule[Any], Robot | Examined], list[Finding]]
@@ -102,11 +103,7 @@ def _problem(name: str) -> str:
     """Import a check of another package; return why it is left out, or nothing."""
     if any(rule.find.__name__ == name and not is_foreign(rule.find) for rule in CHECKS.values()):
         return PLUGINS.left_out(name)
-    try:
-        PLUGINS.load_foreign(name)
-    except BrokenPluginError as error:
-        return str(error)
-    return ""
+    return PLUGINS.problem(name)
 
 
 def run_checks(robot: Robot, report: Report, find: FindBy | None = None) -> None:
@@ -148,13 +145,18 @@ def _turn(rule: Rule[Any]) -> int:
 
 def findings_of(rule: Rule[Any], subject: Robot | Examined) -> list[Finding]:
     """Return the findings of a rule. If one of another package raises an error, the rest still run."""
-    if not is_foreign(rule.find):
-        return list(rule(subject))
+    return answers_of(rule.find, f"check {rule.code}", lambda: rule(subject))
+
+
+def answers_of(part: Callable[..., Any], what: str, ask: Callable[[], Iterable[T]]) -> list[T | Finding]:
+    """Return the answers of a function, or a finding that it has failed if it is of another package."""
     try:
-        return list(rule(subject))
+        return [*ask()]
     except Exception as error:  # third-party code may raise anything
+        if not is_foreign(part):
+            raise
         reason = plain(f"{type(error).__name__}: {error}")
-        return [LEFT_OUT.at(None, f"the check {rule.code} of '{_package(rule.find)}' has failed: {reason}")]
+        return [LEFT_OUT.at(None, f"the {what} of '{_package(part)}' has failed: {reason}")]
 
 
 def is_foreign(part: Callable[..., Any]) -> bool:

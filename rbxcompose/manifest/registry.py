@@ -13,7 +13,7 @@ from typing import Any, ParamSpec, TypeVar
 from pydantic import Field, create_model
 
 from rbxcompose.base.findings import Finding
-from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins, domain_of, package_of
+from rbxcompose.base.plugins import LEFT_OUT, Plugins, domain_of, package_of
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT, Declaration, Reading, Section
 from rbxcompose.manifest.tree import MappingNode
@@ -149,13 +149,7 @@ def _problems() -> tuple[str, ...]:
 
 
 def _problem(name: str) -> str:
-    if _is_ours(name):
-        return PLUGINS.left_out(name)
-    try:
-        PLUGINS.load_foreign(name)
-    except BrokenPluginError as error:
-        return str(error)
-    return ""
+    return PLUGINS.left_out(name) if _is_ours(name) else PLUGINS.problem(name)
 
 
 FILES = {

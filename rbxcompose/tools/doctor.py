@@ -7,6 +7,7 @@ import resource
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,9 @@ from typing import Any
 import rbxcompose
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Severity
-from rbxcompose.base.plugins import Plugins
+from rbxcompose.base.plugins import LEFT_OUT, Plugins
 from rbxcompose.bus.graph import Graph
+from rbxcompose.compiler.check_runner import answers_of
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.devices.serial_ports import SerialPort
 from rbxcompose.runtime.folder import RobotFolder, RobotState
@@ -171,12 +173,16 @@ def examination(examine: Examine) -> Examine:
 
 
 def examine_all(facts: HostFacts) -> list[ExaminationResult]:
-    """Run every examination, by name; one of another package that has the name of ours is left out."""
+    """Run every examination, by name; one of another package is left out if it is broken, or has the name of ours."""
     PLUGINS.load_shipped()
-    for name in PLUGINS.third_party:
-        if name not in EXAMINATIONS:
-            PLUGINS.load_foreign(name)
-    return [ExaminationResult(name, answer) for name in sorted(EXAMINATIONS) for answer in EXAMINATIONS[name](facts)]
+    foreign = [name for name in sorted(PLUGINS.third_party) if name not in EXAMINATIONS]
+    broken = [(name, LEFT_OUT.at(None, problem)) for name in foreign if (problem := PLUGINS.problem(name))]
+    answers = [
+        (name, answer)
+        for name, examine in sorted(EXAMINATIONS.items())
+        for answer in answers_of(examine, f"examination {name}", partial(examine, facts))
+    ]
+    return [ExaminationResult(*result) for result in (*answers, *broken)]
 
 
 def has_errors(answers: Sequence[ExaminationResult]) -> bool:

@@ -91,10 +91,12 @@ def test_a_program_that_is_not_known_is_wrong_usage(capsys: pytest.CaptureFixtur
 def test_a_broken_importer_of_another_package_is_told_and_left_out(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    load_ours = PLUGINS.load
+
     def load(name: str) -> bool:
         if name == "lamp":
             raise BrokenPluginError("the importer 'lamp' cannot be used")
-        return True
+        return load_ours(name)
 
     monkeypatch.setitem(vars(PLUGINS), "third_party", {"lamp": ()})
     monkeypatch.setattr(PLUGINS, "load", load)

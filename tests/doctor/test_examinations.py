@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.base.findings import Finding
+from rbxcompose.base.plugins import Plugins
 from rbxcompose.bus.graph import Graph, GraphEnd, GraphName, WireType
 from rbxcompose.bus.wire import RosQos
 from rbxcompose.compiler.compile import compile_robot
@@ -34,6 +35,7 @@ from rbxcompose.tools.doctor import (
     examine_all,
     has_errors,
 )
+from tests.third_party.places import put, see
 
 HERE = Process.of(os.getpid())
 GONE = Process(HERE.pid, 1)
@@ -100,6 +102,33 @@ def test_on_a_machine_that_is_well_nothing_is_wrong() -> None:
         "wires",
     }  # for these one must run
     assert not has_errors(answers)
+
+
+@pytest.mark.parametrize(
+    ("module", "reason"),
+    [
+        ("import no_such_module", "the doctor 'odd' of package 'odd-package' cannot be used: ModuleNotFoundError"),
+        (
+            "from rbxcompose.tools.doctor import examination\n@examination\ndef odd(facts):\n    return {}['x']",
+            "the examination odd of 'odd_module' has failed: KeyError: 'x'",
+        ),
+    ],
+    ids=["import", "raises"],
+)
+def test_a_broken_examination_is_left_out_with_a_warning(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str, reason: str
+) -> None:
+    PLUGINS.load_shipped()
+    put(tmp_path / "site", "odd-package", {"doctor.odd": "odd_module"}, {"odd_module.py": module})
+    see(tmp_path / "site", monkeypatch)
+    monkeypatch.setattr(machine, "PLUGINS", Plugins("doctor", "examinations"))
+    monkeypatch.setattr(machine, "EXAMINATIONS", dict(machine.EXAMINATIONS))
+    results = examine_all(FINE)
+    [answer] = [result.answer for result in results if result.examination == "odd"]
+    assert isinstance(answer, Finding)
+    assert answer.code == "RBX9302"
+    assert reason in answer.message
+    assert len({result.examination for result in results}) > 1
 
 
 def test_adapters_are_told_with_the_devices_that_they_are(tmp_path: Path) -> None:

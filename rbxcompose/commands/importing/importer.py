@@ -7,7 +7,7 @@ from dataclasses import field
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Report, Severity, kind
-from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
+from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins, reported
 from rbxcompose.commands.importing.foreign_files import ForeignFile
 from rbxcompose.manifest.files import ROBOT_FILE
 
@@ -66,12 +66,15 @@ def importer(name: str, about: str, *, has_arguments: bool = False) -> Callable[
 
 def importers() -> dict[str, Importer]:
     """Return all importers that work, by name."""
-    return {name: _IMPORTERS[name] for name in PLUGINS.names() if not _problem(name) and name in _IMPORTERS}
+    return {name: _IMPORTERS[name] for name in PLUGINS.names() if not _problem(name)}
 
 
 def imported(program: str, files: Sequence[ForeignFile], name: str, report: Report) -> ImportedFiles:
     """Return a manifest with what files of a program have; empty, after a finding, if it is nothing."""
-    run = importers()[program].run(files, name, report) if files else ""
+    run: str | ImportedFiles = ""
+    if files:
+        with reported(report, None), PLUGINS.guarded(program):
+            run = importers()[program].run(files, name, report)
     made = run if isinstance(run, ImportedFiles) else ImportedFiles(run)
     if not made.text and not report.has_errors:
         report.add(NOTHING_LEFT.at(None, "nothing of these files could be imported, so no manifest is written"))
@@ -79,14 +82,14 @@ def imported(program: str, files: Sequence[ForeignFile], name: str, report: Repo
 
 
 def broken_importers() -> list[Finding]:
-    """Return a finding for each importer of another package that is left out."""
-    return [LEFT_OUT.at(None, problem) for name in sorted(PLUGINS.third_party) if (problem := _problem(name))]
+    """Return a finding for each importer that is left out."""
+    return [LEFT_OUT.at(None, problem) for name in PLUGINS.names() if (problem := _problem(name))]
 
 
 def _problem(name: str) -> str:
     """Load an importer; return why it is left out, or nothing."""
     try:
-        PLUGINS.load(name)
+        PLUGINS.find(name, _IMPORTERS, f"function by @importer({name!r}, ...)")
     except BrokenPluginError as error:
         return str(error)
     return ""

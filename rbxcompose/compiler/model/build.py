@@ -10,6 +10,7 @@ from rbxcompose.base.config import Config, is_live, key_of, leaves
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Itself, Report, once
 from rbxcompose.base.levels import LOG_LEVELS
+from rbxcompose.base.plugins import reported
 from rbxcompose.compiler.composition.robot_file import read_mission
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.model.robot import (
@@ -25,9 +26,10 @@ from rbxcompose.compiler.model.robot import (
 from rbxcompose.compiler.model.skills import names_of_skills, services_of, skills_of, topics_of
 from rbxcompose.compiler.model.values import findings_about, triggers_of, value_of
 from rbxcompose.compiler.sections.missions import missions
+from rbxcompose.manifest import registry as section_registry
 from rbxcompose.manifest.registry import sections_in_use
 from rbxcompose.manifest.section import ROBOT, Contents, WantedComponent
-from rbxcompose.manifest.tree import MappingNode, at
+from rbxcompose.manifest.tree import MappingNode, at, key_span
 from rbxcompose.manifest.validate import refusals
 from rbxcompose.missions.analysis.facts import sent_by, settings_of
 from rbxcompose.missions.engine.inputs import bind_inputs
@@ -35,6 +37,7 @@ from rbxcompose.missions.language.reader import Budget, read_program
 from rbxcompose.missions.program.linker import Using
 from rbxcompose.missions.program.program import Program
 from rbxcompose.missions.sources import ValueSource
+from rbxcompose.sdk import registry
 from rbxcompose.sdk.capabilities import Drives, require_declared
 from rbxcompose.sdk.ports import In, Out
 from rbxcompose.sdk.registry import component_type
@@ -145,9 +148,13 @@ def written_components(manifest: RobotManifest, report: Report) -> dict[str, Rob
     wires = _Wires(manifest.bus.namespace or "")
     given = _given_topics(manifest.contents)
     for section in sorted(sections_in_use(ROBOT), key=lambda one: not one.names):
-        for wanted in section.components(manifest.contents, wires):
-            if (accepted := _accepted(manifest, wanted, report)) is not None:
-                wires.add(_component(manifest, accepted, given.get(wanted.name, {})))
+        there = reported(report, key_span(manifest.root, (section.name,)))
+        with there, section_registry.PLUGINS.guarded(section.name):
+            for wanted in section.components(manifest.contents, wires):
+                here = reported(report, key_span(manifest.root, wanted.path))
+                with here, registry.PLUGINS.guarded(wanted.type_name):
+                    if (accepted := _accepted(manifest, wanted, report)) is not None:
+                        wires.add(_component(manifest, accepted, given.get(wanted.name, {})))
     return wires.components
 
 

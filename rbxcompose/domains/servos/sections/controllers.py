@@ -12,7 +12,7 @@ from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Related, Span, kind
 from rbxcompose.base.plugins import BROKEN, BrokenPluginError
 from rbxcompose.domains.body.model import BodyJoint
 from rbxcompose.domains.body.sections.body import body
-from rbxcompose.domains.servos.controller import ControllerConfig, controller_names, controller_type
+from rbxcompose.domains.servos.controller import PLUGINS, ControllerConfig, controller_names, controller_type
 from rbxcompose.domains.servos.models import OUTPUTS
 from rbxcompose.domains.servos.sections.actuators import actuators, model_of
 from rbxcompose.domains.servos.sections.joints import held_limits, joints, may_be_driven
@@ -109,7 +109,12 @@ def _read(reading: Reading[ControllerConfig], name: str, entry: Entry) -> Contro
         reading.report.add(_unknown_type(written, names))
         return None
     try:
-        return reading.valid(controller_type(written.text).config_type(), name, entry.value)
+        with PLUGINS.guarded(written.text):
+            cls = controller_type(written.text)
+            config = reading.valid(cls.config_type(), name, entry.value)
+            if config is not None:
+                cls.ports(name, config)  # asked for in many places: what it raises is reported here
+            return config
     except BrokenPluginError as error:
         reading.report.add(BROKEN.at(written.span, str(error)))
         return None
