@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from rbxcompose.base.findings import Report
 from rbxcompose.compiler.schema.mission import schemas_of_keys
+from rbxcompose.missions import modifiers
 from rbxcompose.missions.analysis.examined import check_program
 from rbxcompose.missions.engine.snapshot import restore, save
 from rbxcompose.missions.engine.world import Settings
 from rbxcompose.missions.language.reader import read_program
+from rbxcompose.missions.modifiers.results import Timeout, TimeoutTask
 from rbxcompose.missions.program import registry
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.outcomes import SUCCEEDS
@@ -39,6 +42,7 @@ from rbxcompose.missions.sdk import (
     dataclass,
     duration,
     kind,
+    modifier,
     says,
     started,
 )
@@ -222,6 +226,29 @@ def test_a_kind_that_leaves_something_unanswered_is_refused_and_a_type_error() -
     with pytest.raises(TypeError, match="abstract"):
         Silent()  # type: ignore[abstract]
     assert "silent" not in kinds()
+
+
+class OtherTimeout(Timeout):
+    """A modifier whose name is taken."""
+
+
+def test_a_word_that_is_taken_is_refused() -> None:
+    before = dict(kinds())
+    with pytest.raises(ValueError, match=r"two kinds are named 'wait': rbxcompose.missions.kinds.steps and tests"):
+        kind("wait", PersistTask)(Persist)
+    assert dict(kinds()) == before
+    with pytest.raises(ValueError, match=r"two modifiers are named 'timeout'"):
+        modifier("timeout", TimeoutTask)(OtherTimeout)
+
+
+def test_no_key_of_a_kind_is_read_by_a_modifier_too() -> None:
+    taken = {(name, key) for name, found in kinds().items() for key in found.fields if key in registry.anywhere()}
+    assert taken == set()
+
+
+def test_each_file_of_modifiers_has_its_place_in_the_order() -> None:
+    files = {path.stem for path in Path(modifiers.__path__[0]).glob("*.py")}
+    assert files == {"__init__", *registry.MODULES}
 
 
 def test_nothing_of_it_is_left() -> None:

@@ -26,12 +26,11 @@ def kind(name: str, task: Callable[[Site, S], Task], *, is_inner: bool = False) 
 
     Raises:
         TypeError: if the kind does not answer everything that every kind must.
+        ValueError: if another kind has this word.
     """
 
     def register(cls: type[S]) -> type[S]:
-        if inspect.isabstract(cls):
-            raise TypeError(f"the kind '{name}' does not answer {', '.join(sorted(cls.__abstractmethods__))}")
-
+        _require_usable("kind", name, cls, KINDS)
         cls.bind(name)
         cls.is_inner = is_inner
         KINDS[name], _TASKS[cls] = cls, task
@@ -39,6 +38,15 @@ def kind(name: str, task: Callable[[Site, S], Task], *, is_inner: bool = False) 
         return cls
 
     return register
+
+
+def _require_usable(what: str, name: str, cls: type[Any], known: Mapping[str, type[Any]]) -> None:
+    """Raise an error if a class leaves questions open, or if another one has its name."""
+    if inspect.isabstract(cls):
+        raise TypeError(f"the {what} '{name}' does not answer {', '.join(sorted(cls.__abstractmethods__))}")
+    other = known.get(name, cls)
+    if (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
+        raise ValueError(f"two {what}s are named '{name}': {other.__module__} and {cls.__module__}")
 
 
 def forget(name: str) -> None:
@@ -85,12 +93,11 @@ def modifier(
 
     Raises:
         TypeError: if the modifier does not implement all abstract members.
+        ValueError: if another modifier has this key.
     """
 
     def register(cls: type[M]) -> type[M]:
-        if inspect.isabstract(cls):
-            raise TypeError(f"the modifier '{name}' does not answer {', '.join(sorted(cls.__abstractmethods__))}")
-
+        _require_usable("modifier", name, cls, MODIFIERS)
         cls.bind(name)
         cls.only_states = only_states
         MODIFIERS[name], _DECORATORS[cls] = cls, task
