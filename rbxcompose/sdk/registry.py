@@ -5,18 +5,20 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import field
+from difflib import get_close_matches
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from rbxcompose.base.config import Config, Dimensioned, Place
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.types import COUNT, FLAG, PLACE, POSE, TEXT, Type, choice_of, quantity_of
+from rbxcompose.base.findings import DID_YOU_MEAN, SIMILAR
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.plugins import BrokenPluginError, Plugins
 from rbxcompose.base.units import NUMBER
 from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import Port, ServesTopic
+from rbxcompose.sdk.ports import In, Port, ServesAction, ServesTopic
 
 T = TypeVar("T", bound=type[Component[Any]])
 K = TypeVar("K", bound=Capability)
@@ -30,7 +32,7 @@ def component(name: str) -> Callable[[T], T]:
 
     Raises:
         TypeError: if it is not a subclass of `Component`.
-        ValueError: if another class has this name, or one of its ports refers to a port that it does not have.
+        ValueError: if another class has this name, or a port or a method refers to a port that it does not have.
     """
 
     def register(cls: T) -> T:
@@ -40,6 +42,7 @@ def component(name: str) -> Callable[[T], T]:
         if other is not None and (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
             raise ValueError(f"two component types are named '{name}': {other.__module__} and {cls.__module__}")
         _require_ends(cls)
+        _require_handled(cls)
         cls.type_name = name
         _TYPES[name] = cls
         return cls
@@ -56,6 +59,23 @@ def _require_ends(cls: type[Component[Any]]) -> None:
             if other is not None and not any(other is one for one in ports):
                 where = f"{cls.__module__}.{cls.__qualname__}"
                 raise ValueError(f"{where}: '{word}' of the port '{port.name}' is not a port of this class")
+
+
+def _require_handled(cls: type[Component[Any]]) -> None:
+    """Raise ValueError if a method is named like the handler that a port lacks, but for a slip: `on_rwa` for `raw`.
+
+    A method for several ports may have their common words, such as `on_scan` for `scan_left`.
+    """
+    ports: dict[str, Port[Any]] = dict(inspect.getmembers(cls, lambda member: isinstance(member, Port)))
+    kinds = {"accept_": ServesAction} | ({"on_": In} if cls.received is Component.received else {})
+    for prefix, kind in kinds.items():
+        methods = {name.removeprefix(prefix) for name in dir(cls) if name.startswith(prefix)}
+        lacking = [name for name, port in ports.items() if isinstance(port, kind) and name not in methods]
+        for name in sorted(methods - ports.keys()):
+            slips = [port for port in lacking if f"_{name}_" not in f"_{port}_"]
+            if near := get_close_matches(name, slips, n=1, cutoff=SIMILAR):
+                wrong = f"{cls.__module__}.{cls.__qualname__}.{prefix}{name}"
+                raise ValueError(f"{wrong} is for no port: {DID_YOU_MEAN} '{prefix}{near[0]}'?")
 
 
 def component_names() -> list[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from rbxcompose import sdk
+from rbxcompose.sdk import capabilities
 from tests.conftest import ROOT
 from tests.docs.examples import blocks_of
 
@@ -19,3 +21,9 @@ def test_each_block_is_the_file_that_it_names() -> None:
 
 def test_it_leads_to_all_that_the_sdk_has() -> None:
     assert "(reference/sdk.md)" in TEXT
+
+
+def test_authors_import_every_capability_from_the_sdk() -> None:
+    kinds = {name for name, kind in vars(capabilities).items() if isinstance(kind, type)}
+    wanted = {name for name in kinds if issubclass(getattr(capabilities, name), capabilities.Capability)}
+    assert wanted - {*sdk.__all__} == set()

@@ -11,10 +11,11 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.schema.mission import skills_of
 from rbxcompose.missions.program.goals import topic_skill
 from rbxcompose.missions.sources import Orders, OrderTopic, SkillWay
+from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist
 from rbxcompose.msgs.std_msgs import Bool, Empty, Float64, String
 from rbxcompose.msgs.std_srvs import SetBool
-from rbxcompose.sdk import Component, Config, In, Out, ServesTopic, component
+from rbxcompose.sdk import Component, Config, In, Out, ServesAction, ServesTopic, component
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import check_text
 from rbxcompose.tools.inspection.diagram import diagram_of
@@ -89,6 +90,39 @@ def test_ends_and_halts_are_ports_of_the_same_class(word: str) -> None:
 
     with pytest.raises(ValueError, match=f"'{word}' of the port 'grip' is not a port of this class"):
         component("toy_broken_hand")(Hand)
+
+
+@pytest.mark.parametrize(("method", "meant"), [("on_rwa", "on_raw"), ("accept_gripp", "accept_grip")])
+def test_a_misspelt_handler_is_refused(method: str, meant: str) -> None:
+    class Misspelt(Component[Config]):
+        raw = In(Empty, "raw")
+        grip = ServesAction(FollowJointTrajectory, "grip")
+
+    setattr(Misspelt, method, lambda self, message: None)
+    with pytest.raises(ValueError, match=f"Misspelt.{method} is for no port: did you mean '{meant}'?"):
+        component("toy_misspelt")(Misspelt)
+
+
+def test_a_method_for_several_ports_and_one_for_the_component_itself_are_no_slips() -> None:
+    @component("toy_several_scans")
+    class SeveralScans(Component[Config]):
+        """Reads the newest scans."""
+
+        scan_left, scan_right = In(Empty, "left"), In(Empty, "right")
+
+        def on_scan(self, message: Empty) -> None: ...
+
+        def on_timer(self) -> None: ...
+
+    @component("toy_any_message")
+    class AnyMessage(Component[Config]):
+        """Handles all messages alike."""
+
+        raw = In(Empty, "raw")
+
+        def received(self, port: str, message: Empty) -> None: ...
+
+        def on_rwa(self) -> None: ...
 
 
 # What missions know
