@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from docs.generating.markdown import table
+from rbxcompose.base.plugins import domain_of
 from rbxcompose.commands.finding_pages import FAMILIES, declared
 
 LAST = 99  # of a family: a code has four digits
@@ -12,7 +13,8 @@ def families() -> str:
     """Return a table of the families."""
     homes: dict[str, set[str]] = {family: set() for family in FAMILIES}
     for module, code in declared():
-        homes[code[3:5]].add(f"`{module.split('.')[1]}`")
+        domain = domain_of(module)
+        homes[code[3:5]].add(f"`domains/{domain}`" if domain else f"`{module.split('.')[1]}`")
     rows = [(f"RBX{family}", FAMILIES[family], ", ".join(sorted(packages))) for family, packages in homes.items()]
     return table(("codes", "about", "declared in"), rows)
 

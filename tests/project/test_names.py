@@ -42,4 +42,5 @@ def test_each_public_name_of_a_class_stands_for_nothing_else() -> None:
 
 
 def test_no_module_is_named_by_a_verb() -> None:
-    assert {path.stem for path in PACKAGE.rglob("*ing.py")} == NOUNS
+    found = {path.stem for path in PACKAGE.rglob("*ing.py")}
+    assert found == NOUNS, "name a module by a noun; one that ends in `ing` stands in NOUNS above"
