@@ -237,11 +237,11 @@ def chosen_layers(arguments: argparse.Namespace) -> ChosenLayers:
     return ChosenLayers(tuple(arguments.profile), overlays, tuple(arguments.sets), arguments.real)
 
 
-def compiled(robot: str, arguments: argparse.Namespace, *overlays: str, processes: int = 0) -> Compilation:
+def compiled(robot: str, arguments: argparse.Namespace, *overlays: str, tries_profiles: bool = False) -> Compilation:
     """Compile a robot with all layers that a command puts over its file, and more `overlays`."""
     layers = layers_of(arguments)
     layers["overlays"] = [*layers["overlays"], *overlays]
-    return compile_robot(robot, **layers, processes=processes)
+    return compile_robot(robot, **layers, tries_profiles=tries_profiles)
 
 
 def without_errors(found: Compilation) -> tuple[Robot, Plan]:

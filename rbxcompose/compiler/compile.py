@@ -1,15 +1,10 @@
 """The compiler: the only place that knows the order of the stages. It reads like a table of contents."""
 
-import os
-import pickle
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import field, replace
-from functools import partial
-from itertools import islice
 from pathlib import Path
-from threading import active_count
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import (
@@ -21,7 +16,6 @@ from rbxcompose.base.findings import (
     Severity,
     Span,
     kind,
-    need,
     needed,
     one_compile,
 )
@@ -29,7 +23,7 @@ from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.compiler.check_runner import findings_of, run_checks
 from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_file import load_robot
-from rbxcompose.compiler.doubts import removed_by, with_removals
+from rbxcompose.compiler.doubts import with_removals
 from rbxcompose.compiler.model.build import build_robot, read_missions, with_missions
 from rbxcompose.compiler.model.flow import start_order
 from rbxcompose.compiler.model.robot import NOTHING, Outside, Robot, RobotComponent
@@ -71,13 +65,13 @@ def compile_robot(
     environment: Mapping[str, str],
     unsaved: Mapping[Path, str] = MappingProxyType({}),
     outside: Outside = NOTHING,
-    processes: int = 0,
+    tries_profiles: bool = False,
 ) -> Compilation:
     """Compile a robot's file (a path, a folder with a `robot.yaml`, or `rbx:...`) and report all its mistakes.
 
     `overlays` are files that change it. `unsaved` are texts from an editor, by the real path of the file that each
-    replaces. `outside` is what it has of other robots. If no profile was chosen, and there are `processes` for it, each
-    profile is tried as well, so that a broken one is found before it is used.
+    replaces. `outside` is what it has of other robots. With `tries_profiles`, each profile is tried as well if
+    none was chosen, so that a broken one is found before it is used.
     """
 
     parsed: dict[tuple[str, str], ParsedText] = {}  # a profile changes no text
@@ -103,26 +97,19 @@ def compile_robot(
         out.report.findings = manifest.inclusions.located(out.report.findings)
         return out
 
-    def tried(profile: str, span: Span) -> TriedProfile:
-        keys = out.robot.manifest.profile_keys if out.robot else {}  # its own value of what `--set` replaces counts
-        found = compiled([profile], keys.get(profile, frozenset()))
-        gone = removed_by(span, found.robot.manifest.history) if found.robot else None
-        texts = {file: found.sources[file] for file in found.sources.keys() - out.sources.keys() - {PROFILE, SET}}
-        return TriedProfile(span, list(found.report), gone, texts, needed())
-
     out = compiled(profiles)
-    if out.robot is not None and not profiles and processes:
+    if out.robot is not None and not profiles and tries_profiles:
         steps = sum(len(mission.program.nodes) for mission in out.robot.missions.values())
         steps = max(LEAST_STEPS, steps + _steps_to_read(out.sources))
-        all_profiles = out.robot.manifest.profiles
-        some = dict(islice(all_profiles.items(), PROFILE_STEPS // steps))
-        for profile in _shared([partial(tried, *one) for one in some.items()], processes):
-            _report_profile(profile, out, {SET, *out.robot.manifest.overlays})
-            for file in profile.needed:
-                need(*file)
-        for name in islice(all_profiles, len(some), len(some) + 1):
-            message = f"the profiles from '{name}' on were not tried: it would take too long for this robot"
-            out.report.add(NOT_TRIED.at(all_profiles[name], message, help=f"rbxcompose check --profile {name}"))
+        keys = out.robot.manifest.profile_keys  # a profile is tried with its own value of what `--set` replaces
+        for number, (name, span) in enumerate(out.robot.manifest.profiles.items(), 1):
+            if number * steps > PROFILE_STEPS:
+                message = f"the profiles from '{name}' on were not tried: it would take too long for this robot"
+                out.report.add(NOT_TRIED.at(span, message, help=f"rbxcompose check --profile {name}"))
+                break
+            _report_profile(
+                span, compiled([name], keys.get(name, frozenset())), out, {SET, *out.robot.manifest.overlays}
+            )
     if out.robot is not None:
         registry.choose(out.robot.manifest.messages)  # profiles may have had others
     if out.robot is not None and not out.report.has_errors:
@@ -196,62 +183,18 @@ def _steps_to_read(sources: Mapping[str, str]) -> int:
     return max(sum(map(len, sources.values())) // STEP_BYTES, values // STEP_VALUES)
 
 
-class TriedProfile(NamedTuple):
-    """A robot with one profile: where that is written, what was found, and what it removes; None if it has no robot."""
-
-    span: Span
-    findings: list[Finding]
-    gone: Mapping[str, Span] | None
-    texts: Mapping[str, str]
-    """What was read only with this profile, by file."""
-    needed: frozenset[NeededFile]
-
-
-def _shared(tries: Sequence[Callable[[], TriedProfile]], processes: int) -> list[TriedProfile]:
-    """Return what each of them returns; with several processes, forks of this one take their share.
-
-    A process with threads tries all itself: a fork has none of them, and what they have locked stays so.
-    """
-    shares = max(1, min(processes, len(tries))) if active_count() == 1 else 1
-    forks = [_forked(tries[share::shares]) for share in range(1, shares)]
-    found = [[attempt() for attempt in tries[::shares]]]
-    for share, (pid, pipe) in enumerate(forks, 1):
-        with os.fdopen(pipe, "rb") as file:
-            data = file.read()
-        _, status = os.waitpid(pid, 0)
-        found.append([attempt() for attempt in tries[share::shares]] if status else pickle.loads(data))  # noqa: S301 - our own
-    return [found[number % shares][number // shares] for number in range(len(tries))]
-
-
-def _forked(tries: Sequence[Callable[[], TriedProfile]]) -> tuple[int, int]:
-    """Return the id of a process that tries these, and the pipe where it writes what they return."""
-    reading, writing = os.pipe()
-    if pid := os.fork():
-        os.close(writing)
-        return pid, reading
-    status = 1  # then they are tried again, and what is wrong is seen there
-    try:
-        data = pickle.dumps([attempt() for attempt in tries])
-        with os.fdopen(writing, "wb") as file:
-            file.write(data)
-        status = 0
-    finally:
-        os._exit(status)  # nothing of the other process ends here
-
-
-def _report_profile(tried: TriedProfile, out: Compilation, above: Set[str]) -> None:
+def _report_profile(profile: Span, tried: Compilation, out: Compilation, above: Set[str]) -> None:
     """Add the findings that only a profile causes, in its own text or in the robot's files.
 
     `above` names the layers that override profiles: their values were chosen without this profile.
     """
-    profile = tried.span
     known = {(finding.code, finding.span) for finding in out.report}
-    new = [one for one in tried.findings if (one.code, one.span) not in known]
-    if out.robot and tried.gone is not None:
+    new = [one for one in tried.report if (one.code, one.span) not in known]
+    if out.robot and tried.robot:
         ends = ((name, end.instance) for end in out.robot.ends for name in (end.skill, end.topic) if name)
-        new = list(with_removals(new, tried.gone, ends))
-    more = tried.texts.keys() - out.sources.keys()  # a mission that only this profile has
-    out.sources.update({file: tried.texts[file] for file in sorted(more)})
+        new = list(with_removals(new, tried.robot.manifest.history, profile, ends))
+    more = tried.sources.keys() - out.sources.keys() - {PROFILE, SET}  # a mission that only this profile has
+    out.sources.update({file: tried.sources[file] for file in sorted(more)})
     for finding in new:
         span = finding.span
         if span is None or span.file not in out.sources or span.file in above:

@@ -228,19 +228,15 @@ def without_half_entries(
     ]
 
 
-def removed_by(profile: Span, history: History) -> Mapping[str, Span]:
-    """Return what a profile removes, by name, each with the place that says so."""
-    gone = (item for section in sections_in_use() for item in history.removed(section.name).items())
-    return {name: span for name, span in gone if profile.contains(span)}
-
-
 def with_removals(
-    findings: Iterable[Finding], gone: Mapping[str, Span], ends: Iterable[tuple[str, str]]
+    findings: Iterable[Finding], history: History, profile: Span, ends: Iterable[tuple[str, str]]
 ) -> Iterator[Finding]:
-    """Yield what only a profile causes: one finding for each thing that is `gone`, instead of those about its absence.
+    """Yield what only a profile causes: one finding for each thing that it removes, instead of those about its absence.
 
     `ends` are the topics and skills of the robot without the profile, each with its component.
     """
+    gone = {name: span for section in sections_in_use() for name, span in history.removed(section.name).items()}
+    gone = {name: span for name, span in gone.items() if profile.contains(span)}
     owners = {name: name for name in gone} | {name: component for name, component in ends if component in gone}
     users: dict[str, list[Finding]] = {}
     for finding in findings:

@@ -87,7 +87,7 @@ def check_file(
             sets=sets,
             real=real,
             environment=environment or {},
-            processes=1,
+            tries_profiles=True,
         )
     )
 

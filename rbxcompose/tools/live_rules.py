@@ -84,5 +84,5 @@ def _compiled(
         environment=os.environ,
         unsaved=unsaved,
         outside=NOTHING if placed is None else placed[1].robot.outside,
-        processes=int(bool(unsaved)),  # what is about to be saved must not break a profile that runs another day
+        tries_profiles=bool(unsaved),  # what is about to be saved must not break a profile that runs another day
     )

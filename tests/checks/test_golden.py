@@ -36,7 +36,7 @@ def test_what_a_check_says_is_its_golden_text(
         with subtests.test(code):
             robot = Path(f"{code}.yaml")
             real = "# check: --real" in robot.read_text(encoding="utf-8")
-            out = compile_robot(str(robot), real=real, environment={}, processes=1)
+            out = compile_robot(str(robot), real=real, environment={}, tries_profiles=True)
             assert {finding.code for finding in out.report} == {code}
             golden.check(f"{code}.txt", render_text(out.report, out.sources))
 

@@ -57,7 +57,7 @@ def compiled(path: str, environment: dict[str, str]) -> dict[str, object]:
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     limit = pages * resource.getpagesize() + MEMORY
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    out = compile_robot(path, environment=environment, processes=1)
+    out = compile_robot(path, environment=environment, tries_profiles=True)
     written = [renderer(name)(out.report, out.sources, False) for name in FORMATS]
     findings = list(out.report)
     return {

@@ -152,7 +152,7 @@ def run(case: Case, folder: Path) -> Outcome:
         sets=[value for option, value in options if option == "--set"],
         real=("--real", "") in options,
         environment=environment,
-        processes=1,
+        tries_profiles=True,
     )
     return Outcome(case, frozenset(_mark(finding) for finding in out.report), tuple(out.report))
 

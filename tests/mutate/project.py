@@ -78,7 +78,7 @@ class Project:
     def compile(self, robot: str) -> Compilation:
         """Compile one robot, and write its findings in every format, or its plan."""
         started = time.process_time()
-        out = compile_robot(str(self.folder / robot), environment={}, processes=1)
+        out = compile_robot(str(self.folder / robot), environment={}, tries_profiles=True)
         assert (out.plan is None) == out.report.has_errors
         for finding in out.report:
             assert finding.message, finding

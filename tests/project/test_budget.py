@@ -35,7 +35,7 @@ ROOMS: dict[str, Cost] = {
     "base": Cost(code=3797, files=25, small=3, imports=215),
     "bus": Cost(code=2382, files=17, small=0, imports=160),
     "commands": Cost(code=2566, files=24, small=3, imports=320),
-    "compiler": Cost(code=7826, files=53, small=1, imports=884),
+    "compiler": Cost(code=7783, files=53, small=1, imports=878),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
     "domains/arms": Cost(code=12768, files=64, small=1, imports=1106),
     "domains/bases": Cost(code=2089, files=16, small=0, imports=193),
@@ -62,10 +62,10 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 112906,
-    "files": 753,
+    "lines of code": 112863,
+    "files": 749,
     "files of 1 to 30 lines of code": 42,
-    "lines of imports": 10362,
+    "lines of imports": 10356,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 369,

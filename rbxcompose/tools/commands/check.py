@@ -80,13 +80,13 @@ def run(arguments: argparse.Namespace) -> int:
 def _check(wanted: Targets, arguments: argparse.Namespace) -> CheckedRobots:
     checked = CheckedRobots()
     for robot in wanted.robots:
-        checked.add(compiled(robot, arguments, processes=len(os.sched_getaffinity(0))))
+        checked.add(compiled(robot, arguments, tries_profiles=True))
     for robot, overlay in wanted.overlays:
-        one = compiled(robot, arguments, overlay, processes=len(os.sched_getaffinity(0)))
+        one = compiled(robot, arguments, overlay, tries_profiles=True)
         one.report = _new(one.report, checked.report)
         checked.add(one)
     for robot in wanted.users:
-        one = compiled(robot, arguments, processes=len(os.sched_getaffinity(0)))
+        one = compiled(robot, arguments, tries_profiles=True)
         if any(file in one.sources for file in wanted.files):
             checked.add(one)
     if wanted.tests:

@@ -167,7 +167,7 @@ class MissionHome:
         if text is None:
             return False
         unsaved = {self.file: text.removeprefix("\ufeff").replace("\r\n", "\n")}
-        after = compile_robot(str(self.file), environment=os.environ, unsaved=unsaved, processes=1)
+        after = compile_robot(str(self.file), environment=os.environ, unsaved=unsaved, tries_profiles=True)
         if after.plan is None or after.robot is None or answers.name not in after.robot.missions:
             return False
         if before != read_regular(self.file, FILE_BYTES):

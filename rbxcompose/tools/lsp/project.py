@@ -152,7 +152,7 @@ class Project:
     def _compile(self, path: Path) -> None:
         if self.is_outdated():
             raise OutdatedError
-        made = compile_robot(str(path), environment=self.environment, unsaved=self.unsaved, processes=1)
+        made = compile_robot(str(path), environment=self.environment, unsaved=self.unsaved, tries_profiles=True)
         before = self._watched.get(path)
         files = frozenset({path, *(Path(shown).resolve() for shown in made.sources)})
         # While a text cannot be read, the names of the last readable robot serve best.
@@ -174,7 +174,7 @@ class Project:
     def _overlay_findings(self, path: Path, base: Path) -> list[Finding]:
         """Return the findings in an overlay when it is applied to the robot beside it."""
         made = compile_robot(
-            str(base), overlays=[str(path)], environment=self.environment, unsaved=self.unsaved, processes=1
+            str(base), overlays=[str(path)], environment=self.environment, unsaved=self.unsaved, tries_profiles=True
         )
         return [finding for finding in made.report if finding.span and Path(finding.span.file).resolve() == path]
 

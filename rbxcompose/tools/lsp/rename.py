@@ -245,6 +245,6 @@ def compiler(environment: Mapping[str, str], unsaved: Mapping[Path, str]) -> Com
     """Return a function that compiles a robot with other texts, over those in the editor."""
 
     def compiled(robot: Path, texts: Mapping[Path, str]) -> Compilation:
-        return compile_robot(str(robot), environment=environment, unsaved={**unsaved, **texts}, processes=1)
+        return compile_robot(str(robot), environment=environment, unsaved={**unsaved, **texts}, tries_profiles=True)
 
     return compiled
