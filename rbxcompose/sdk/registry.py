@@ -66,12 +66,13 @@ def _require_handled(cls: type[Component[Any]]) -> None:
 
     A method for several ports may have their common words, such as `on_scan` for `scan_left`.
     """
-    ports: dict[str, Port[Any]] = dict(inspect.getmembers(cls, lambda member: isinstance(member, Port)))
     kinds = {"accept_": ServesAction} | ({"on_": In} if cls.received is Component.received else {})
     for prefix, kind in kinds.items():
         methods = {name.removeprefix(prefix) for name in dir(cls) if name.startswith(prefix)}
+        strangers = sorted(name for name in methods if not isinstance(getattr(cls, name, None), Port))
+        ports = dict(inspect.getmembers(cls, lambda member: isinstance(member, Port))) if strangers else {}
         lacking = [name for name, port in ports.items() if isinstance(port, kind) and name not in methods]
-        for name in sorted(methods - ports.keys()):
+        for name in strangers:
             slips = [port for port in lacking if f"_{name}_" not in f"_{port}_"]
             if near := get_close_matches(name, slips, n=1, cutoff=SIMILAR):
                 wrong = f"{cls.__module__}.{cls.__qualname__}.{prefix}{name}"

@@ -273,6 +273,7 @@ def test_a_board_that_starts_again_while_it_is_unplugged_moves_nothing(
         robot.run(5.0)
         assert robot.status == (0, "rests")
         assert robot.place == pytest.approx(before, abs=1e-3)
+        assert len([text for text in robot.bench.texts() if "the board has started again" in text]) == 1
 
 
 @needs_compiler

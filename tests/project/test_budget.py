@@ -38,7 +38,7 @@ ROOMS: dict[str, Cost] = {
     "compiler": Cost(code=7783, files=53, small=1, imports=878),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
     "domains/arms": Cost(code=12768, files=64, small=1, imports=1106),
-    "domains/bases": Cost(code=2089, files=16, small=0, imports=193),
+    "domains/bases": Cost(code=2091, files=16, small=0, imports=193),
     "domains/body": Cost(code=3568, files=27, small=2, imports=364),
     "domains/console": Cost(code=3547, files=20, small=0, imports=249),
     "domains/devices": Cost(code=1890, files=15, small=0, imports=183),
@@ -55,14 +55,14 @@ ROOMS: dict[str, Cost] = {
     "missions": Cost(code=12008, files=78, small=3, imports=1030),
     "msgs": Cost(code=1557, files=14, small=3, imports=93),
     "runtime": Cost(code=7620, files=38, small=0, imports=673),
-    "sdk": Cost(code=1383, files=8, small=0, imports=159),
+    "sdk": Cost(code=1384, files=8, small=0, imports=159),
     "testing": Cost(code=374, files=5, small=2, imports=55),
     "tools": Cost(code=17501, files=116, small=8, imports=1834),
 }
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 112863,
+    "lines of code": 112866,
     "files": 749,
     "files of 1 to 30 lines of code": 42,
     "lines of imports": 10356,

@@ -166,6 +166,8 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
             self.understood()
             self.last = state
             if state.begins:
+                if self.kept is not None:
+                    self.warn("the board has started again: how far its wheels have turned meanwhile is not known")
                 self.has_begun = True
                 self.odometry.lose_wheels()
             if reason := self.odometry.update(state.left, state.right, self.now):
