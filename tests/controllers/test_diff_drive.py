@@ -303,6 +303,15 @@ def test_settings_that_contradict_each_other_are_a_mistake() -> None:
     assert mistake(odometry={"frame": "odom", "child": "odom"}).startswith("odometry: the frame 'odom'")
 
 
+def driven(model: str = "XL430-W250") -> Rover:
+    """Return a base that has driven along an arc, and stands."""
+    rover = Rover(model)
+    rover.drive(0.2, 0.4, 4.0)
+    rover.command(0.0)
+    rover.advance(1.0)
+    return rover
+
+
 def restarted(rover: Rover, *, loses: float | None = None, turns: float = 0.0) -> Rover:
     """Let the driver fail and start again, with its servos where they are, or at `loses` [ticks] as after a power cut.
 
@@ -323,10 +332,7 @@ def restarted(rover: Rover, *, loses: float | None = None, turns: float = 0.0) -
 @pytest.mark.parametrize("model", ["XL430-W250", *rare("MX-28")])
 @pytest.mark.parametrize("turns", [0.0, 700.0])
 def test_after_a_restart_odometry_goes_on_by_what_the_wheels_have_turned_since(model: str, turns: float) -> None:
-    rover = Rover(model)
-    rover.drive(0.2, 0.4, 4.0)
-    rover.command(0.0)
-    rover.advance(1.0)
+    rover = driven(model)
     sure = rover.told[-1].pose.covariance
     before, way = rover.pose, turns * rover.servos[0].model.per_tick * RADIUS
     restarted(rover, turns=turns)
@@ -338,10 +344,7 @@ def test_after_a_restart_odometry_goes_on_by_what_the_wheels_have_turned_since(m
 
 
 def test_after_a_restart_of_driver_and_servos_odometry_goes_on_where_it_was_and_that_is_said() -> None:
-    rover = Rover()
-    rover.drive(0.2, 0.4, 4.0)
-    rover.command(0.0)
-    rover.advance(1.0)
+    rover = driven()
     before = rover.pose
     restarted(rover, loses=2048.0)
     assert rover.pose.distance(before) < 0.003
@@ -353,10 +356,7 @@ def test_after_a_restart_of_driver_and_servos_odometry_goes_on_where_it_was_and_
 
 
 def test_other_settings_of_a_bus_leave_the_base_where_it_is() -> None:
-    rover = Rover()
-    rover.drive(0.2, 0.4, 4.0)
-    rover.command(0.0)
-    rover.advance(1.0)
+    rover = driven()
     before = rover.pose
     rover.bench.host.prepare([instance("servos", "servo_bus", wheels("XL430-W250", max_speed=0.3))])
     rover.bench.host.activate(["servos"])

@@ -38,7 +38,7 @@ ROOMS: dict[str, Cost] = {
     "compiler": Cost(code=7783, files=53, small=1, imports=878),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
     "domains/arms": Cost(code=12768, files=64, small=1, imports=1106),
-    "domains/bases": Cost(code=2091, files=16, small=0, imports=193),
+    "domains/bases": Cost(code=2097, files=16, small=0, imports=193),
     "domains/body": Cost(code=3568, files=27, small=2, imports=364),
     "domains/console": Cost(code=3547, files=20, small=0, imports=249),
     "domains/devices": Cost(code=1890, files=15, small=0, imports=183),
@@ -62,7 +62,7 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 112866,
+    "lines of code": 112872,
     "files": 749,
     "files of 1 to 30 lines of code": 42,
     "lines of imports": 10356,

@@ -293,13 +293,6 @@ class OdometryRecord:
     covariance: tuple[float, ...]
     """Of x [m], y [m], heading [rad], row by row."""
 
-    def is_news(self, kept: OdometryRecord | None, *, is_at_rest: bool) -> bool:
-        """Return whether the base has moved so far since `kept` that this one is worth keeping."""
-        if kept is None:
-            return True
-        step, (way, turn) = kept.pose.inverse().compose(self.pose), KEPT_AT_REST if is_at_rest else KEPT
-        return math.hypot(step.x, step.y) > way or abs(step.heading) > turn
-
 
 class WheelOdometry:
     """Adds up exact arcs between readings: rolling wheels whose speeds keep their ratio lose nothing.
@@ -408,6 +401,38 @@ class WheelOdometry:
         )
         noise = self.policy.variance_per_metre * np.diag([abs(left), abs(right)])
         self.covariance = by_pose @ self.covariance @ by_pose.T + by_wheels @ noise @ by_wheels.T
+
+
+class OdometryKeeper:
+    """What the supervisor keeps of an odometry, for a base that starts again; until then that base reports no place."""
+
+    def __init__(self, odometry: WheelOdometry, *, is_again: bool) -> None:
+        self._odometry = odometry
+        self.kept: OdometryRecord | None = None
+        self._reports_from = math.inf if is_again else -math.inf
+
+    def start(self, now: float) -> None:
+        """Wait no longer than `PATIENCE` from `now` [s]: there may be nothing to recall."""
+        self._reports_from = min(self._reports_from, now + PATIENCE)
+
+    def may_report(self, now: float) -> bool:
+        """Return whether the place can be reported at `now` [s]."""
+        return now >= self._reports_from
+
+    def recall(self, record: OdometryRecord) -> None:
+        """Go on where the base was before it started again."""
+        self.kept, self._reports_from = record, -math.inf
+        self._odometry.go_on_from(record)
+
+    def news(self, *, is_at_rest: bool) -> OdometryRecord | None:
+        """Return where the base is, if it has moved so far that this is to be kept, else None."""
+        record = self._odometry.record
+        if record is not None and self.kept is not None:
+            step, (way, turn) = self.kept.pose.inverse().compose(record.pose), KEPT_AT_REST if is_at_rest else KEPT
+            if math.hypot(step.x, step.y) <= way and abs(step.heading) <= turn:
+                return None
+        self.kept = record or self.kept
+        return record
 
 
 def odometry_message(known: WheelOdometry, header: Header, child: str) -> Odometry:

@@ -16,8 +16,8 @@ from rbxcompose.base.requests import Command
 from rbxcompose.domains.bases import wheel_board
 from rbxcompose.domains.bases.driving import drives
 from rbxcompose.domains.bases.wheels import (
-    PATIENCE,
     BaseLimits,
+    OdometryKeeper,
     OdometryPolicy,
     OdometryRecord,
     WheelDrive,
@@ -120,8 +120,7 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
         fastest = self.geometry.fastest(Velocity2(config.max_speed, config.max_turn_rate)) * tick
         policy = OdometryPolicy(greatest_speed=JUMP * fastest, resolution=tick, window=AVERAGED)
         self.odometry = WheelOdometry(self.geometry, policy)
-        self.kept: OdometryRecord | None = None  # what the supervisor knows of that
-        self.knows_from = math.inf if self.context.is_again else -math.inf  # when it reports its place
+        self.keeper = OdometryKeeper(self.odometry, is_again=self.context.is_again)
         self.has_begun = False  # the board has started since this component has
         self.last: wheel_board.BoardState | None = None
         self.was_alive = False
@@ -130,20 +129,19 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
 
     def start(self) -> None:
         """Report the place soon, also if there was none to recall."""
-        self.knows_from = min(self.knows_from, self.now + PATIENCE)
+        self.keeper.start(self.now)
 
     def take_over(self, old: Self) -> None:
         """Go on where a base with other settings was."""
-        if record := old.odometry.record or old.kept:
+        if record := old.odometry.record or old.keeper.kept:
             self.recall(RecallOdometry(record))
 
     @sdk.answers(RecallOdometry)
     def recall(self, request: RecallOdometry) -> str:
         """Go on where the base was before the restart."""
-        self.odometry.go_on_from(request.record)
+        self.keeper.recall(request.record)
         if self.has_begun:
             self.odometry.lose_wheels()
-        self.kept, self.knows_from = request.record, -math.inf
         return "odometry goes on from before the restart"
 
     @property
@@ -166,22 +164,16 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
             self.understood()
             self.last = state
             if state.begins:
-                if self.kept is not None:
+                if self.keeper.kept is not None:
                     self.warn("the board has started again: how far its wheels have turned meanwhile is not known")
                 self.has_begun = True
                 self.odometry.lose_wheels()
             if reason := self.odometry.update(state.left, state.right, self.now):
                 self.faults["jumps of wheels"] += "jumped" in reason
-            if self.now >= self.knows_from:
+            if self.keeper.may_report(self.now):
                 self.publish(state)
-                self.keep()
-
-    def keep(self) -> None:
-        """Let the supervisor know where the base is, if that is news."""
-        record = self.odometry.record
-        if record is not None and record.is_news(self.kept, is_at_rest=self.drive.at_rest):
-            self.kept = record
-            self.context.repeat([RecallOdometry(record)])
+                if news := self.keeper.news(is_at_rest=self.drive.at_rest):
+                    self.context.repeat([RecallOdometry(news)])
 
     def publish(self, state: wheel_board.BoardState) -> None:
         """Publish the odometry and the battery."""

@@ -14,8 +14,8 @@ from rbxcompose.base.geometry import Velocity2
 from rbxcompose.base.requests import from_data
 from rbxcompose.domains.bases.driving import drives
 from rbxcompose.domains.bases.wheels import (
-    PATIENCE,
     BaseLimits,
+    OdometryKeeper,
     OdometryPolicy,
     OdometryRecord,
     WheelDrive,
@@ -171,8 +171,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
         spread = config.odometry.variance_per_metre
         policy = OdometryPolicy(spread, JUMP * fastest, radius * tick, AVERAGED, OVERRUN * fastest)
         self.odometry = WheelOdometry(rolling, policy, self.site.start)
-        self.kept: OdometryRecord | None = None  # what is known of that after a restart
-        self.knows_from = math.inf if self.site.is_again else -math.inf  # when it reports its place
+        self.keeper = OdometryKeeper(self.odometry, is_again=self.site.is_again)
         self.seen = -math.inf  # when both wheels had been measured last [s]
         self.refused = self.trouble = ""
 
@@ -239,21 +238,19 @@ class DiffDriveController(Controller[DiffDriveConfig]):
 
     def start(self) -> None:
         """Report the place soon, also if there was none to recall."""
-        self.knows_from = min(self.knows_from, self.site.now + PATIENCE)
+        self.keeper.start(self.site.now)
 
     def recall(self, memory: Any) -> None:
         """Go on where the base was before a restart."""
-        self.kept, self.knows_from = from_data(OdometryRecord, memory), -math.inf
-        self.odometry.go_on_from(self.kept)
+        self.keeper.recall(from_data(OdometryRecord, memory))
 
     def publish(self) -> None:
         """Publish where the base is, and how it moves."""
         odometry, known = self.config.odometry, self.odometry
-        if self.site.now < self.knows_from:
+        if not self.keeper.may_report(self.site.now):
             return
-        if (record := known.record) is not None and record.is_news(self.kept, is_at_rest=self.drive.at_rest):
-            self.kept = record
-            self.site.keep(record)
+        if news := self.keeper.news(is_at_rest=self.drive.at_rest):
+            self.site.keep(news)
         header = Header(stamp=to_time(self.site.stamp), frame_id=odometry.frame)
         self.site.send("odometry", odometry_message(known, header, odometry.child))
         if odometry.tf:
