@@ -27,11 +27,14 @@ from rbxcompose.domains.policies.components.policy import (
     observed,
 )
 from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.msgs.nav2_msgs import Wait
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.sensor_msgs import JointState
+from rbxcompose.msgs.stamps import to_duration
 from rbxcompose.msgs.std_msgs import Float32, Float64MultiArray
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory
+from rbxcompose.sdk import Ended, Outcome, SentGoal
 from rbxcompose.testing import Bench, instance
 from tests.policies.networks import network
 
@@ -254,6 +257,104 @@ def test_it_is_off_until_it_is_switched_on_and_after_a_stop(tmp_path: Path) -> N
     assert (0.2, 0.1) in driving.wish(0.2, 0.5)
     assert driving.switch(on=False).success
     assert driving.wish(0.2, 0.5) == [(0.0, 0.0)], "it rests once"
+
+
+class Running(Driving):
+    """A policy that is off, and runs for a goal."""
+
+    def __init__(self, folder: Path, **config: Any) -> None:
+        super().__init__(folder, starts=False, **config)
+        self.client = self.bench.bus.action_client("bench", "/run_policy", Wait)
+        self.ended: list[Ended[Wait.Result]] = []
+        self.bench.advance(0.1)
+
+    def run(self, seconds: float) -> SentGoal:
+        return self.client(Wait.Goal(time=to_duration(seconds)), self.ended.append)
+
+    @property
+    def ends(self) -> list[tuple[Outcome, str]]:
+        return [(end.outcome, end.message or (end.result.error_msg if end.result else "")) for end in self.ended]
+
+
+def test_a_goal_runs_it_for_a_time_and_leaves_it_off_and_at_rest(tmp_path: Path) -> None:
+    running = Running(tmp_path)
+    running.run(2.0)
+    assert (0.2, 0.1) in running.wish(0.2, 1.8)
+    assert running.ends == []
+    assert running.wish(0.2, 0.5)[-1] == (0.0, 0.0)
+    assert running.ends == [(Outcome.SUCCEEDED, "")]
+    assert running.ended[0].result == Wait.Result(total_elapsed_time=to_duration(2.0))
+    assert running.wish(0.2, 0.5) == []
+
+
+def test_a_goal_that_is_cancelled_leaves_it_off_though_it_had_been_switched_on(tmp_path: Path) -> None:
+    running = Running(tmp_path)
+    assert running.switch(on=True).success
+    goal = running.run(60.0)
+    assert (0.2, 0.1) in running.wish(0.2, 1.0)
+    goal.cancel()
+    assert running.wish(0.2, 0.5)[-1] == (0.0, 0.0)
+    assert [outcome for outcome, _ in running.ends] == [Outcome.CANCELED]
+    assert running.wish(0.2, 0.5) == []
+
+
+def test_a_newer_goal_replaces_an_older_one_and_has_its_own_time(tmp_path: Path) -> None:
+    running = Running(tmp_path)
+    running.run(1.0)
+    running.wish(0.2, 0.8)
+    running.run(2.0)
+    assert (0.2, 0.1) in running.wish(0.2, 1.5)
+    assert [outcome for outcome, _ in running.ends] == [Outcome.ABORTED]
+    running.wish(0.2, 1.0)
+    assert [outcome for outcome, _ in running.ends] == [Outcome.ABORTED, Outcome.SUCCEEDED]
+
+
+def test_a_paused_goal_rests_and_keeps_its_time(tmp_path: Path) -> None:
+    running = Running(tmp_path)
+    running.run(2.0)
+    running.wish(0.2, 1.0)
+    pause = running.bench.bus.client("bench", "/run_policy/pause", SetBool)
+    pause(SetBool.Request(data=True), lambda _: None)
+    assert running.wish(0.2, 5.0)[-1] == (0.0, 0.0)
+    pause(SetBool.Request(data=False), lambda _: None)
+    assert (0.2, 0.1) in running.wish(0.2, 0.8)
+    assert running.ends == []
+    running.wish(0.2, 0.5)
+    assert [outcome for outcome, _ in running.ends] == [Outcome.SUCCEEDED]
+
+
+def test_a_goal_fails_with_the_reason_when_nothing_can_be_sent_or_it_is_switched_off(tmp_path: Path) -> None:
+    running = Running(tmp_path)
+    running.run(60.0)
+    running.wish(0.2, 1.0)
+    running.bench.advance(3.0)
+    assert running.ends == [(Outcome.ABORTED, "nothing comes on 'wish'")]
+    assert running.wish(0.2, 0.5) == []
+    running.run(60.0)
+    running.wish(0.2, 1.0)
+    assert running.switch(on=False).success
+    running.wish(0.2, 0.5)
+    assert running.ends[1:] == [(Outcome.ABORTED, "the policy has been switched off")]
+
+
+def test_a_goal_needs_a_robot_that_may_move_and_a_network(tmp_path: Path) -> None:
+    running = Running(tmp_path)
+    running.bench.host.stop()
+    running.run(5.0)
+    running.bench.advance(0.2)
+    assert [outcome for outcome, _ in running.ends] == [Outcome.REJECTED]
+    running.bench.host.release()
+    running.run(5.0)
+    assert (0.2, 0.1) in running.wish(0.2, 1.0)
+    running.bench.host.stop()
+    running.bench.advance(0.2)
+    running.bench.host.release()
+    assert running.wish(0.2, 0.5) == []
+    assert [outcome for outcome, _ in running.ends[1:]] == [Outcome.CANCELED]
+    lacking = Running(tmp_path, model=str(tmp_path / "nowhere.onnx"))
+    lacking.run(5.0)
+    lacking.bench.advance(0.2)
+    assert lacking.ends == [(Outcome.ABORTED, f"there is no file '{tmp_path / 'nowhere.onnx'}'")]
 
 
 @pytest.mark.parametrize("is_replaced", [False, True])

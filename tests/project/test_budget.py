@@ -45,7 +45,7 @@ ROOMS: dict[str, Cost] = {
     "domains/diagnostics": Cost(code=2348, files=23, small=4, imports=210),
     "domains/muxes": Cost(code=2120, files=13, small=1, imports=132),
     "domains/navigation": Cost(code=4080, files=27, small=2, imports=382),
-    "domains/policies": Cost(code=845, files=6, small=0, imports=72),
+    "domains/policies": Cost(code=889, files=6, small=0, imports=73),
     "domains/power": Cost(code=439, files=5, small=0, imports=31),
     "domains/programs": Cost(code=3800, files=26, small=0, imports=372),
     "domains/servos": Cost(code=7847, files=47, small=2, imports=559),
@@ -62,10 +62,10 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 112872,
+    "lines of code": 112916,
     "files": 749,
     "files of 1 to 30 lines of code": 42,
-    "lines of imports": 10356,
+    "lines of imports": 10357,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 369,

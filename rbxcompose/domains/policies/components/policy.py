@@ -24,7 +24,8 @@ from rbxcompose.msgs.arrays import filled
 from rbxcompose.msgs.definitions import FieldShape
 from rbxcompose.msgs.fields import NoFieldError, field_type
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
-from rbxcompose.msgs.stamps import to_duration
+from rbxcompose.msgs.nav2_msgs import Wait
+from rbxcompose.msgs.stamps import to_duration, to_seconds
 from rbxcompose.msgs.std_msgs import Float64MultiArray
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
@@ -40,6 +41,7 @@ JOINTS, NUMBERS, VELOCITY = JointTrajectory.TYPE, Float64MultiArray.TYPE, Twist.
 MESSAGES: Mapping[str, type[Message]] = {JOINTS: JointTrajectory, NUMBERS: Float64MultiArray, VELOCITY: Twist}
 AXES = tuple(f"{kind}.{axis}" for kind in ("linear", "angular") for axis in "xyz")
 PERIODS = 2.0  # of the rate, in which joints arrive if nothing else is said
+PATIENCE = 2.0  # [s] beyond the deadline, in which a goal waits for an answer that can be sent
 
 
 class PolicyNetworkError(ValueError):
@@ -340,6 +342,8 @@ class PolicyConfig(sdk.Config):
     """What its answers command."""
     switch: TopicName = "policy/enable"
     """The service that switches it on and off."""
+    action: TopicName = "run_policy"
+    """The action that runs it for a time; its last word is the skill of missions."""
     starts: bool = False
     """Whether it is on as soon as the robot is up; after a stop, a failure, or `apply` of other settings it is off."""
 
@@ -378,8 +382,9 @@ def positions_in(observes: list[ObservationConfig]) -> dict[str, tuple[int, int]
 class Policy(sdk.Component[PolicyConfig]):
     """Runs a network in ONNX that observes joints or other numbers, and commands a controller or an input of a mux.
 
-    Nothing is sent that is late, not finite, or beyond the limits of `outputs`. It is off until its service, such as
-    the skill `enable`, switches it on.
+    Nothing is sent that is late, not finite, or beyond the limits of `outputs`. The skill `run_policy: 30 s` runs it
+    for a time and leaves it off, and fails where no answer can be sent. Its service, such as the skill `enable`,
+    switches it on until something switches it off.
 
     Example:
         reach: {type: policy, model: /opt/models/reach.onnx,
@@ -409,6 +414,7 @@ class Policy(sdk.Component[PolicyConfig]):
             **inputs,
             "commands": commands.named("commands"),
             "switch": sdk.Serves(SetBool, config.switch).named("switch"),
+            "run": sdk.ServesAction(Wait, config.action, claims=_claimed(config.commands), pausable=True).named("run"),
         }
 
     @classmethod
@@ -434,6 +440,8 @@ class Policy(sdk.Component[PolicyConfig]):
         self.observations = _observed(config)
         self.newest: dict[str, tuple[float, Any]] = {}
         self.is_on, self.problem = False, ""
+        self.goal: sdk.ServedGoal[Wait.Goal, Wait.Result, Wait.Feedback] | None = None
+        self.ran, self.awaits = 0.0, 0.0  # [s] how long the goal has run, and since when it waits for an answer
         self.begins = config.starts and not self.context.is_again
         self.network: PolicyNetwork | None = None
         try:
@@ -467,16 +475,58 @@ class Policy(sdk.Component[PolicyConfig]):
 
     def step(self, dt: float) -> None:
         """Ask the network, and send its answer if that may be."""
+        self.begin_goal()
         if self.network is None:
             self.status(Level.ERROR, self.problem)
+            if self.goal is not None:
+                self.goal.aborted(self.problem)
             return
-        problem = self.ask(self.network) if self.is_on else ""
+        is_paused = self.goal is not None and self.goal.is_paused
+        if is_paused:
+            self.rest()
+            self.awaits = self.now
+        problem = self.ask(self.network) if self.is_on and not is_paused else ""
         if self.core.must_rest(self.now):
             self.send_rest()
+        if self.goal is not None:
+            self.ran += 0.0 if is_paused else dt
+            self.pursue(self.goal, problem)
         words = problem or ("sends" if self.is_on else "is off")
         is_silent = bool(problem) and self.core.last is None
         level = Level.ERROR if is_silent else Level.WARN if problem else Level.OK
         self.status(level, words, **self.core.counts)
+
+    def begin_goal(self) -> None:
+        """Be on as soon as there is a goal; a newer one replaces it."""
+        goal = self.bound["run"].current
+        if goal is not self.goal:
+            self.goal, self.ran, self.awaits = goal, 0.0, self.now
+            self.is_on = goal is not None
+            if goal is None:
+                self.rest()
+
+    def pursue(self, goal: sdk.ServedGoal[Wait.Goal, Wait.Result, Wait.Feedback], problem: str) -> None:
+        """End a goal that is over, and be off with it."""
+        left = to_seconds(goal.request.time) - self.ran
+        if goal.cancel_requested:
+            self.end_goal()
+            goal.canceled()
+        elif not self.is_on:
+            self.end_goal()
+            goal.aborted("the policy has been switched off")
+        elif left < ROUNDING:
+            self.end_goal()
+            goal.succeeded(Wait.Result(total_elapsed_time=to_duration(self.ran)))
+        elif self.now - max(self.core.sent_at, self.awaits) > self.config.deadline + PATIENCE:
+            self.end_goal()
+            goal.aborted(problem)
+        else:
+            goal.feedback(Wait.Feedback(time_left=to_duration(left)))
+
+    def end_goal(self) -> None:
+        """Be off, at rest, and without a goal."""
+        self.goal = None
+        self.stop()
 
     def ask(self, network: PolicyNetwork) -> str:
         """Send the answer to what is observed now; return why not, or nothing."""
@@ -561,6 +611,11 @@ class Policy(sdk.Component[PolicyConfig]):
 def _observed(config: PolicyConfig) -> dict[str, ObservationConfig]:
     """Return the observations by the names of their ports."""
     return {f"observed_{number}": seen for number, seen in enumerate(config.observes, 1)}
+
+
+def _claimed(commands: PolicyCommandsConfig) -> str:
+    """Return what a goal claims: the base, or the controller or mux that it commands."""
+    return "base" if commands.message == VELOCITY else commands.topic.partition("/")[0]
 
 
 def _quality(config: PolicyConfig) -> str:
