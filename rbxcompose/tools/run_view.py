@@ -2,11 +2,11 @@
 
 import os
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from rbxcompose.base.findings import Report
 from rbxcompose.base.levels import Level
-from rbxcompose.commands.console import emit, good, has_colour, refuse, write_report
+from rbxcompose.commands.console import emit, good, has_colour, refuse
 from rbxcompose.commands.lookup import ALREADY_UP, UNSAFE
 from rbxcompose.commands.targets import missing_extras
 from rbxcompose.compiler.model.robot import Robot
@@ -124,12 +124,11 @@ class _Watch:
                 return exit_code or (INTERRUPTED if self._options.is_detached and not self._is_up else 0)
 
 
-def is_fit(robot: Robot, sources: Mapping[str, str]) -> bool:
-    """Tell what is wrong with this machine for a robot, and return whether it may start."""
+def machine_findings(robot: Robot) -> Report:
+    """Return what is wrong with this machine for a robot."""
     report = Report([*missing_extras(robot), *port_findings(robot, serial_ports(), look_at)])
     report.extend(program_findings(robot, os.environ, ask_for_real))
-    write_report(report, sources)
-    return not report.has_errors
+    return report
 
 
 def real_time_only(robot: Robot) -> list[str]:

@@ -5,8 +5,10 @@ import json
 import os
 import socket
 import sys
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from rbxcompose.base.findings import Finding, Report, kind
@@ -22,17 +24,19 @@ from rbxcompose.compiler.systems.model import PlacedRobot, System
 from rbxcompose.compiler.systems.share import exchange_of, robots_on, share_of
 from rbxcompose.runtime.folder import ChosenLayers, RobotFolder, RunOptions
 from rbxcompose.runtime.supervision.plan_change import Fate
+from rbxcompose.runtime.supervision.supervisor import SERVICE_MANAGER
 from rbxcompose.tools.commands.security import certificate_findings
 from rbxcompose.tools.inspection.plan_text import changes_text
 from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import Proposal, carry_out, unsure
-from rbxcompose.tools.run_view import is_fit, run_plan
+from rbxcompose.tools.run_view import machine_findings, run_plan
 
 WHICH_HOST = kind("RBX6110")
 OTHER_MACHINE = kind("RBX6111")
 WHICH_ROBOT = kind("RBX6112")
 REFUSED_THERE = kind("RBX6128")
 Key = tuple[str, str]  # host and robot
+_LOOK = 1.0  # [s] between two examinations of a machine that lacks something
 
 
 def _bundle(system: System) -> Bundle:
@@ -117,13 +121,8 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
         return refuse(ALREADY_UP.at(None, f"already up: {up}", help=help_text))
     for robot in chosen:
         plan = planned(system, robot, arguments.host)
-        if not is_fit(_here(robot, arguments.host), system.sources):
+        if not _is_ready(partial(_machine_findings, plan, system, robot, arguments.host, path), system.sources):
             return FINDINGS
-        write_report(found := _certificate_findings(plan, system, arguments.host, path), {})
-        if found.has_errors:
-            return FINDINGS
-        if (problem := _address_problem(plan, arguments.host)) is not None:
-            return refuse(problem)
         own = replace(options, layers=layers_of(system, robot, real=arguments.real))
         if (exit_code := run_plan(plan, own, LiveRules(robot.robot, (system, robot)))) or not options.is_detached:
             return exit_code
@@ -186,9 +185,26 @@ def planned(system: System, robot: PlacedRobot, host: str) -> Plan:
     return replace(plan, share=share, exchange=replace(exchange, tls=tls) if exchange else None)
 
 
-def _certificate_findings(plan: Plan, system: System, host: str, path: str) -> Report:
-    tls = (plan.share and plan.share.tls) or (plan.exchange and plan.exchange.tls)
-    return Report([*certificate_findings(tls, common_name(system.name, host), path)]) if tls else Report()
+def _is_ready(examine: Callable[[], Report], sources: Mapping[str, str]) -> bool:
+    """Show what this machine lacks for its share, and return whether it may start.
+
+    A service manager starts it with the machine, whose network, clock and devices may come later: then it waits.
+    """
+    write_report(found := examine(), sources)
+    if found.has_errors and SERVICE_MANAGER in os.environ:
+        sys.stderr.write("it starts as soon as this is mended\n")
+        while (found := examine()).has_errors:
+            time.sleep(_LOOK)
+    return not found.has_errors
+
+
+def _machine_findings(plan: Plan, system: System, robot: PlacedRobot, host: str, path: str) -> Report:
+    report = machine_findings(_here(robot, host))
+    if tls := (plan.share and plan.share.tls) or (plan.exchange and plan.exchange.tls):
+        report.extend(certificate_findings(tls, common_name(system.name, host), path))
+    if (problem := _address_problem(plan, host)) is not None:
+        report.add(problem)
+    return report
 
 
 def _address_problem(plan: Plan, host: str) -> Finding | None:

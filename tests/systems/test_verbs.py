@@ -15,6 +15,7 @@ from rbxcompose.commands.console import ReportedError
 from rbxcompose.commands.hosts import Remote, SystemCommand, compiled
 from rbxcompose.commands.main import main
 from rbxcompose.commands.verbs import load, parser_of, verbs
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.manifest.system_file import HostModel
 from rbxcompose.runtime.folder import RobotFolder
@@ -127,6 +128,30 @@ def test_one_that_is_down_beside_others_that_are_up_is_started_by_its_name(
         assert main(["up", "-d", "s.yaml", "--robot", "a"]) == 0
     finally:
         os.close(lock)
+
+
+@pytest.mark.parametrize("is_unit", [False, True])
+def test_a_unit_waits_for_what_its_machine_has_not_yet(
+    is_unit: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lacking = [system_runs.OTHER_MACHINE.at(None, "there is no address yet")] * 3
+    waits, started = list[float](), list[str]()
+    monkeypatch.setattr(system_runs, "_address_problem", lambda *_: lacking.pop() if lacking else None)
+    monkeypatch.setattr("time.sleep", waits.append)
+
+    def start(plan: Plan, *_: object) -> int:
+        started.append(plan.robot)
+        return 0
+
+    monkeypatch.setattr(system_runs, "run_plan", start)
+    monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
+    if is_unit:
+        monkeypatch.setenv("NOTIFY_SOCKET", "/run/systemd/notify")
+    assert main(["up", "s.yaml", "--host", "here", "--robot", "a"]) == (0 if is_unit else 1)
+    assert (len(waits), started) == ((2, ["a"]) if is_unit else (0, []))
+    error = capsys.readouterr().err
+    assert error.count("error[RBX6111]: there is no address yet") == 1
+    assert ("it starts as soon as this is mended" in error) is is_unit
 
 
 def test_over_ssh_only_the_robot_that_is_named_is_started(

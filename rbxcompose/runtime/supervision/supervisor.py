@@ -33,13 +33,15 @@ from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type, declared
 
 READY, ALIVE = b"READY=1", b"WATCHDOG=1"
+SERVICE_MANAGER = "NOTIFY_SOCKET"
+"""Names, in the environment, the socket of the service manager that has started this process."""
 
 
 class ServiceManager:
-    """Sends to the socket in `NOTIFY_SOCKET`; without one, nobody listens."""
+    """Sends to the socket of the `SERVICE_MANAGER`; without one, nobody listens."""
 
     def __init__(self, environment: Mapping[str, str]) -> None:
-        name = environment.get("NOTIFY_SOCKET", "")
+        name = environment.get(SERVICE_MANAGER, "")
         self._address = f"\0{name[1:]}" if name.startswith("@") else name
         self._is_watched = "WATCHDOG_USEC" in environment
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 from rbxcompose.base.units import TIME, UnitError, to_si
 from rbxcompose.commands import targets
-from rbxcompose.commands.console import FINDINGS, misused, refuse
+from rbxcompose.commands.console import FINDINGS, misused, refuse, write_report
 from rbxcompose.commands.formats.json_ import render_json
 from rbxcompose.commands.options import add_system_options, is_system, speed_up
 from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.recording.topics import UNWRITABLE
 from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import LiveReload
-from rbxcompose.tools.run_view import is_fit, real_time_only, run_plan
+from rbxcompose.tools.run_view import machine_findings, real_time_only, run_plan
 
 GROUP = "run"
 IS_COMMON = True
@@ -71,7 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
         return refuse(UNWRITABLE.at(None, problem))
     if options.is_stepped and options.rate is None and options.duration is None and plan.start is None:
         return misused("up", "without 'start:' nothing ends a run at --rate max: give --for")
-    if not is_fit(robot, compilation.sources):
+    write_report(found := machine_findings(robot), compilation.sources)
+    if found.has_errors:
         return FINDINGS
     reload = None
     if arguments.watch:

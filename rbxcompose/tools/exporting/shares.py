@@ -199,7 +199,7 @@ def _lines(share: ExportedShare, program: str, file: str, user: str) -> Iterator
     yield f"ExecStart={_quoted(program)} {words}"
     yield "Restart=on-failure"
     yield "RestartSec=1"
-    yield "RestartPreventExitStatus=1 2 3"  # findings, wrong usage, a failed mission: another try changes none of them
+    yield "RestartPreventExitStatus=1 2 3"  # findings, wrong usage, a failed mission: another try changes none
     yield "SuccessExitStatus=130"
     yield "KillMode=mixed"
     yield f"TimeoutStopSec={share.rest_time + GRACE:g}"
