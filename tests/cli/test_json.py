@@ -41,7 +41,7 @@ MISTAKES = {
     "diag history": "",
     "diag tree": "",
     "diag watch": "",
-    "doctor": "nobody",
+    "doctor": "pyproject.toml",
     "down": "nobody",
     "expand": "nowhere.yaml",
     "explain": "RBX1099",

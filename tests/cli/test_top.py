@@ -221,6 +221,9 @@ def test_the_doctor_looks_at_a_robot_that_is_up(robot: Robot) -> None:
     assert alone["message"] == "/base of 'topped' subscribes to /cmd_vel, which has no publisher"
 
 
-def test_the_doctor_is_told_a_robot_that_is_there(robot: Robot) -> None:
+def test_the_doctor_examines_the_machine_also_if_the_robot_is_not_up(robot: Robot) -> None:
     done = robot.do("doctor", "topper")
-    assert (done.returncode, "did you mean 'topped'?" in done.stderr) == (1, True)
+    assert (done.returncode, "did you mean 'topped'?" in done.stdout) == (1, True)
+    found = json.loads(robot.do("doctor", "topper", "--json").stdout)
+    assert {entry["examination"] for entry in found if entry["level"] == "error"} == {"robots"}
+    assert {"clocks", "devices", "limits", "permissions", "versions"} <= {entry["examination"] for entry in found}

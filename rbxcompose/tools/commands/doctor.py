@@ -1,7 +1,7 @@
 """Examine this machine and the robots that run on it: what is wrong, and what to do about it.
 
-With a robot, by file or name, it examines only that robot, including its devices and secrets. Exit codes: 0 no
-error, 1 errors found, 2 wrong usage.
+With a robot, by file or name, it examines only that robot, including its devices and secrets; if none of this name is
+up, that is an error, and the machine is examined all the same. Exit codes: 0 no error, 1 errors found, 2 wrong usage.
 """
 
 import argparse
@@ -14,7 +14,7 @@ from rbxcompose.base.findings import Finding, Report
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, has_colour, write_report
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.commands.guest import Guest, ReceivedMessage
-from rbxcompose.commands.lookup import add_addressed_robot, find_robot, place_of, robots_up
+from rbxcompose.commands.lookup import NOT_UP, add_addressed_robot, find_robot, place_of, robots_up
 from rbxcompose.commands.messages import to_json
 from rbxcompose.commands.options import EACH, add_json_option
 from rbxcompose.compiler.compile import compile_robot
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Collect the facts, examine them, and report the results."""
     watch = machine.ClockWatch()
-    folders, path = _addressed(arguments.robot or arguments.path)
+    folders, path, lacking = _addressed(arguments.robot or arguments.path)
     file = None if path is None else _described(path)
     if path is not None and file is None:
         return FINDINGS
@@ -58,25 +58,27 @@ def run(arguments: argparse.Namespace) -> int:
         latencies=latency_timers(),
         ports=serial_ports(),
     )
-    answers = examine_all(facts)
+    answers = [*lacking, *examine_all(facts)]
     emit(to_json([result.to_data() for result in answers]) if arguments.json else _text(answers))
     return FINDINGS if has_errors(answers) else 0
 
 
-def _addressed(wanted: str | None) -> tuple[list[RobotFolder], str | None]:
-    """Return the running robots, or the given file, whose robot need not run.
+def _addressed(wanted: str | None) -> tuple[list[RobotFolder], str | None, list[ExaminationResult]]:
+    """Return the running robots, or the given file, whose robot need not run; else what is lacking.
 
     Raises:
-        NotDoneError: if `wanted` is neither.
+        NotDoneError: if it is not clear which robot is `wanted`.
     """
     if wanted is None:
-        return robots_up(), None
+        return robots_up(), None, []
     try:
-        return [find_robot(wanted)], None
-    except NotDoneError:
-        if not os.path.exists(wanted) and not wanted.startswith(PREFIX):
+        return [find_robot(wanted)], None, []
+    except NotDoneError as error:
+        if os.path.exists(wanted) or wanted.startswith(PREFIX):
+            return [], wanted, []
+        if error.finding.code != NOT_UP.code:
             raise
-        return [], wanted
+        return [], None, [ExaminationResult("robots", error.finding)]  # the machine may be why it is not up
 
 
 def _described(path: str) -> Robot | None:
