@@ -6,6 +6,7 @@ import os
 from contextlib import suppress
 from typing import TypeVar
 
+from rbxcompose import __version__
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, kind, suggest
 from rbxcompose.base.requests import Command, Refused, Request
@@ -97,6 +98,13 @@ def known_state(folder: RobotFolder) -> RobotState | None:
         return ask(folder, RobotStatus())
     except (NoAnswerError, Refused):
         return None
+
+
+def version_problem(robot: str, version: str) -> str:
+    """Return that a robot's supervisor runs another version than the one that is installed, or nothing."""
+    if version == __version__:
+        return ""
+    return f"'{robot}' runs rbxcompose {version}, and {__version__} is installed: 'down', then 'up', starts that"
 
 
 def answer_of(folder: RobotFolder, request: Request[A], *, timeout: float = ANSWER) -> A:

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 
+from rbxcompose import __version__
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import TEMPORARY, open_regular, replace_file
 from rbxcompose.base.requests import UnreadableError, from_data, to_data
@@ -190,6 +191,7 @@ class RobotState:
     clocks: Mapping[str, ClockOffset] = field(
         default_factory=dict
     )  # of other hosts of the robot, against that of this one
+    package_version: str = __version__  # of rbxcompose, as the supervisor runs it
 
     def to_text(self) -> str:
         """Return the text of the state file: a checksum, then JSON."""

@@ -283,11 +283,12 @@ def _is_synchronised() -> bool | None:
 
 
 def versions() -> list[Version]:
-    """Return the packages that rbxcompose needs; in a checkout, the lock file is beside the package."""
+    """Return rbxcompose and the packages that it needs; in a checkout, the lock file is beside the package."""
     lock = Path(rbxcompose.__file__).parents[1] / "requirements.lock"
     lines = _LOCKED.findall(lock.read_text(encoding="utf-8")) if lock.is_file() else []
     locked = {_normal(name): version for name, version in lines}
-    return [Version(name, _installed(name), locked.get(_normal(name))) for name in sorted(_needed())]
+    needed = [Version(name, _installed(name), locked.get(_normal(name))) for name in sorted(_needed())]
+    return [Version(NAME, rbxcompose.__version__, None), *needed]
 
 
 def _needed() -> set[str]:

@@ -13,7 +13,7 @@ from typing import Any
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import to_data
 from rbxcompose.commands.console import NotDoneError, emit, misused, refuse, write_report
-from rbxcompose.commands.lookup import REFUSED, answer_of, find_robot
+from rbxcompose.commands.lookup import REFUSED, answer_of, find_robot, known_state, version_problem
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.model.robot import Robot
@@ -47,9 +47,11 @@ class Proposal:
         """Ask the running robot of this name what the plan, compiled with these layers, would change.
 
         Raises:
-            NotDoneError: if none is up, or it does not answer.
+            NotDoneError: if none is up, it does not answer, or it runs another version of rbxcompose.
         """
         folder, text = find_robot(plan.robot), dump(plan, reveals_secrets=True)  # the socket is this user's alone
+        if (state := known_state(folder)) and (problem := version_problem(state.robot, state.package_version)):
+            raise NotDoneError(REFUSED.at(None, problem))
         found = answer_of(folder, ComparePlan(text), timeout=_COMPARE)
         return cls(folder, text, found, layers, with_places(to_data(found), robot))
 

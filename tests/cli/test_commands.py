@@ -10,10 +10,12 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from rbxcompose import __version__
 from rbxcompose.base.levels import Level
 from rbxcompose.base.plugins import file_of
 from rbxcompose.commands import main as command
@@ -43,6 +45,24 @@ def written(name: str, stop: StopState | None = None, supervisor: Process | None
     file = f"/robots/{name}/robot.yaml"
     folder.write_state(RobotState(name, file, gone, {"robot": gone}, (component,), boot=boot_id(), stop=stop))
     return folder
+
+
+def test_a_robot_of_another_version_is_shown_as_such_and_not_changed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(Process, "is_titled", lambda self, prefix: True)
+    folder = written("turtlebot", supervisor=Process.of(os.getpid()))
+    state = folder.read_state()
+    assert state is not None
+    folder.write_state(replace(state, package_version="0.0.9"))
+    words = f"'turtlebot' runs rbxcompose 0.0.9, and {__version__} is installed: 'down', then 'up', starts that"
+    assert command.main(["ps"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == words
+    assert command.main(["apply", str(ROOT / "robots/turtlebot"), "--yes"]) == 1
+    assert f"error[RBX9004]: {words}" in capsys.readouterr().err
+    folder.write_state(state)
+    assert command.main(["ps"]) == 0
+    assert "installed" not in capsys.readouterr().out
 
 
 def test_without_a_command_it_shows_its_usage(capsys: pytest.CaptureFixture[str]) -> None:
@@ -179,6 +199,7 @@ def test_ps_shows_what_a_dead_supervisor_last_wrote(capsys: pytest.CaptureFixtur
     assert json.loads(capsys.readouterr().out) == {
         "robot": "a",
         "supervisor": {"pid": None},
+        "version": __version__,
         "router": {"endpoint": None},
         "stop": None,
         "real": False,

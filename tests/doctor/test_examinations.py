@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose import __version__
 from rbxcompose.base.findings import Finding
 from rbxcompose.base.plugins import Plugins
 from rbxcompose.bus.graph import Graph, GraphEnd, GraphName, WireType
@@ -188,6 +189,13 @@ def test_a_package_that_is_missing_or_another_is_told() -> None:
         ("RBX9401", "mcap is not installed"),
         ("ok", "Python 3.11.7"),
     ]
+
+
+def test_a_robot_that_runs_another_version_is_found() -> None:
+    old = replace(FINE, running=(running(replace(state(), package_version="0.0.9")),))
+    [(code, words), (level, _)] = told("versions", old)
+    assert (code, words.startswith("'cart' runs rbxcompose 0.0.9, and "), level) == ("RBX9401", True, "ok")
+    assert [level for level, _ in told("versions", replace(FINE, running=(running(state()),)))] == ["ok"]
 
 
 def test_the_port_of_the_bus_is_free_or_taken_by_whom(tmp_path: Path) -> None:
@@ -383,6 +391,7 @@ def test_the_machine_tells_who_listens_what_it_may_and_what_is_installed() -> No
     assert machine.limits().shared_memory is not None
     versions = {version.name: version for version in machine.versions()}
     assert versions["pydantic"].installed
+    assert versions["rbxcompose"].installed == __version__
     assert versions["pydantic"].locked
     clocks = machine.ClockWatch().clocks()
     assert abs(clocks.step) < 0.05

@@ -8,7 +8,15 @@ from typing import Any
 
 from rbxcompose.base.requests import to_data
 from rbxcompose.commands.console import NotDoneError, emit, refuse, table
-from rbxcompose.commands.lookup import NO_SUPERVISOR, add_addressed_robot, answer_of, find_robot, known_state, robots_up
+from rbxcompose.commands.lookup import (
+    NO_SUPERVISOR,
+    add_addressed_robot,
+    answer_of,
+    find_robot,
+    known_state,
+    robots_up,
+    version_problem,
+)
 from rbxcompose.commands.options import EACH
 from rbxcompose.runtime.folder import SUSPENDED, ClockOffset, ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process
@@ -70,6 +78,7 @@ def _shown(folder: RobotFolder) -> dict[str, Any]:
 def _data(state: RobotState, supervisor: int | None) -> dict[str, Any]:
     return {
         "robot": state.robot,
+        "version": state.package_version,
         "supervisor": {"pid": supervisor},
         "router": {"endpoint": state.router},
         "real": state.layers.real,
@@ -114,8 +123,9 @@ def _table(shown: Mapping[str, Any]) -> str:
     waiting = [f"{component['name']} waits for {component['waits_for']}, which failed" for component in blocked]
     notes = [f"{component['name']}: {component['note']}" for component in shown["components"] if "note" in component]
     clocks = [f"clock of {host}: {ClockOffset(**clock).words}" for host, clock in shown["clocks"].items()]
-    left = [] if pid else [_CLEANS_UP.format(shown["robot"])]
-    return "\n".join([head, *_stop_lines(shown["stop"]), table([_COLUMNS, *rows]), *waiting, *notes, *clocks, *left])
+    last = version_problem(shown["robot"], shown["version"]) if pid else _CLEANS_UP.format(shown["robot"])
+    lines = [head, *_stop_lines(shown["stop"]), table([_COLUMNS, *rows]), *waiting, *notes, *clocks]
+    return "\n".join([*lines, last] if last else lines)
 
 
 def _stop_lines(stop: Mapping[str, Any] | None) -> Iterator[str]:

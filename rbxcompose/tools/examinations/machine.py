@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rbxcompose.base.findings import Finding, Severity, kind
 from rbxcompose.base.printable import plain
+from rbxcompose.commands.lookup import version_problem
 from rbxcompose.commands.targets import missing_extras
 from rbxcompose.manifest.files import project_of, shown_name
 from rbxcompose.manifest.fill import SECRETS_FOLDER
@@ -116,13 +117,16 @@ def _open_to_others(paths: list[Path], mode: str) -> Iterator[Finding]:
 
 @examination
 def versions(facts: HostFacts) -> Iterator[str | Finding]:
-    """Compare the installed versions with the locked ones, if there is a lock file."""
+    """Compare the installed versions with those that robots run, and with the locked ones, if there is a lock file."""
     wrong = [one for one in facts.versions if one.installed is None or one.locked not in (None, one.installed)]
     for one in wrong:
         there = f"{one.name} {one.installed} is installed" if one.installed else f"{one.name} is not installed"
         locked = f", {one.locked} is locked" if one.locked else ""
         todo = "pip install -r requirements.lock" if one.locked else f"pip install {one.name}"
         yield OTHER_VERSION.at(None, there + locked, help=todo)
+    for robot in (running.state for running in facts.running if running.state is not None):
+        if problem := version_problem(robot.robot, robot.package_version):
+            yield OTHER_VERSION.at(None, problem)
     fine = ", ".join(f"{one.name} {one.installed}" for one in facts.versions if one not in wrong)
     yield f"Python {facts.python}, {fine}" if fine else f"Python {facts.python}"
 
