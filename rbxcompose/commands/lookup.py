@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import sys
 from contextlib import suppress
 from typing import TypeVar
 
@@ -14,6 +15,7 @@ from rbxcompose.commands.console import NotDoneError, emit
 from rbxcompose.commands.options import add_system_options, system_and_robot
 from rbxcompose.runtime.control import ANSWER, NoAnswerError, ask
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, UnsafeFolderError, all_folders
+from rbxcompose.runtime.log import write_problem
 from rbxcompose.runtime.requests import RobotStatus
 
 A = TypeVar("A")
@@ -98,6 +100,12 @@ def known_state(folder: RobotFolder) -> RobotState | None:
         return ask(folder, RobotStatus())
     except (NoAnswerError, Refused):
         return None
+
+
+def warn_of_lost_log(folder: RobotFolder) -> None:
+    """Write to stderr why what a robot logs is lost, if it is."""
+    if problem := write_problem(folder.path):
+        sys.stderr.write(f"the log of '{folder.path.name}' cannot be written: {problem}\n")
 
 
 def version_problem(robot: str, version: str) -> str:

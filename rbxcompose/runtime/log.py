@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import tempfile
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -150,6 +151,16 @@ def start_new(folder: Path) -> LogFile:
         if part.exists():
             part.replace(kept)
     return LogFile(folder / NAME)
+
+
+def write_problem(folder: Path) -> str:
+    """Return why the log in a folder cannot be written, as when its disk is full; nothing if it can."""
+    try:
+        with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
+            file.write(b"\n")
+    except OSError as error:
+        return error.strerror or str(error)
+    return ""
 
 
 def _set_aside(path: Path) -> None:

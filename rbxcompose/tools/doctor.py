@@ -14,13 +14,14 @@ from typing import Any
 
 import rbxcompose
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import state_folder
 from rbxcompose.base.findings import Finding, Severity
 from rbxcompose.base.plugins import LEFT_OUT, Plugins
 from rbxcompose.bus.graph import Graph
 from rbxcompose.compiler.check_runner import answers_of
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.devices.serial_ports import SerialPort
-from rbxcompose.runtime.folder import RobotFolder, RobotState
+from rbxcompose.runtime.folder import RobotFolder, RobotState, base_folder
 from rbxcompose.runtime.processes import Process, titled
 
 PLUGINS = Plugins("doctor", "examinations")
@@ -113,6 +114,7 @@ class HostFacts:
     """All facts. `file` is the named robot, which need not be up; `processes` are this user's titled processes.
 
     `latencies` are the latency timers of USB adapters [s], by the paths of their ports; `ports` are plugged in.
+    `disks` has the free space [B] where each kind of file goes.
     """
 
     running: Sequence[RunningRobot]
@@ -126,6 +128,7 @@ class HostFacts:
     base: Path
     latencies: Mapping[str, float] = field(default_factory=dict)
     ports: Sequence[SerialPort] = ()
+    disks: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def robots(self) -> list[Robot]:
@@ -262,6 +265,13 @@ def _free(folder: Path) -> int | None:
     except FileNotFoundError:
         return None
     return found.f_bavail * found.f_frsize
+
+
+def disks() -> dict[str, int]:
+    """Return the free space where each kind of file goes [B]."""
+    folders = {"logs": base_folder(), "snapshots of missions": state_folder(), "recordings made here": Path.cwd()}
+    there = {kind: next(each for each in (path, *path.parents) if each.exists()) for kind, path in folders.items()}
+    return {f"{kind}, in {path}": free for kind, path in there.items() if (free := _free(path)) is not None}
 
 
 class ClockWatch:

@@ -3,11 +3,12 @@
 import os
 import sys
 from collections.abc import Iterable
+from contextlib import suppress
 
 from rbxcompose.base.findings import Report
 from rbxcompose.base.levels import Level
 from rbxcompose.commands.console import emit, good, has_colour, refuse
-from rbxcompose.commands.lookup import ALREADY_UP, UNSAFE
+from rbxcompose.commands.lookup import ALREADY_UP, UNSAFE, warn_of_lost_log
 from rbxcompose.commands.targets import missing_extras
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan, extent
@@ -95,13 +96,15 @@ class _Watch:
         match report:
             case launch.Begun():
                 folder = RobotFolder.of(name)
-                folder.write_findings(self._findings)
+                with suppress(OSError):  # the disk is full, which is reported once the robot is up
+                    folder.write_findings(self._findings)
                 self._log = Follower(folder.path / NAME)
                 return None
             case launch.Up(components, processes, seconds):
                 self._is_up = True
                 took = "" if self._options.is_stepped else f", {seconds:.2f} s"  # all stepped runs write the same
                 emit(f"{name} is up: {extent(components, processes)}{took}")
+                warn_of_lost_log(RobotFolder.of(name))
                 if not self._options.is_stepped:
                     for instance in self._plan.instances:
                         for page in declared(instance.type, instance.config, ServesPage):

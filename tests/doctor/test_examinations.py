@@ -58,6 +58,7 @@ FINE = HostFacts(
     listeners={},
     processes={},
     base=Path("/nowhere"),
+    disks={"logs, in /run": 16_000_000},
 )
 MANIFEST = "rbx: 1\nkind: Robot\nname: cart\n"
 
@@ -278,6 +279,17 @@ def test_low_limits_are_told() -> None:
     assert [code for code, _ in told("limits", replace(FINE, limits=low))] == ["RBX9406", "RBX9406", "ok"]
     none = replace(FINE.limits, shared_memory=None)
     assert told("limits", replace(FINE, limits=none))[0] == ("RBX9406", "shared memory: there is none")
+
+
+def test_a_disk_that_is_full_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    full = {"logs, in /run": 14_900_000, "recordings made here, in /home": 10**9}
+    assert told("disks", replace(FINE, disks=full)) == [
+        ("RBX9406", "logs, in /run: 15 MB free"),
+        ("ok", "recordings made here, in /home: 1000 MB free"),
+    ]
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "not/yet"))
+    assert {f"snapshots of missions, in {tmp_path}", f"recordings made here, in {tmp_path}"} < machine.disks().keys()
 
 
 def test_a_subscription_without_a_publisher_is_told_unless_it_is_open(tmp_path: Path) -> None:

@@ -57,6 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
         base=base_folder(),
         latencies=latency_timers(),
         ports=serial_ports(),
+        disks=machine.disks(),
     )
     answers = [*lacking, *examine_all(facts)]
     emit(to_json([result.to_data() for result in answers]) if arguments.json else _text(answers))

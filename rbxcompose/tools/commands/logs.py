@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.levels import LOG_LEVELS
 from rbxcompose.commands.console import NotDoneError, emit, has_colour
-from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, known_state
+from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, known_state, warn_of_lost_log
 from rbxcompose.commands.options import EACH, add_system_options, count_from_zero
 from rbxcompose.runtime.folder import RobotFolder, base_folder
 from rbxcompose.runtime.log import NAME, Follower, Record, StoryWriter
@@ -59,6 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     shown = wanted(records)
     show(shown if arguments.lines is None else shown[max(0, len(shown) - arguments.lines) :])
+    warn_of_lost_log(folder)
     while arguments.follow:
         time.sleep(_PAUSE)
         show(wanted(follower.read()))

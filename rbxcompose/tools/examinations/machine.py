@@ -19,7 +19,7 @@ LEFT = kind("RBX9409", Severity.WARNING)
 _TITLE = re.compile(r"rbxcompose (?P<robot>[^:]+): (?P<process>.+)")
 _SUPERVISOR = "supervisor"
 FEWEST_FILES = 1024
-SMALLEST_SHARED = 16_000_000  # [B]
+SMALLEST_SHARED = SMALLEST_DISK = 16_000_000  # [B]
 LOW_LIMIT = kind("RBX9406", Severity.WARNING)
 OPEN_TO_OTHERS = kind("RBX9410")
 OTHER_VERSION = kind("RBX9401", Severity.WARNING)
@@ -75,6 +75,14 @@ def limits(facts: HostFacts) -> Iterator[str | Finding]:
         f"open files {_number(has.open_files)}, real-time priority {_number(has.real_time_priority)}, "
         f"locked memory {_size(has.locked_memory)}, shared memory {shared}"
     )
+
+
+@examination
+def disks(facts: HostFacts) -> Iterator[str | Finding]:
+    """Report the free space for logs, snapshots and recordings, which are lost without it."""
+    for where, free in facts.disks.items():
+        words = f"{where}: {_size(free)} free"
+        yield words if free >= SMALLEST_DISK else LOW_LIMIT.at(None, words, help="remove what is not needed there")
 
 
 def _number(value: int | None) -> str:
