@@ -123,7 +123,9 @@ def parse_type(text: str, package: str = "") -> FieldType:
     """
     found = _TYPE.fullmatch(text)
     base = found["base"] if found else ""
-    if not found or base in ("wstring", "wchar") or (found["limit"] and base != "string"):
+    if base == "wstring":
+        raise DefinitionError("'wstring' is not supported: use 'string', which is UTF-8")
+    if not found or (found["limit"] and base != "string"):
         raise DefinitionError(f"no such type: {text!r}")
     if found["most"] and not found["length"]:
         raise DefinitionError(f"a bound without a number: {text!r}")

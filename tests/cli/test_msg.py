@@ -225,6 +225,26 @@ def test_packages_of_the_robot_are_exported_too(robot: Path) -> None:
     assert (robot / "src/my_msgs/msg/Grasp.msg").read_text() == (robot / "msgs/my_msgs/msg/Grasp.msg").read_text()
 
 
+MISTAKES = [("msgs: {own: msgs}", "flaot64 width\nuint8 n\n", "RBX3026"), ("msgs: {own: msg}", "uint8 n\n", "RBX1301")]
+
+
+@pytest.mark.parametrize(("section", "text", "code"), MISTAKES)
+def test_what_is_left_of_types_with_mistakes_is_neither_shown_nor_written(
+    robot: Path, section: str, text: str, code: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (robot / "msgs/my_msgs/msg/Grasp.msg").write_text(text)
+    Path("robot.yaml").write_text(f"rbx: 1\nkind: Robot\nname: one\n{section}\ncomponents: {{}}\n")
+    for words in (["show", "my_msgs/Grasp"], ["stubs"], ["export", "src", "robot.yaml"]):
+        assert main(["msg", *words]) == 1
+        assert code in capsys.readouterr().err
+    assert {path.name for path in robot.iterdir()} == {"msgs", "robot.yaml"}
+
+
+def test_other_mistakes_of_the_robot_hide_no_type(robot: Path) -> None:
+    Path("robot.yaml").write_text("rbx: 1\nkind: Robot\nname: one\nmsgs: {own: msgs}\ncomponents: {a: {type: b}}\n")
+    assert main(["msg", "export", "src", "robot.yaml"]) == 0
+
+
 def test_a_robot_that_cannot_be_read_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["msg", "ls", str(tmp_path / "robot.yaml")]) == 1
     assert "RBX1301" in capsys.readouterr().err

@@ -70,7 +70,8 @@ def test_comments_and_quotes_do_not_disturb_each_other() -> None:
     "line, why",
     [
         ("flaot32 x", "no such type: 'flaot32'"),
-        ("wstring x", "no such type: 'wstring'"),
+        ("wstring x", "'wstring' is not supported: use 'string', which is UTF-8"),
+        ("wchar x", "no such type: 'wchar'"),
         ("int8<=3 x", "no such type: 'int8<=3'"),
         ("int8[<=] x", "a bound without a number: 'int8[<=]'"),
         ("int8", "neither a field nor a constant: 'int8'"),

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import rbxcompose
 from rbxcompose.base.files import replace_file
-from rbxcompose.base.findings import kind
+from rbxcompose.base.findings import Span, kind
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, table, write_report
 from rbxcompose.commands.messages import NO_TYPE, to_json
 from rbxcompose.commands.new_files import NAME, write_new
@@ -21,7 +21,9 @@ from rbxcompose.commands.options import Subcommand, add_actions, argument, run_a
 from rbxcompose.commands.targets import add_path_argument, robot_path
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.message_texts import wrong_package, wrong_type
+from rbxcompose.compiler.sections.bus import msgs
 from rbxcompose.manifest.files import shown_name
+from rbxcompose.manifest.tree import MappingNode, entries_of
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import KINDS, parse, parts, type_hash
 from rbxcompose.msgs.generate import all_structures, modules
@@ -30,6 +32,7 @@ from rbxcompose.msgs.packages import OWN, all_names, own_packages, package_files
 GROUP = "data"
 LICENCE = "Apache-2.0"
 NO_OWN = kind("RBX9049")
+_ENDINGS = tuple(f".{kind_}" for kind_ in KINDS)
 _NAMES = "such as my_msgs/Grasp, my_msgs/srv/Open or my_msgs/action/Close"
 _BEGUN = {
     "msg": """# What it tells, with units.
@@ -82,16 +85,26 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _choose_robot(path: str | None) -> int:
-    """Let names mean the types of a robot, or of the only one here, if there is one; return the exit code."""
+    """Let names mean the types of a robot, or of the only one here, if there is one; return the exit code.
+
+    A mistake in the types is refused: what is left of such a type is another type.
+    """
     with suppress(NotDoneError):
         path = robot_path(path)
     if path is None:
         return 0
     compilation = compile_robot(path, environment=os.environ)
-    if compilation.robot is None:
+    robot = compilation.robot
+    if robot is None or any(_is_in_types(finding.span, robot.manifest.root) for finding in compilation.report):
         write_report(compilation.report, compilation.sources)
         return FINDINGS
     return 0
+
+
+def _is_in_types(span: Span | None, root: MappingNode) -> bool:
+    """Return whether a place is in the text of a type, or in the section that names the folders of such texts."""
+    folders = [entry.value.span for entry in entries_of(root.get(msgs.name)).values()]
+    return span is not None and (span.file.endswith(_ENDINGS) or any(folder.contains(span) for folder in folders))
 
 
 def _ls(arguments: argparse.Namespace) -> int:
@@ -143,11 +156,11 @@ def _new(arguments: argparse.Namespace) -> int:
 
 
 def _stubs(arguments: argparse.Namespace) -> int:
-    compilation = compile_robot(robot_path(arguments.path), environment=os.environ)
-    own = registry.chosen().texts if compilation.robot is not None else {}
-    if compilation.robot is None or not own:
-        write_report(compilation.report, compilation.sources)
-        return FINDINGS if compilation.robot is None else refuse(NO_OWN.at(None, "the robot has no types of its own"))
+    if code := _choose_robot(robot_path(arguments.path)):
+        return code
+    own = registry.chosen().texts
+    if not own:
+        return refuse(NO_OWN.at(None, "the robot has no types of its own"))
     packages = {name.split("/")[0] for name in own}
     files = {package: arguments.into / "rbxcompose" / "msgs" / f"{package}.pyi" for package in sorted(packages)}
     structures = {part: one for name in own for part, one in parts(name, parse(name, own[name])).items()}
