@@ -188,6 +188,28 @@ RUNS: Mapping[str, tuple[str, dict[str, object], str]] = {
         {"fails": {"a": [1, 2]}},
         "success: 0 a, 1 a failure, 1 a, 2 a failure, 2 a",
     ),
+    "RecoveryNode": (f'<RecoveryNode number_of_retries="2">{AB}</RecoveryNode>', {}, "success: 0 a"),
+    "RecoveryNode tries again after its second child": (
+        f'<RecoveryNode number_of_retries="2">{AB}</RecoveryNode>',
+        {"fails": {"a": [1]}},
+        "success: 0 a, 1 a failure, 1 b, 2 a",
+    ),
+    "RecoveryNode does not recover after the last failure": (
+        f"<RecoveryNode>{AB}</RecoveryNode>",
+        {"fails": {"a": ALWAYS}},
+        "failure: 0 a, 1 a failure, 1 b, 2 a, 3 a failure",
+    ),
+    "RecoveryNode fails with its second child": (
+        f'<RecoveryNode number_of_retries="6">{AB}</RecoveryNode>',
+        {"fails": {"a": ALWAYS, "b": ALWAYS}},
+        "failure: 0 a, 1 a failure, 1 b, 2 b failure",
+    ),
+    "RecoveryNode in another one begins anew": (
+        '<Sequence><Script code="n := 1"/><RecoveryNode number_of_retries="{n}">'
+        f"<RecoveryNode>{AB}</RecoveryNode><C/></RecoveryNode></Sequence>",
+        {"fails": {"a": [1, 2, 3]}},
+        "success: 0 a, 1 a failure, 1 b, 2 a, 3 a failure, 3 c, 4 a, 5 a failure, 5 b, 6 a",
+    ),
     "Repeat": ('<Repeat num_cycles="2"><A/></Repeat>', {}, "success: 0 a, 1 a"),
     "Repeat ends at a failure": (
         '<Repeat num_cycles="-1"><A/></Repeat>',
@@ -224,6 +246,21 @@ RUNS: Mapping[str, tuple[str, dict[str, object], str]] = {
         '<Precondition if="is_ready" else="RUNNING"><A/></Precondition>',
         {"ready": [(0.0, False), (2.0, True)]},
         "success: 2 a",
+    ),
+    "BlackboardCheckInt": (
+        '<Sequence><Script code="n := 2"/><BlackboardCheckInt value_A="{n}" value_B="2" return_on_mismatch="FAILURE">'
+        '<A/></BlackboardCheckInt><BlackboardCheckDouble value_A="{n}" value_B="3" return_on_mismatch="SUCCESS">'
+        "<B/></BlackboardCheckDouble><C/></Sequence>",
+        {},
+        "success: 0 a, 1 c",
+    ),
+    "BlackboardCheckString": (
+        '<Sequence><SetBlackboard output_key="s" value="x"/>'
+        '<BlackboardCheckString value_A="{s}" value_B="x" return_on_mismatch="FAILURE">'
+        '<BlackboardCheckBool value_A="true" value_B="false" return_on_mismatch="FAILURE"><A/></BlackboardCheckBool>'
+        "</BlackboardCheckString></Sequence>",
+        {},
+        "failure: ",
     ),
     "LoopInt": ('<LoopInt queue="1;2" value="{n}"><A/></LoopInt>', {}, "success: 0 a, 1 a"),
     "LoopBool": ('<LoopBool queue="true;false" value="{n}"><A/></LoopBool>', {}, "success: 0 a, 1 a"),
@@ -391,7 +428,7 @@ WRONG: Mapping[str, tuple[str, str, list[tuple[str, int]]]] = {
     "a choice in a script": ('<Script code="a := b ? 1 : 2"/>', "", [("RBX2265", 3)]),
     "no script": ('<Script code="a := := 3"/>', "", [("RBX2265", 3)]),
     "a remap to nothing": ('<SubTree ID="Sub" x="{y}"/>', SUB, [("RBX2266", 3)]),
-    "nodes with children": ("<RateController><A/></RateController>", "", [("RBX2265", 3)]),
+    "nodes with children": ("<Mine><A/></Mine>", "", [("RBX2265", 3)]),
     "nodes without a counterpart": ('<UnsetBlackboard key="x"/>', "", [("RBX2265", 3)]),
     "an action that is done again there": ('<ReactiveSequence><A x="1"/><B/></ReactiveSequence>', "", [("RBX2266", 4)]),
     "a shared entry": ('<A x="{@home}"/>', "", [("RBX2265", 2), ("RBX2266", 2)]),
@@ -428,6 +465,12 @@ def test_what_was_left_out_fails(tmp_path: Path) -> None:
     made = of_body(tmp_path, "<Sequence><ManualSelector><A/></ManualSelector><B/></Sequence>")
     assert run(made) == "failure: "
     assert "# tried.xml:4: 'ManualSelector' is left out" in made.text
+
+
+def test_nodes_of_nav2_without_a_counterpart_are_told_with_what_comes_near(tmp_path: Path) -> None:
+    made = of_body(tmp_path, '<RateController hz="1.0"><A/></RateController>')
+    assert [(found.code, "`every`" in found.help) for found in made.report] == [("RBX2265", True)]
+    assert "your program" not in made.words
 
 
 REFUSED = {
@@ -480,6 +523,28 @@ def test_files_are_included_once_and_version_3_is_told(tmp_path: Path) -> None:
     made = of_text(tmp_path, f'<root main_tree_to_execute="Main">{body}</root>')
     assert made.told == [("RBX2266", 1), ("RBX2266", 1)]
     assert run(made) == "success: 0 a"
+
+
+@pytest.mark.parametrize("version", [3, 4])
+def test_texts_without_braces_are_entries_for_sub_trees_of_version_3(version: int, tmp_path: Path) -> None:
+    main = (
+        '<Sequence><SetBlackboard output_key="goal" value="dock"/>'
+        '<SubTree ID="Sub" target="goal" result="found"/><SubTreePlus ID="Sub" target="goal"/></Sequence>'
+    )
+    sub = '<Sequence><Go to="{target}"/><SetBlackboard output_key="result" value="done"/></Sequence>'
+    trees = f'<{TREE} ID="Main">{main}</{TREE}><{TREE} ID="Sub">{sub}</{TREE}>'
+    made = of_text(tmp_path, f'<root BTCPP_format="{version}">{trees}</root>')
+    _, *used = made.data["do"]["sequence"]
+    assert [step["with"]["target"] for step in used] == ["$goal" if version == 3 else "goal", "goal"]
+    kept = {"set": {"found": "$sub_result.result"}}
+    assert used[0].get("on_success") == (kept if version == 3 else None), made.text
+    assert not made.told
+
+
+def test_an_entry_that_nothing_sets_is_named_as_the_mission_reads_it(tmp_path: Path) -> None:
+    made = of_body(tmp_path, '<Sequence><A/><B port="{a}" goal="{theGoal}" n="{n}"/></Sequence>')
+    assert made.data["do"]["sequence"][1]["b"]["port"] == "$a_2"
+    assert "sets 'a', here 'a_2', 'theGoal', here 'the_goal', 'n'" in made.words
 
 
 def test_a_main_tree_that_is_not_there_is_told(tmp_path: Path) -> None:

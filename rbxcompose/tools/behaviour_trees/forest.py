@@ -14,7 +14,7 @@ from rbxcompose.commands.importing.importer import OTHER_PROGRAM
 from rbxcompose.domains.body.xml_reader import XmlElement, XmlFormat, read_xml
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.reader import read_source
-from rbxcompose.tools.behaviour_trees.nodes import DIFFERS, EXPLICIT, MISTAKE, OLD_NAMES
+from rbxcompose.tools.behaviour_trees.nodes import DIFFERS, EXPLICIT, MISTAKE, OLD_NAMES, entry_of
 
 FORMAT = XmlFormat("root", "a file of trees", OTHER_PROGRAM)
 TREE, MODELS = "BehaviorTree", "TreeNodesModel"
@@ -54,6 +54,11 @@ def type_of(element: XmlElement) -> str:
     if element.name in EXPLICIT or element.name == "SubTreePlus":
         return "SubTree" if element.name.startswith("SubTree") else element.attributes.get("ID", "")
     return OLD_NAMES.get(element.name, element.name)
+
+
+def ports_of(element: XmlElement) -> dict[str, str]:
+    """Return the attributes of an element that are ports."""
+    return {key: text for key, text in element.attributes.items() if key not in ("name", "ID") and key[0] != "_"}
 
 
 def below(element: XmlElement) -> Iterator[XmlElement]:
@@ -98,10 +103,14 @@ class _ForestReader:
     def _root(self, root: XmlElement) -> None:
         version = root.attributes.get("BTCPP_format")
         if version is None:
-            words = "there is no 'BTCPP_format' here, so this may be version 3, which has no skipped nodes"
-            help_text = "it is read like version 4; if it is, write '<root BTCPP_format=\"4\">'"
+            words = "there is no 'BTCPP_format' here: for version 4, a text without braces is no entry in a '<SubTree>'"
+            help_text = 'write \'<root BTCPP_format="4">\', or "3", for which it names an entry'
             self.report.add(DIFFERS.at(root.span, words, help=help_text))
-        elif version.strip() not in ("3", "4"):
+        elif version.strip() == "3":
+            for element in below(root):
+                for port, text in ports_of(element).items() if element.name == "SubTree" else ():  # not 'SubTreePlus'
+                    element.attributes[port] = text if not text or entry_of(text, port) else f"{{{text}}}"
+        elif version.strip() != "4":
             words = f"'BTCPP_format' is '{plain(version, 20)}'; only 3 and 4 exist"
             self.report.add(MISTAKE.at(root.span, words, help='write BTCPP_format="4"'))
         for element in root.children:

@@ -24,7 +24,7 @@ from rbxcompose.missions.language.grammar import LEVELS
 from rbxcompose.missions.language.node_reader import NAME as _NAME
 from rbxcompose.missions.program.registry import kinds, modifier_keys, modifiers
 from rbxcompose.tools.behaviour_trees import nodes
-from rbxcompose.tools.behaviour_trees.forest import Forest, below, type_of
+from rbxcompose.tools.behaviour_trees.forest import Forest, below, ports_of, type_of
 from rbxcompose.tools.behaviour_trees.nodes import CONDITIONS, DIFFERS, EXPLICIT, MISTAKE, NODES, NOT_SAID
 from rbxcompose.tools.behaviour_trees.scripts import ScriptError, number, script_of, statements, text_of, unplaced
 
@@ -37,6 +37,7 @@ MOST_PASSED = 20_000  # entries by `_autoremap`
 _HOOKS = {"on_success": ("_onSuccess", "_post"), "on_failure": ("_onFailure", "_post"), "on_halt": ("_onHalted",)}
 _TYPES = {"bool": "flag", "double": "number", "float": "number", "string": "text"}
 _LOOPS = {"LoopInt": "number", "LoopDouble": "number", "LoopBool": "flag", "LoopString": "text"}
+_EQUALITIES = {f"BlackboardCheck{name.removeprefix('Loop')}": type_ for name, type_ in _LOOPS.items()}
 
 
 class FlowText(str):
@@ -104,11 +105,6 @@ def _only_asks(step: ImportedStep) -> bool:
 
 def _is_nothing(element: XmlElement) -> bool:
     return type_of(element) == "AlwaysSuccess" and element.attributes == {"_skipIf": "true"}
-
-
-def _ports(element: XmlElement) -> dict[str, str]:
-    """Return the attributes of an element that are ports."""
-    return {key: text for key, text in element.attributes.items() if key not in ("name", "ID") and key[0] != "_"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +213,7 @@ class ForestImporter:
         for tree in reversed(self.order):
             for element in self._subtrees(tree):
                 if (used := self.ports.get(element.attributes.get("ID", ""))) and id(element) not in self.refused:
-                    used.passed |= _ports(element).keys()
+                    used.passed |= ports_of(element).keys()
                     if _is_auto(element):
                         used.passed.add("*")
         for tree in self.order:
@@ -256,7 +252,7 @@ class ForestImporter:
                 found.outputs.add(name)
 
     def _uses(self, element: XmlElement) -> Iterator[_Use]:
-        kind, ports = type_of(element), _ports(element)
+        kind, ports = type_of(element), ports_of(element)
         for key in _BEFORE:
             if key in element.attributes and (key[0] == "_" or kind == "Precondition"):
                 yield from _script_uses(element.attributes[key])
@@ -283,7 +279,8 @@ class ForestImporter:
                     is_own = kind in NODES
                     declared = model.ports.get(port) if model is not None else None
                     how = "r" if is_own else hows[declared.direction] if declared else "?"
-                    yield _Use(name, how, _type_of_port(declared.element.attributes) if declared else "")
+                    type_ = _type_of_port(declared.element.attributes) if declared else _EQUALITIES.get(kind, "")
+                    yield _Use(name, how, type_)
         for key in _AFTER:
             yield from _script_uses(element.attributes.get(key, ""))
 
@@ -313,7 +310,7 @@ def _is_auto(element: XmlElement) -> bool:
 
 def passed_ports(element: XmlElement, used: _TreePorts, forest: Forest) -> dict[str, str]:
     """Return what a sub-tree is given, by port, with what its model and `_autoremap` add."""
-    found = _ports(element)
+    found = ports_of(element)
     model = forest.models.get(element.attributes.get("ID", ""))
     for port, declared in model.ports.items() if model is not None and not _is_auto(element) else ():
         default = declared.element.attributes.get("default", "")
@@ -469,7 +466,11 @@ class _TreeImporter:
         known = {*types, *self.ports.inputs, *(use.entry for use in self.ports.uses if use.how == "i")}
         unknown = (use.entry for use in self.ports.uses if use.entry not in known)
         if unset := [entry for entry in unknown if self.ports.our(entry) not in declared]:
-            shown = ", ".join(f"'{plain(name, 60)}'" for name in dict.fromkeys(unset))
+            names = {entry: self.ports.our(entry) for entry in unset}
+            shown = ", ".join(
+                f"'{plain(entry, 60)}'" if entry == name else f"'{plain(entry, 60)}', here '{name}'"
+                for entry, name in names.items()
+            )
             words = f"nothing in the tree '{plain(self.tree, 60)}' sets {shown[:200]}"
             help_text = "declare what it is under 'values' of the robot, or under 'inputs' of the mission"
             self.report.add(DIFFERS.at(self.root.span, words, help=help_text))
@@ -505,13 +506,15 @@ class _TreeImporter:
         node = NODES.get(kind)
         if node is None or (element.name in EXPLICIT and kind == "Log"):
             return self.skill(element, kind)
+        if node.ours == nodes.NOT_IMPORTED:
+            return self.left_out(element, "missions have nothing for it", node.note)
         least, most = node.children
         if not least <= len(element.children) <= most:
             some = f"at least {least}" if most == nodes.MANY else f"{least} to {most}"
             wanted = str(least) if least == most else some
             return self.left_out(element, f"it needs {wanted} children, and has {len(element.children)}", code=MISTAKE)
         if kind != "SubTree":
-            for port in _ports(element).keys() - node.ports.keys():
+            for port in ports_of(element).keys() - node.ports.keys():
                 words = f"'{kind}' has no port '{plain(port, 60)}'"
                 self.report.add(MISTAKE.misspelt(element.span, words, port, node.ports, "its ports are"))
             needed = (port for port, codec in node.ports.items() if codec.default is None)
@@ -523,8 +526,6 @@ class _TreeImporter:
             return self.left_out(element, str(error))
 
     def known(self, element: XmlElement, node: nodes.BtNode) -> ImportedStep:
-        if node.ours == nodes.NOT_IMPORTED:
-            return self.left_out(element, "missions have nothing for it", node.note)
         if reader := _READERS.get(node.name):
             return reader(self, element)
         value = self.port(element, node.port) if node.port else True
@@ -650,7 +651,7 @@ class _TreeImporter:
         if element.children or family in ("Control", "Decorator"):
             help_text = "write what it does with the kinds of missions"
             return self.left_out(element, "it is a node of your program with children, and skills have none", help_text)
-        name, ports = nodes.skill_name(kind), _ports(element)
+        name, ports = nodes.skill_name(kind), ports_of(element)
         if self.is_asked and not ports and family in ("", "Condition"):
             words = f"'{plain(kind, 60)}' is evaluated again and again here, as a value of the robot"
             help_text = f"declare '{name}' under 'values', of the type 'flag'"
@@ -800,19 +801,17 @@ class _TreeImporter:
         return ImportedStep({"sequence": [mark, chosen], "reactive": True}, element.span)
 
     def switch(self, element: XmlElement) -> ImportedStep:
-        text, span = element.attributes["variable"], element.span
-        entry = nodes.entry_of(text, "variable")
+        span, entry = element.span, nodes.entry_of(element.attributes["variable"], "variable")
         with self.asking(False):
             steps = [self.step(child) for child in element.children]
         cases: dict[str, ImportedStep] = {}
         for index, step in enumerate(steps[:-1], 1):
             cases.setdefault(_case(element.attributes[f"case_{index}"]), step)
-        value = f"${self.our(entry)}" if entry else text_of(_literal(text))
         if any(use.entry == entry and use.how == "w" for child in below(element) for use in self.all._uses(child)):
             words = f"'{plain(entry, 60)}' is read once here, though it is set inside"
             self.report.add(DIFFERS.at(span, words, help="choose again after what sets it has ended"))
         otherwise = {} if _is_nothing(element.children[-1]) else {"else": steps[-1]}
-        return ImportedStep({"choose": value, "cases": cases, **otherwise}, span)
+        return ImportedStep({"choose": self.operand(element, "variable"), "cases": cases, **otherwise}, span)
 
     def try_catch(self, element: XmlElement) -> ImportedStep:
         if element.attributes.get("catch_on_halt", "false").lower() not in ("false", "0"):
@@ -842,6 +841,21 @@ class _TreeImporter:
             return ImportedStep({"wait_for": step["check"]}, element.span)
         return around(step, {"attempts": attempts})
 
+    def recovery(self, element: XmlElement) -> ImportedStep:
+        given, span = element.attributes.get("number_of_retries", "1"), element.span
+        retries = nodes.COUNT.read(given, self.our)
+        rounds = f"{retries} + 1" if "$" in retries else str(int(retries) + 1) if retries.isdigit() else retries
+        failed = self.ports.free.take("has_failed", "has_failed")
+        self.data[failed] = False
+        with self.asking(False):
+            tried, recovery = self.steps(element)
+        hooks = {"on_success": {"set": {failed: "false"}}, "on_failure": {"set": {failed: "true"}}}
+        tried = around(around(tried, hooks), {"optional": True})
+        turn = ImportedStep({"sequence": [around(recovery, {"only_if": f"${failed}"}), tried]}, span)
+        loop = ImportedStep({"repeat": rounds, "until": f"not ${failed}", "do": turn, "optional": True}, span)
+        start, end = ImportedStep({"set": {failed: "false"}}, span), ImportedStep({"check": f"not ${failed}"}, span)
+        return ImportedStep({"sequence": [start, loop, end]}, span)
+
     def repeat(self, element: XmlElement) -> ImportedStep:
         rounds = self.port(element, "num_cycles") if type_of(element) == "Repeat" else "forever"
         return ImportedStep({"repeat": rounds, "do": self.step(element.children[0])}, element.span)
@@ -851,14 +865,22 @@ class _TreeImporter:
         return ImportedStep({"sequence": [waited, self.step(element.children[0])]}, element.span)
 
     def precondition(self, element: XmlElement) -> ImportedStep:
-        text, span = self.condition(element, "if"), element.span
-        step, otherwise = self.step(element.children[0]), element.attributes.get("else", "FAILURE").strip()
+        return self.guarded(element, self.condition(element, "if"), "else")
+
+    def equality(self, element: XmlElement) -> ImportedStep:
+        sides = [self.operand(element, port, _EQUALITIES[type_of(element)]) for port in ("value_A", "value_B")]
+        return self.guarded(element, " == ".join(sides), "return_on_mismatch")
+
+    def guarded(self, element: XmlElement, text: str, port: str) -> ImportedStep:
+        """Return the step of a decorator with a condition; a port says how it ends if that does not hold."""
+        span = element.span
+        step, otherwise = self.step(element.children[0]), element.attributes.get(port, "FAILURE").strip()
         if otherwise == "SKIPPED":
             return around(step, {"only_if": text})
         if otherwise == "RUNNING":
             return ImportedStep({"sequence": [ImportedStep({"wait_for": text}, span), step]}, span)
         if otherwise not in ("SUCCESS", "FAILURE"):
-            raise ScriptError(f"'else' cannot be '{plain(otherwise, 30)}'")
+            raise ScriptError(f"'{port}' cannot be '{plain(otherwise, 30)}'")
         result = ImportedStep({"check": "true" if otherwise == "SUCCESS" else "false"}, span)
         return ImportedStep({"if": text, "then": step, "else": result}, span)
 
@@ -891,10 +913,15 @@ class _TreeImporter:
         return groups[0] if len(groups) == 1 else ImportedStep({"sequence": groups}, element.span)
 
     def set_blackboard(self, element: XmlElement) -> ImportedStep:
-        key, value = element.attributes["output_key"], element.attributes["value"]
-        entry = nodes.entry_of(value, "value")
-        text = f"${self.our(entry)}" if entry else text_of(_literal(value))
+        key = element.attributes["output_key"]
+        text = self.operand(element, "value")
         return ImportedStep({"set": {self.our(nodes.entry_of(key, key) or key): text}}, element.span)
+
+    def operand(self, element: XmlElement, port: str, wanted: str = "") -> str:
+        """Return the value of a port as an expression; a literal is of the wanted type, or what it looks like."""
+        text = element.attributes[port]
+        entry = nodes.entry_of(text, port)
+        return f"${self.our(entry)}" if entry else text_of(_literal(text, wanted))
 
     def log(self, element: XmlElement) -> ImportedStep:
         level = element.attributes.get("level", "info")
@@ -1010,10 +1037,12 @@ _READERS: Mapping[str, Callable[[_TreeImporter, XmlElement], ImportedStep]] = {
     "RunOnce": _TreeImporter.run_once,
     "Timeout": _TreeImporter.timeout,
     "RetryUntilSuccessful": _TreeImporter.retry,
+    "RecoveryNode": _TreeImporter.recovery,
     "Repeat": _TreeImporter.repeat,
     "KeepRunningUntilFailure": _TreeImporter.repeat,
     "Delay": _TreeImporter.delay,
     "Precondition": _TreeImporter.precondition,
+    **dict.fromkeys(_EQUALITIES, _TreeImporter.equality),
     **dict.fromkeys(_LOOPS, _TreeImporter.loop),
     "SubTree": _TreeImporter.subtree,
     "AlwaysSuccess": _TreeImporter.always,

@@ -219,8 +219,7 @@ def _others() -> list[BtNode]:
           for count in range(2, 7)),
         row("TryCatch", (2, MANY), "`fallback` of a `sequence` and the last child, which then fails",
             "`catch_on_halt` is not imported.", {"catch_on_halt": _text("false")}),
-        row("ManualSelector", CONTROL, none, "Start the mission of your choice with `rbxcompose mission run`.",
-            {"repeat_last_selection": _text("false")}),
+        row("ManualSelector", CONTROL, none, "Start the mission of your choice with `rbxcompose mission run`."),
         row("ForceFailure", DECORATOR, "`optional: true`, and `invert: true` around it"),
         row("Repeat", DECORATOR, "`repeat: 3`, `do`", "One round per tick; a skipped round counts.",
             {"num_cycles": COUNT}, "repeat", {}, is_exported=True),
@@ -228,12 +227,23 @@ def _others() -> list[BtNode]:
         row("Delay", DECORATOR, "`sequence` with a `wait` before the step", "", {"delay_msec": MSEC}),
         row("Precondition", DECORATOR, "`only_if: $ready`; with another `else`: `if`", "",
             {"if": SCRIPT, "else": _text("FAILURE")}, "only_if", {}, is_exported=True),
+        *(row(f"BlackboardCheck{type_}", DECORATOR, "`if: $a == $b`, `then`, `else`", "Of version 3.",
+              {"value_A": TEXT, "value_B": TEXT, "return_on_mismatch": _text("FAILURE")})
+          for type_ in ("Int", "Double", "Bool", "String")),
         *(row(name, DECORATOR, "`for: item`, `in: [1, 2]`, `do`", "An empty list is skipped.",
               {"queue": TEXT, "value": TEXT, "if_empty": _text("SUCCESS")})
           for name in ("LoopInt", "LoopBool", "LoopDouble", "LoopString")),
-        *(row(name, children, none, "Write `wait_for: new($value)` for a value of the robot.", {"entry": TEXT})
+        *(row(name, children, none, "Write `wait_for: new($value)` for a value of the robot.")
           for name, children in (("WasEntryUpdated", LEAF), ("SkipUnlessUpdated", DECORATOR),
                                  ("WaitValueUpdate", DECORATOR))),
+        row("RecoveryNode", (2, 2), "`repeat` with `until`, and a datum that says whether the first child has failed",
+            "Of Nav2.", {"number_of_retries": _text("1")}),
+        *(row(name, CONTROL, none, "Of Nav2: `go_to` of `navigation` plans again while it drives.")
+          for name in ("PipelineSequence", "GoalUpdater", "PathLongerOnApproach")),
+        *(row(name, DECORATOR, none, "Of Nav2: write `repeat` with `every`, in a `parallel` with the rest.")
+          for name in ("RateController", "DistanceController", "SpeedController")),
+        row("RoundRobin", CONTROL, none, "Of Nav2: a `fallback` with `order: random` may begin with any child."),
+        row("SingleTrigger", DECORATOR, none, "Of Nav2: write `once: true`, which is skipped after the first time."),
         row("SubTree", LEAF, "`use`, `with`; outputs by `save`", "`_autoremap` passes every entry that both use."),
         row("AlwaysSuccess", LEAF, "`check: true`"),
         row("AlwaysFailure", LEAF, "`check: false`"),
@@ -241,7 +251,7 @@ def _others() -> list[BtNode]:
         row("ScriptCondition", LEAF, "`check: $level > 3`", "", {"code": SCRIPT}, "check", {}, is_exported=True),
         row("Script", LEAF, "`set`, one for each statement that reads what an earlier one sets", "", {"code": TEXT}),
         row("SetBlackboard", LEAF, "`set`", "", {"value": TEXT, "output_key": TEXT}),
-        row("UnsetBlackboard", LEAF, none, "Data always have a value; `set` one that means none.", {"key": TEXT}),
+        row("UnsetBlackboard", LEAF, none, "Data always have a value; `set` one that means none."),
         row("TestNode", LEAF, none, "Tests of missions replace skills by `mocks`."),
         row("Log", LEAF, "`log`", "A node of your program, if an exported mission logs.",
             {"message": TEXT, "level": _text("info")}),
