@@ -152,6 +152,15 @@ def test_the_robot_starts_where_amcl_was_told_and_only_then(tmp_path: Path) -> N
     assert [code for code, _ in unset.told].count("RBX2299") == 2  # and no map
 
 
+@pytest.mark.parametrize(("yaw", "tolerance", "told"), [(3.14, 0.2, []), (-90, 0.2, [1]), (6.28, 10, [2])])
+def test_angles_that_look_like_degrees_are_told(yaw: float, tolerance: float, told: list[int], tmp_path: Path) -> None:
+    start = f"amcl: {{ros__parameters: {{set_initial_pose: true, initial_pose: {{x: 1, yaw: {yaw}}}}}}}\n"
+    checker = f"{{goal_checker: {{yaw_goal_tolerance: {tolerance}}}}}"
+    made = nav2(tmp_path, f"{start}controller_server: {{ros__parameters: {checker}}}\n")
+    assert [line for code, line in made.told if code == "RBX2023"] == told, made.words
+    assert navigation(made)["localisation"]["start"]["heading"] == f"{yaw} rad"
+
+
 WRONG = {
     "another program": ("talker: {ros__parameters: {rate: 1}}\n", "RBX2231", 1),
     "a list": ("[1, 2]\n", "RBX2231", 1),

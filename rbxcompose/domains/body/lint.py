@@ -35,7 +35,7 @@ LARGEST = 20.0  # [m]
 _WRITE = "write what the motor can do"
 _UNWRITTEN = "a limit that is not written is 0; joints without limits are 'continuous', those that never move 'fixed'"
 _LACKS_UNIT = "are these millimetres, or does a size lack its unit?"
-_TURN = math.tau + 0.01  # [rad]
+TURN = math.tau + 0.01  # [rad] beyond which an angle may be one in degrees
 _WITH_ORIGINS = ("link", "joint", "visual", "collision", "inertial")
 
 
@@ -232,7 +232,7 @@ def lint(
 def orientations(root: XmlElement) -> Iterator[Finding]:
     """Yield the orientations in a URDF that are more than a turn."""
     for child in root.children:
-        if child.name == "origin" and any(abs(value) > _TURN for value in rpy_of(child)):
+        if child.name == "origin" and any(abs(value) > TURN for value in rpy_of(child)):
             right = " ".join(f"{math.radians(value):.4g}" for value in rpy_of(child))
             message = f"'rpy=\"{plain(child.attributes['rpy'], _SHOWN)}\"' is more than a turn: are these degrees?"
             help_text = f"angles in a URDF are in radians: for degrees, write 'rpy=\"{right}\"'"

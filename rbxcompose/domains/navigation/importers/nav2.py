@@ -40,6 +40,7 @@ from rbxcompose.commands.importing.manifest_text import (
     word,
 )
 from rbxcompose.commands.importing.ros_parameters import NodeParameters, parameters_of, scalars_of, topic_name, value_of
+from rbxcompose.domains.body.lint import TURN, TURNED_IN_DEGREES
 from rbxcompose.domains.worlds.shapes import PolygonFootprint, convex_hull
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.validate import WRONG_TYPE, label_of, to_plain
@@ -127,7 +128,16 @@ class ForeignNavigation:
         for key in keys:
             if (found := given.above_zero(key)) is not None:
                 self.take(setting, found.value, write(found.value), found.span, key)
+                if write is angle:
+                    self.judge_angle(found, f"'{key}'")
                 break
+
+    def judge_angle(self, given: Given[float], was: str) -> None:
+        """Report an angle that may be in degrees."""
+        if abs(given.value) > TURN:
+            words = f"{was} is {given.value:g} rad, which is more than a turn: are these degrees?"
+            help_text = f"angles in Nav2 are in radians: for degrees, write {math.radians(given.value):.4g}"
+            self.report.add(TURNED_IN_DEGREES.at(given.span, words, help=help_text))
 
     def limit(self, setting: str, value: float, text: str, span: Span, was: str) -> None:
         """Take a value if there is none, or only a larger one."""
@@ -205,6 +215,8 @@ def _start(out: ForeignNavigation, numbers: Sequence[Given[float] | None]) -> No
         x, y, yaw = (0.0 if number is None else number.value for number in numbers)
         text = flow({"x": length(x), "y": length(y), "heading": angle(yaw)})
         out.take("localisation.start", (x, y, yaw), text, given[0].span, "initial pose")
+        if (turned := numbers[2]) is not None:
+            out.judge_angle(turned, "the yaw of the initial pose")
 
 
 def _controllers(out: ForeignNavigation, given: ForeignMap) -> None:
