@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+import io
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap.writer import Writer
 from mcap_ros2._dynamic import generate_dynamic
 
 from rbxcompose.bus.tokens import EndpointToken, EntityKind, NodeToken
 from rbxcompose.bus.wire import WIRE_PROFILES, ros_qos
 from rbxcompose.msgs import cdr, registry
+from rbxcompose.msgs.definitions import Structures, type_hash
 from rbxcompose.msgs.std_msgs import String
-from rbxcompose.runtime.recording.reader import playlist, summary_of
+from rbxcompose.runtime.recording.reader import RecordingReader, playlist, summary_of
 from rbxcompose.runtime.recording.topics import (
     Recorded,
     RecordedTopic,
     Selection,
     definition_of,
-    is_replayable,
+    hash_of,
     qos_of_metadata,
     qos_of_token,
     topic_of,
+    why_not_replayable,
 )
 from rbxcompose.sdk.ports import Qos
 from tests.loops import for_all
@@ -52,7 +57,7 @@ def test_a_publisher_is_a_topic() -> None:
 @given(st.text(max_size=20), st.text(max_size=40), st.text(max_size=20))
 def test_tokens_of_strangers_give_a_topic_fit_for_a_key_or_none(name: str, dds: str, type_hash: str) -> None:
     found = topic_of(token(f"/{name}", dds, type_hash))
-    assert found is None or is_replayable(found)
+    assert found is None or not why_not_replayable(found)
 
 
 @pytest.mark.parametrize("bad", [token(name="/a/*"), token(dds="nav_msgs/Odometry"), token(type_hash="**")])
@@ -85,6 +90,48 @@ def test_every_definition_is_whole_for_an_independent_decoder(name: str) -> None
     decoded = decoder(cdr.encode(registry.message(name)()))
     fields = registry.message(name).FIELDS
     assert [field for field in fields if not hasattr(decoded, field)] == []
+
+
+@for_all("name", registry.names("msg"))
+def test_the_hash_of_a_type_follows_from_its_definition_alone(name: str) -> None:
+    with registry.choosing({}):
+        assert hash_of(name, definition_of(name)) == hash_of(name, "") == registry.message(name).HASH
+
+
+def foreign(type_: str, definition: str) -> RecordedTopic:
+    """A topic as a recorder of others writes it: without the hash of its type."""
+    file = io.BytesIO()
+    writer = Writer(file)
+    writer.start(profile="ros2")
+    schema = writer.register_schema(type_, "ros2msg", definition.encode())
+    channel = writer.register_channel("/chatter", "cdr", schema, {"offered_qos_profiles": ""})
+    writer.add_message(channel, 0, b"\0\1\0\0", 0)
+    writer.finish()  # type: ignore[no-untyped-call]
+    (found,) = RecordingReader(io.BytesIO(file.getvalue())).messages()
+    return found.topic
+
+
+def test_recordings_of_others_are_replayed_with_the_hash_of_the_definition_in_them() -> None:
+    for type_ in ("std_msgs/msg/String", "std_msgs/String"):
+        found = foreign(type_, "# Text.\r\nstring data\r\n")
+        assert (found.type, found.hash, why_not_replayable(found)) == (String.TYPE, String.HASH, "")
+    inner = f"{'=' * 80}\nMSG: odd_msgs/In\nstring<=9 text\n"
+    own = {"odd_msgs/msg/Odd": "In[] in\nstd_msgs/String more\n", "odd_msgs/msg/In": "string<=9 text\n"}
+    odd = foreign("odd_msgs/msg/Odd", f"{own['odd_msgs/msg/Odd']}{inner}")
+    assert odd.hash == type_hash("odd_msgs/msg/Odd", Structures(own))
+
+
+@pytest.mark.parametrize(
+    ("type_", "definition", "why"),
+    [
+        ("odd_msgs/msg/Odd", "", "no definition of 'odd_msgs/msg/Odd'"),
+        ("odd_msgs/msg/Odd", "In in\n", "no definition of 'odd_msgs/msg/In'"),
+        ("odd_msgs/msg/Odd", "int8 a\nwstring b\n", "line 2: 'wstring' is not supported"),
+        ("Odd", "int8 a\n", "'Odd' is no type of ROS 2"),
+    ],
+)
+def test_a_recorded_type_without_a_hash_is_refused_with_the_reason(type_: str, definition: str, why: str) -> None:
+    assert why in why_not_replayable(foreign(type_, definition))
 
 
 def test_a_type_of_which_nothing_is_known_has_no_definition() -> None:

@@ -5,6 +5,7 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import field
 from typing import IO
 
@@ -18,7 +19,9 @@ from mcap.stream_reader import StreamReader
 from rbxcompose.base.clock import NANOSECONDS
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.printable import plain
-from rbxcompose.runtime.recording.topics import HASH, NODE, Recorded, RecordedTopic, qos_of_metadata
+from rbxcompose.msgs.definitions import DefinitionError
+from rbxcompose.msgs.registry import full_name
+from rbxcompose.runtime.recording.topics import CDR, HASH, NODE, Recorded, RecordedTopic, hash_of, qos_of_metadata
 from rbxcompose.sdk.ports import Qos
 
 LARGEST = 64 * 1024 * 1024  # bytes of a record, and of an unpacked chunk
@@ -64,6 +67,7 @@ class RecordingReader:
         self._file = file
         self._reader = StreamReader(file, emit_chunks=True, record_size_limit=LARGEST)
         self._schemas: dict[int, tuple[str, str]] = {}  # name and definition
+        self._hashes: dict[tuple[str, str], str] = {}  # by those
         self._channels: dict[int, RecordedTopic] = {}
         self._unpacked = 0  # [bytes] so far
         self._count = 0  # of messages so far, and of other records in chunks
@@ -143,15 +147,27 @@ class RecordingReader:
 
     def _topic(self, channel: Channel) -> RecordedTopic:
         name, definition = self._schemas.get(channel.schema_id, ("", ""))
+        hash_ = channel.metadata.get(HASH, "")
+        if channel.message_encoding == CDR:
+            name = full_name(name, "msg")
+            hash_ = hash_ or self._hash_of(name, definition)
         return RecordedTopic(
             channel.topic,
             name,
-            channel.metadata.get(HASH, ""),
+            hash_,
             qos_of_metadata(channel.metadata),
             definition,
             channel.message_encoding,
             channel.metadata.get(NODE, ""),
         )
+
+    def _hash_of(self, name: str, definition: str) -> str:
+        """Return the hash of a type; recordings of others lack it."""
+        if (name, definition) not in self._hashes:
+            self._hashes[name, definition] = ""
+            with suppress(DefinitionError):
+                self._hashes[name, definition] = hash_of(name, definition)
+        return self._hashes[name, definition]
 
 
 def _unpacked(chunk: Chunk) -> bytes:

@@ -12,7 +12,7 @@ from rbxcompose.bus.names import name_problem
 from rbxcompose.bus.tokens import EndpointToken, EntityKind
 from rbxcompose.bus.wire import ros_qos
 from rbxcompose.msgs import registry
-from rbxcompose.msgs.definitions import FieldType, parse_type
+from rbxcompose.msgs.definitions import DefinitionError, FieldType, Structures, parse_type, type_hash
 from rbxcompose.msgs.packages import joined, parts, short
 from rbxcompose.sdk.ports import Qos
 
@@ -34,6 +34,7 @@ NODE = "rbxcompose.node"
 _DDS_TYPE = re.compile(r"(\w+)::(msg|srv|action)::dds_::(\w+)_", re.ASCII)
 _TYPE = re.compile(r"\w+/(msg|srv|action)/\w+", re.ASCII)
 _HASH = re.compile(r"\w{1,100}", re.ASCII)
+_BETWEEN_TEXTS = re.compile(r"^={20,}+\s*?\n", re.MULTILINE)
 _QOS = re.compile(r"(?P<reliability>\d?):(?P<durability>\d?):(?P<history>\d?),(?P<depth>\d{0,9}):.*")
 _FOREVER = "{sec: 9223372036, nsec: 854775807}"  # how ROS writes "no limit"
 _IS_LATCHED = re.compile(r"^[ \t-]*+durability: *+(1|transient_local)[ \t\r]*+$", re.MULTILINE)
@@ -81,10 +82,34 @@ def by_name(counts: Mapping[RecordedTopic, int]) -> dict[RecordedTopic, int]:
     return found
 
 
-def is_replayable(topic: RecordedTopic) -> bool:
-    """Return whether a recorded topic can be published: its names must be valid on the bus, which carries only CDR."""
-    is_named = _TYPE.fullmatch(topic.type) and _HASH.fullmatch(topic.hash) and not name_problem(topic.name)
-    return bool(is_named) and topic.encoding == CDR
+def why_not_replayable(topic: RecordedTopic) -> str:
+    """Return why a recorded topic cannot be published, or nothing: its names must be valid on the bus, which is CDR."""
+    if topic.encoding != CDR:
+        return f"the encoding is '{topic.encoding}', not '{CDR}'"
+    if not (_TYPE.fullmatch(topic.type) and _HASH.fullmatch(topic.hash)):
+        try:
+            return f"the hash of the type is '{topic.hash}', not '{hash_of(topic.type, topic.definition)}'"
+        except DefinitionError as error:
+            return f"the type has no hash: {error}"
+    return name_problem(topic.name)
+
+
+def hash_of(name: str, definition: str) -> str:
+    """Return the hash of a type from its definition; a type without a text in it is the known one of this name.
+
+    Raises:
+        DefinitionError: if a text is not valid, or a type is not known.
+    """
+    if not _TYPE.fullmatch(name):
+        raise DefinitionError(f"'{name}' is no type of ROS 2")
+    own, *inner = _BETWEEN_TEXTS.split(definition)
+    texts = {name: own} if own.strip() else {}
+    for head, _, text in (part.partition("\n") for part in inner):
+        texts[registry.full_name(head.removeprefix("MSG:").strip(), "msg")] = text
+    try:
+        return type_hash(name, Structures(texts))
+    except KeyError as error:
+        raise DefinitionError(f"there is no definition of {error}") from error
 
 
 def topic_of(token: EndpointToken) -> RecordedTopic | None:

@@ -42,7 +42,7 @@ from rbxcompose.runtime.recording import topics as codes
 from rbxcompose.runtime.recording.files import PART, Recorder, write_problem
 from rbxcompose.runtime.recording.reader import RecordingReader, RecordingSummary, playlist, summary_of
 from rbxcompose.runtime.recording.tape import PLAN
-from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, is_replayable, matches
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, matches, why_not_replayable
 from rbxcompose.runtime.replay import ReplayResult, RunDifference, missing_topics, replayed
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.tools.commands.record import add_selection_options, selection_of
@@ -215,9 +215,10 @@ def _chosen(summary: RecordingSummary, wanted: Selection) -> list[RecordedTopic]
     known = {topic.name for topic in summary.counts}
     warn_of_unmatched((one for one in wanted.patterns if not any(matches(name, one) for name in known)), known)
     topics = sorted((topic for topic in summary.counts if wanted.takes(topic)), key=lambda topic: topic.name)
-    unfit = [topic.name for topic in topics if not is_replayable(topic)]
-    if unfit:
-        warn(codes.NOT_REPLAYED.at(None, f"topics that the bus cannot carry: {plain(', '.join(unfit))}"))
+    unfit = {topic.name: why for topic in topics if (why := why_not_replayable(topic))}
+    for why in dict.fromkeys(unfit.values()):
+        names = ", ".join(name for name in unfit if unfit[name] == why)
+        warn(codes.NOT_REPLAYED.at(None, f"topics that the bus cannot carry: {plain(names)}: {plain(why)}"))
     topics = [topic for topic in topics if topic.name not in unfit]
     if wanted.patterns:
         return topics
