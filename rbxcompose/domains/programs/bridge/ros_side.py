@@ -32,6 +32,7 @@ _LOOK = 0.5  # [s] between two looks at the graph
 _SHALLOWEST = 10  # messages that wait in ROS: the newest counts only where it is used
 _BUSY, _PACE = 500.0, 0.002  # [1/s] messages from ROS, above which they are taken that often [s]
 _SETTLED = 2.0  # [s] without anything new
+_SERVED_WITHIN = 10.0  # [s] for a node that starts to have its servers; until then, requests wait for them
 _GOODBYE = 1.0  # [s] to leave ROS
 _ECHOES = 64  # messages that may be on their way back to us
 
@@ -76,6 +77,7 @@ class RosSide:
         self._orders: deque[dict[str, Any]] = deque()
         self._echoes: dict[str, deque[bytes]] = {}  # of topics that pass both ways
         self._lock = threading.Lock()
+        self._early: dict[int, tuple[float, deque[link.Frame]]] = {}  # by client: until when its requests wait [s]
         self._waiting: dict[tuple[int, int], int] = {}  # numbers of our requests by client and sequence
         self._asked: dict[int, tuple[int, Any]] = {}  # ROS's requests by our number: the channel and the header
         self._next = 0
@@ -106,6 +108,10 @@ class RosSide:
                 echoes.append(frame.payload)
             entity.publish(frame.payload)
         elif frame.kind == link.REQUEST:
+            with self._lock:
+                if frame.channel in self._early:
+                    self._early[frame.channel][1].append(frame)
+                    return
             self._ask(frame, entity)
         else:
             self._answer(frame, entity)
@@ -117,6 +123,23 @@ class RosSide:
         request = deserialize_message(frame.payload, client.srv_type.Request)
         with self._lock, client.handle:
             self._waiting[(frame.channel, client.handle.send_request(request))] = frame.number
+
+    def _ask_early(self) -> None:
+        """Send the requests that came before their servers, in their order, once these are there or late."""
+        for channel, (until, frames) in [*self._early.items()]:
+            client = self._entities[channel]
+            if not client.service_is_ready() and time.monotonic() < until:
+                continue
+            while channel in self._early:
+                with self._lock:
+                    if not frames:
+                        del self._early[channel]
+                        break
+                    frame = frames.popleft()
+                try:
+                    self._ask(frame, client)
+                except Exception as error:  # as in `receive`
+                    self._problem(channel, f"{type(error).__name__}: {error}")
 
     def _answer(self, frame: link.Frame, service: Any) -> None:
         with self._lock:
@@ -149,6 +172,7 @@ class RosSide:
             looked, passed = time.monotonic(), self._passed
             while context.ok() and not self._orders:
                 self._wait(waits, subscriptions, clients, services)
+                self._ask_early()
                 if (now := time.monotonic()) - looked > _LOOK:
                     self._is_busy = (self._passed - passed) / (now - looked) > _BUSY
                     looked, passed = now, self._passed
@@ -232,6 +256,8 @@ class RosSide:
             if end["kind"] == "service":
                 if end["way"] == "to_ros":
                     made = node.create_client(kind, name)
+                    if "/_action/" not in name:  # no goal begins after a stop that came while it waited
+                        self._early[channel] = time.monotonic() + _SERVED_WITHIN, deque()
                 else:
                     made = node.create_service(kind, name, lambda request, response: response)
             elif end["way"] == "to_ros":
@@ -257,6 +283,7 @@ class RosSide:
         return "" if end["hash"] in found else next(iter(found), "")
 
     def _drop(self, channel: int) -> None:
+        self._early.pop(channel, None)
         if (entity := self._entities.pop(channel, None)) is not None:
             entity.destroy()
 
