@@ -56,6 +56,13 @@ class Driven:
             self.now += PERIOD
 
 
+def test_a_joint_with_limits_does_not_turn_without_end() -> None:
+    endless = ServoJoint("pan", joint().servos, MotionLimits(velocity=2.0), is_continuous=True)
+    for limits, is_endless in ((endless.limits, True), (LIMITS, False)):
+        drive = PositionDrive(replace(endless, limits=limits), JointPolicy(cycle=PERIOD))
+        assert drive.rules.is_continuous is is_endless
+
+
 @for_all("name", servo_models())
 @pytest.mark.parametrize("is_inverted", [False, True])
 def test_each_tick_is_the_tick_of_its_angle(name: str, is_inverted: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, files
@@ -107,6 +108,21 @@ def test_what_the_urdf_does_not_have_is_not_exported(tmp_path: Path) -> None:
     assert files["lifter.urdf"] == LIFTER[1].read_text()
     assert semantics_of(robot.manifest.contents, "").groups["arm"].chains == (("base", "palm"),)
     assert FITS in files["lifter.srdf"]
+
+
+def test_a_joint_that_turns_without_end_gets_the_range_of_a_servo_as_a_guess(tmp_path: Path) -> None:
+    paths = [tmp_path / f"lifter.{end}" for end in ("srdf", "urdf")]
+    paths[0].write_text(LIFTER[0].read_text().replace('name="shoulder" value="-0.5"', 'name="shoulder" value="4.0"'))
+    paths[1].write_text(
+        LIFTER[1].read_text().replace('name="shoulder" type="revolute"', 'name="shoulder" type="continuous"')
+    )
+    made = import_files(paths, "lifter", "srdf")
+    assert made.data["arms"]["arm"]["poses"]["home"]["shoulder"] == f"{4.0 - math.tau!r} rad"
+    [line] = [line for line in made.text.splitlines() if "shoulder_servo, limits" in line]
+    assert "[-179.0 deg, 179.0 deg]" in line
+    assert line.endswith("# a guess")
+    report = compiled(tmp_path / "made", made, paths[1]).report
+    assert [finding.code for finding in report if finding.severity == "error"] == []
 
 
 def test_without_its_urdf_an_srdf_means_nothing() -> None:

@@ -49,6 +49,30 @@ def test_an_arm_has_the_joints_of_its_chain_with_their_tighter_limits(tmp_path: 
     assert config.poses["straight_forward"]["right_arm_shoulder_lift_joint"] == pytest.approx(-1.5708, abs=1e-4)
 
 
+TURNING = """
+body: {urdf: arm.urdf}
+buses: {servos: {type: dynamixel}}
+actuators: {turn_servo: {bus: servos, model: XL430-W250, id: 1}}
+joints: {turn: {actuator: turn_servo, limits: {LIMITS}}}
+controllers: {arm_controller: {type: joint_trajectory, joints: [turn]}}
+arms: {arm: {joints: [turn], controller: arm_controller, poses: {back: {turn: 180 deg}}}}
+"""
+TURNING_BODY = """<robot name="arm"><link name="base"/><link name="upper"/>
+<joint name="turn" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/></joint></robot>"""
+
+
+def test_limits_of_the_robot_end_a_joint_that_turns_without_end_in_its_body(tmp_path: Path) -> None:
+    project, files = Project(tmp_path), {"robots/one/arm.urdf": TURNING_BODY}
+    for position, limits in (("", (None, None, True)), (", position: [-1 rad, 4 rad]", (-1.0, 4.0, False))):
+        project.check(TURNING.replace("LIMITS", f"velocity: 1 rad/s{position}"), files=files)
+        assert project.findings == []
+        turn = arm_of(project).config.joints["turn"]
+        assert (turn.lower, turn.upper, turn.is_continuous) == limits
+    limited = project.check(TURNING.replace("LIMITS", "velocity: 1 rad/s, position: [-4 rad, 1 rad]"), files=files)
+    assert limited.codes == ["RBX2304"]
+    assert "in the pose 'back', 'turn' is at 180 deg, beyond its limits" in limited.text
+
+
 def test_a_robot_changes_the_arm_of_its_part(tmp_path: Path) -> None:
     project = Project(tmp_path)
     project.check(

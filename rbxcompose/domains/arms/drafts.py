@@ -82,7 +82,7 @@ def _joint(joint: BodyJoint) -> Row:
     elif max(-lower, upper) > _WIDEST or joint.kind == "continuous":
         bounds = [f"{math.degrees(each):.1f} deg" for each in (max(lower, -_WIDEST), min(upper, _WIDEST))]
         entries["limits"] = flow({"position": flow_list(bounds)})
-    return row(1, f"{key(joint.name)}: {flow(entries)}", _GUESS if joint.slides else "")
+    return row(1, f"{key(joint.name)}: {flow(entries)}", _GUESS if len(entries) > 1 else "")
 
 
 def ends_of(joint: BodyJoint) -> tuple[float, float]:
@@ -130,7 +130,9 @@ def _arm(body: Body, draft: ArmDraft) -> Iterator[Row]:
 
 
 def _position(joint: BodyJoint, value: float) -> str:
-    return length(value) if joint.slides else angle(value)
+    if joint.slides:
+        return length(value)
+    return angle(math.remainder(value, math.tau) if joint.kind == "continuous" else value)
 
 
 LEAST, LONG = 2, 4  # joints of an arm: wheels have one; a long row is an arm even if it carries a hand of many joints

@@ -272,15 +272,14 @@ def _beyond_reach(driven: DrivenJoint) -> Iterator[Finding]:
     is_above = limits.greatest > last + slack and (limits.upper is not None or joint.is_continuous)
     if not (is_below or is_above):
         return
-    is_free = limits.lower is None and limits.upper is None
     bounds = f"{driven.position(limits.least)} to {driven.position(limits.greatest)}"
-    wanted = "turns without end" if is_free else f"may go from {bounds}"
+    wanted = "turns without end" if limits.are_endless else f"may go from {bounds}"
     servo = "its servo reaches" if len(joint.servos) == 1 else "its servos reach"
     body = driven.body.limits if driven.body else None
     message = f"'{driven.name}' {wanted}, but {servo} {driven.position(first)} to {driven.position(last)}"
     if body and not driven.slides and body.may_be_degrees:
         return  # reported as RBX2021
-    if body and not is_free and (intended := _in_degrees(driven)):
+    if body and not limits.are_endless and (intended := _in_degrees(driven)):
         help_text = f"limits in a URDF are in radians: for degrees, write {intended}"
         yield out_of_reach.at(body.span, message, help=help_text)
         return

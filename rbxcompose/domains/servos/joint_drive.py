@@ -131,7 +131,7 @@ class JointDrive(ABC):
 
     def __init__(self, joint: ServoJoint, policy: joint_states.JointPolicy) -> None:
         self.joint, self.policy = joint, policy
-        self.rules = JointRules(joint.limits, joint.is_continuous)
+        self.rules = JointRules(joint.limits, joint.is_continuous and joint.limits.are_endless)
         self.condition = joint_states.JointCondition()
         self.limiter: Limiter | None = None  # from the first torque on
         self.measured = JointSample(math.nan)

@@ -58,6 +58,11 @@ class MotionLimits:
         """The greatest speed, inf without a limit."""
         return math.inf if self.velocity is None else self.velocity
 
+    @property
+    def are_endless(self) -> bool:
+        """Whether all positions are within the range."""
+        return self.lower is None and self.upper is None
+
     def clamped(self, position: float) -> float:
         """Return the position nearest to `position` that is within the range."""
         return max(self.least, min(self.greatest, position))

@@ -127,7 +127,7 @@ def joint_limits(contents: Contents, joint: BodyJoint) -> dict[str, object]:
     """Return the limits of a joint as an `ArmJointConfig` has them."""
     limits = limits_in(contents, joint)
     found = {name: getattr(limits, name) for name in ("lower", "upper", "velocity", "acceleration", "jerk")}
-    return {**found, "is_continuous": joint.kind == "continuous", "slides": joint.slides}
+    return {**found, "is_continuous": joint.kind == "continuous" and limits.are_endless, "slides": joint.slides}
 
 
 def _pairs(description: Description, group: ArmGroup) -> dict[str, list[LinkPair]] | None:
@@ -402,7 +402,7 @@ def _unfit(
         return
     limits = limits_in(reading.contents, known.joints[joint])
     nearest = limits.clamped(position.value)
-    if known.joints[joint].kind != "continuous" and abs(nearest - position.value) > _ROUNDING:
+    if abs(nearest - position.value) > _ROUNDING:
         shown = [format_quantity(value, position.dimension) for value in (position.value, nearest)]
         message = f"in the pose '{pose}', '{joint}' is at {shown[0]}, beyond its limits"
         yield BEYOND.at(span, message, help=f"the nearest that it reaches is {shown[1]}")
