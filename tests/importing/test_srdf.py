@@ -65,6 +65,24 @@ def test_what_is_exported_is_imported_as_the_same(robot: str, tmp_path: Path) ->
     assert said(compiled(tmp_path / "two", again, paths[1])) == said(first)
 
 
+def test_what_is_left_out_is_reported_where_it_is_written(tmp_path: Path) -> None:
+    added = """
+    <group name="Arm"><joint name="lift"/></group>
+    <group_state name="low" group="Arn"><joint name="lift" value="0"/></group_state>
+    <group_state name="Low" group="torso"><joint name="lift" value="0"/></group_state>
+    <passive_joint name="grasp"/>
+</robot>"""
+    (tmp_path / "lifter.srdf").write_text(LIFTER[0].read_text().replace("\n</robot>", added))
+    before = import_files(LIFTER, "lifter", "srdf")
+    after = import_files([tmp_path / "lifter.srdf", LIFTER[1]], "lifter", "srdf")
+    line = LIFTER[0].read_text().count("\n")
+    new = [("RBX2230", line), ("RBX2311", line + 1), ("RBX2313", line + 2), ("RBX2230", line + 3)]
+    assert [told for told in after.told if told not in before.told] == new
+    assert after.data["arms"]["arm"] == before.data["arms"]["arm"]
+    for words in ("a further group 'Arm' has", "did you mean 'Arm'?", "'Low' is called 'low'", "joint 'grasp' has no"):
+        assert words in after.words
+
+
 FITS = '<virtual_joint name="world_joint" type="fixed" parent_frame="world" child_link="base"/>'
 
 

@@ -8,6 +8,7 @@ from dataclasses import field
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Span
+from rbxcompose.base.printable import plain
 from rbxcompose.domains.body.link_pairs import REASONS, LinkPair, PairReason, pair_of
 from rbxcompose.domains.body.xml_reader import XmlElement, quoted
 
@@ -61,6 +62,8 @@ class Semantics:
     outer: tuple[OuterJoint, ...] = ()
     others: tuple[tuple[str, Span], ...] = field(default=(), compare=False)
     """What is understood by MoveIt alone, in words, with its places."""
+    places: Mapping[tuple[str, ...], Span] = field(default_factory=dict, compare=False)
+    """Where it is written, by the element and its names: of a state, its group comes first; links are in order."""
 
 
 def is_srdf(root: XmlElement) -> bool:
@@ -73,21 +76,29 @@ def is_srdf(root: XmlElement) -> bool:
 
 def read_semantics(root: XmlElement) -> Semantics:
     """Return what an SRDF says."""
-    groups = {one.name: one for one in map(_group, root.all("group"))}
+    groups: dict[str, SemanticGroup] = {}
     poses: dict[str, dict[str, dict[str, float]]] = {}
     others: list[tuple[str, Span]] = []
+    places: dict[tuple[str, ...], Span] = {}
+    for element in root.all("group"):
+        group = _group(element)
+        if groups.setdefault(group.name, group) is not group:
+            others.append((f"a further group '{plain(group.name, 60)}'", element.span))
     for state in root.all("group_state"):
-        positions = poses.setdefault(_text(state, "group"), {}).setdefault(_text(state, "name"), {})
+        owner, name = _text(state, "group"), _text(state, "name")
+        places["group_state", owner, name] = state.span
+        positions = poses.setdefault(owner, {}).setdefault(name, {})
         for joint in state.all("joint"):
             value = _number(joint)
             if value is None:
                 others.append((f"'{_text(joint, 'value')}' is not a single position of a joint", joint.span))
             else:
                 positions[_text(joint, "name")] = value
-    pairs = {
-        pair_of(_text(element, "link1"), _text(element, "link2")): _reason(_text(element, "reason"))
-        for element in root.all("disable_collisions")
-    }
+    pairs: dict[LinkPair, PairReason] = {}
+    for element in root.all("disable_collisions"):
+        pair = pair_of(_text(element, "link1"), _text(element, "link2"))
+        pairs[pair], places["disable_collisions", *pair] = _reason(_text(element, "reason")), element.span
+    places |= {("passive_joint", _text(element, "name")): element.span for element in root.all("passive_joint")}
     known = ("group", "group_state", "end_effector", "passive_joint", "disable_collisions", "virtual_joint")
     others += [(f"the element '{child.name}'", child.span) for child in root.children if child.name not in known]
     return Semantics(
@@ -99,6 +110,7 @@ def read_semantics(root: XmlElement) -> Semantics:
         pairs,
         tuple(map(_outer, root.all("virtual_joint"))),
         tuple(others),
+        places,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args
@@ -94,9 +94,10 @@ def srdf(files: Sequence[ForeignFile], name: str, report: Report) -> ImportedFil
     if description is None:
         return ImportedFiles("")
     semantics = read_semantics(said[1])
-    drafts = list(_Drafts(semantics, description.body, report, said[1].span).drafts())
+    drafts = list(_Drafts(semantics, description.body, report).drafts())
+    report.extend(_lost(semantics, {joint for draft in drafts for joint in draft.passive}))
     report.extend(NOT_CARRIED_OVER.at(span, f"{words} has no counterpart") for words, span in semantics.others)
-    matrix = _matrix(semantics, description, report, said[1].span)
+    matrix = _matrix(semantics, description, report)
     outer = virtual_joint(semantics.outer, description.body, report)
     beside = {f"{name}.collisions.yaml": matrix.text()} if matrix.pairs else {}
     if not drafts and not beside:
@@ -107,6 +108,18 @@ def srdf(files: Sequence[ForeignFile], name: str, report: Report) -> ImportedFil
     )
 
 
+def _lost(said: Semantics, passive: Set[str]) -> Iterator[Finding]:
+    """Yield what belongs to no arm; `passive` has the joints that do."""
+    for joint in said.passive:
+        if joint not in passive:
+            words = f"the passive joint '{plain(joint, 60)}' has no counterpart: it is on no arm's chain"
+            yield NOT_CARRIED_OVER.at(said.places["passive_joint", joint], words)
+    for (element, group, *pose), place in said.places.items():
+        if element == "group_state" and group not in said.groups:
+            words = f"the pose '{plain(pose[0], 60)}' is of a group that is not there: '{plain(group, 60)}'"
+            yield NO_SUCH.misspelt(place, words, group, said.groups, "groups")
+
+
 def _described(path: Path, span: Span, report: Report) -> Description | None:
     part = BodyPart("", BodyFile(path, span, False, {}, {}), None, span, span)
     found, findings = describe("", path.parent, [part], {})
@@ -115,24 +128,26 @@ def _described(path: Path, span: Span, report: Report) -> Description | None:
     return found
 
 
-def _matrix(said: Semantics, description: Description, report: Report, span: Span) -> CollisionMatrix:
+def _matrix(said: Semantics, description: Description, report: Report) -> CollisionMatrix:
     """Return the pairs of links that exist."""
     links = description.body.links
     pairs = {pair: reason for pair, reason in said.pairs.items() if set(pair) <= links.keys()}
     if unknown := sorted({link for pair in said.pairs for link in pair} - links.keys()):
         words = ", ".join(f"'{plain(link, 60)}'" for link in unknown[:5])
+        span = next(said.places["disable_collisions", *pair] for pair in said.pairs if pair not in pairs)
         report.add(NO_SUCH.at(span, f"pairs of links that the URDF does not have are left out: {words}"))
-    if resting := [f"{text} - {other}" for (text, other), reason in sorted(pairs.items()) if reason == "default"]:
+    if resting := [pair for pair, reason in sorted(pairs.items()) if reason == "default"]:
+        shown = ", ".join(f"{first} - {second}" for first, second in resting[:5])
         more = f" and {len(resting) - 5} more" if len(resting) > 5 else ""
-        report.add(WATCHED.at(span, f"these stay watched: {', '.join(resting[:5])}{more}"))
+        report.add(WATCHED.at(said.places["disable_collisions", *resting[0]], f"these stay watched: {shown}{more}"))
     return CollisionMatrix(pairs, 0, 0, digest_of(description.body, description.meshes))
 
 
 class _Drafts:
     """The groups of an SRDF as arms."""
 
-    def __init__(self, said: Semantics, body: Body, report: Report, span: Span) -> None:
-        self.said, self.body, self.report, self.span = said, body, report, span
+    def __init__(self, said: Semantics, body: Body, report: Report) -> None:
+        self.said, self.body, self.report = said, body, report
         self.names = FreeNames(is_own_name)
         self.hands = {effector.group: effector for effector in said.effectors if self._is_hand(effector)}
         self.named: dict[str, str] = {}
@@ -143,7 +158,7 @@ class _Drafts:
             if group.name in self.hands:
                 for pose in self.said.poses.get(group.name, {}):
                     words = f"the pose '{plain(pose, 60)}' of '{plain(group.name, 60)}': a gripper opens by a distance"
-                    self.report.add(NOT_CARRIED_OVER.at(group.span, words))
+                    self.report.add(NOT_CARRIED_OVER.at(self.said.places["group_state", group.name, pose], words))
                 continue
             joints = self.joints_of(group)
             moved = tuple(joint for joint in joints if joint not in self.said.passive)
@@ -151,10 +166,10 @@ class _Drafts:
                 words = f"the group '{plain(group.name, 60)}' moves nothing, so it is no arm"
                 self.report.add(NOT_CARRIED_OVER.at(group.span, words))
                 continue
-            self.named[group.name] = name = self._named(self.names, group, group.name, "arm")
-            passive = tuple(joint for joint in joints if joint not in moved) if group.chains else ()
+            self.named[group.name] = name = self._named(self.names, group.span, group.name, "arm")
             where = self._where(group, moved)
-            draft = ArmDraft(name, where, moved, self._poses(group, moved), passive if "chain" in where else ())
+            passive = [joint for joint in joints if joint not in moved] if where.startswith("chain:") else []
+            draft = ArmDraft(name, where, moved, self._poses(group, moved), tuple(passive))
             yield replace(draft, gripper=self._gripper(group, moved))
 
     def joints_of(self, group: SemanticGroup, seen: frozenset[str] = frozenset()) -> list[str]:
@@ -202,15 +217,17 @@ class _Drafts:
     def _poses(self, group: SemanticGroup, moved: tuple[str, ...]) -> Mapping[str, Mapping[str, float]]:
         free = FreeNames()
         return {
-            self._named(free, group, pose, "pose"): {joint: at for joint, at in positions.items() if joint in moved}
+            self._named(free, self.said.places["group_state", group.name, pose], pose, "pose"): {
+                joint: at for joint, at in positions.items() if joint in moved
+            }
             for pose, positions in self.said.poses.get(group.name, {}).items()
         }
 
-    def _named(self, free: FreeNames, group: SemanticGroup, name: str, otherwise: str) -> str:
+    def _named(self, free: FreeNames, span: Span | None, name: str, otherwise: str) -> str:
         """Return the name of a group or one of its poses here, after a finding if it is another one."""
         taken = free.take(name, otherwise)
         if taken != name:
-            self.report.add(RENAMED.at(group.span, f"'{plain(name, 60)}' is called '{taken}'"))
+            self.report.add(RENAMED.at(span, f"'{plain(name, 60)}' is called '{taken}'"))
         return taken
 
     def _is_hand(self, effector: EndEffector) -> bool:
@@ -233,7 +250,7 @@ class _Drafts:
             if effector.parent_group == group.name or (not effector.parent_group and is_carried and not group.groups):
                 joints = self.joints_of(self.said.groups[hand])
                 if len(joints) == 1:
-                    taken = self._named(self.names, group, hand, "gripper")
+                    taken = self._named(self.names, self.said.groups[hand].span, hand, "gripper")
                     if effector.name not in ("", hand):
                         words = f"the end effector '{plain(effector.name, 60)}' is called '{taken}', as its group"
                         self.report.add(RENAMED.at(effector.span, words))
