@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 
 import pytest
+import yaml
 
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.domains.body.link_pairs import digest_of
@@ -81,6 +82,20 @@ def test_what_is_left_out_is_reported_where_it_is_written(tmp_path: Path) -> Non
     assert after.data["arms"]["arm"] == before.data["arms"]["arm"]
     for words in ("a further group 'Arm' has", "did you mean 'Arm'?", "'Low' is called 'low'", "joint 'grasp' has no"):
         assert words in after.words
+
+
+def test_limits_of_the_robot_are_exported_beside_those_of_its_urdf(tmp_path: Path) -> None:
+    made = import_files(LIFTER, "lifter", "srdf")
+    limits = "limits: {position: [-1 rad, 0.5 rad], velocity: 0.2 rad/s, acceleration: 3 rad/s^2}"
+    text = made.text.replace("elbow: {actuator: elbow_servo", f"elbow: {{actuator: elbow_servo, {limits}")
+    robot = compiled(tmp_path, replace(made, text=text), LIFTER[1]).robot
+    assert robot is not None
+    found = yaml.safe_load(exported(robot.manifest.contents, "lifter")["joint_limits.yaml"])["joint_limits"]
+    assert list(found) == ["shoulder", "elbow", "lift", "grasp"]
+    position = {"has_position_limits": True, "min_position": -1.0, "max_position": 0.5}
+    velocity = {"has_velocity_limits": True, "max_velocity": 0.2}
+    assert found["elbow"] == {**position, **velocity, "has_acceleration_limits": True, "max_acceleration": 3.0}
+    assert found["shoulder"]["min_position"] == -2.0
 
 
 FITS = '<virtual_joint name="world_joint" type="fixed" parent_frame="world" child_link="base"/>'

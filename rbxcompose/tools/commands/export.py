@@ -5,7 +5,7 @@
 `rviz` and `foxglove` write what shows a robot there: a configuration of RViz 2, a layout of Foxglove.
 `bt` writes a mission, with those that it uses, as trees of BehaviorTree.CPP 4.
 
-The files go to a new or empty folder; `srdf` writes a URDF and an SRDF.
+The files go to a new or empty folder; `srdf` writes a URDF, an SRDF and the limits of joints.
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
 

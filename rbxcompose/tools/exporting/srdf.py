@@ -1,6 +1,8 @@
-"""What MoveIt reads of a robot: its URDF, and an SRDF with its arms and the pairs of links to ignore."""
+"""What MoveIt reads of a robot: its URDF, an SRDF with its arms and the pairs of links to ignore, limits of joints."""
 
 from collections.abc import Iterator
+
+import yaml
 
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms
 from rbxcompose.domains.body.description import Description
@@ -8,6 +10,7 @@ from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.body.srdf import EndEffector, OuterJoint, SemanticGroup, Semantics, to_srdf
 from rbxcompose.domains.servos.sections.controllers import controllers
+from rbxcompose.domains.servos.sections.joints import held_limits, joints
 from rbxcompose.manifest.section import Contents
 
 _CONTROLLER = "_controller"  # ends the names of controllers, and not those of groups
@@ -18,10 +21,22 @@ def exported(contents: Contents, name: str) -> dict[str, str]:
     description = contents.of(body)
     if description is None:
         return {}
+    limits = dict(_limits(contents, description.body))
     return {
         f"{name}.urdf": description.published,
         f"{name}.srdf": to_srdf(semantics_of(contents, description.body.name)),
+        "joint_limits.yaml": yaml.safe_dump({"joint_limits": limits}, sort_keys=False),
     }
+
+
+def _limits(contents: Contents, known: Body) -> Iterator[tuple[str, dict[str, float]]]:
+    """Yield the joints that are driven with their limits, which are tighter than those of the URDF."""
+    for name, driven in contents.of(joints).items():
+        limits = held_limits(driven, known.joints.get(name))
+        found = {"min_position": limits.lower, "max_position": limits.upper, "max_velocity": limits.velocity}
+        found |= {"max_acceleration": limits.acceleration, "max_jerk": limits.jerk}
+        written = {key: value for key, value in found.items() if value is not None}
+        yield name, {f"has_{key[4:]}_limits": True for key in written} | written
 
 
 def semantics_of(contents: Contents, name: str) -> Semantics:
