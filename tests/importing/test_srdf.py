@@ -13,7 +13,7 @@ import yaml
 
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.domains.body.link_pairs import digest_of
-from rbxcompose.domains.body.srdf import Semantics
+from rbxcompose.domains.body.srdf import EndEffector, SemanticGroup, Semantics
 from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.exporting.srdf import exported, semantics_of
 from tests import shipped
@@ -96,6 +96,18 @@ def test_limits_of_the_robot_are_exported_beside_those_of_its_urdf(tmp_path: Pat
     velocity = {"has_velocity_limits": True, "max_velocity": 0.2}
     assert found["elbow"] == {**position, **velocity, "has_acceleration_limits": True, "max_acceleration": 3.0}
     assert found["shoulder"]["min_position"] == -2.0
+
+
+@for_all("tip, links", [("palm", ("finger", "thumb")), ("fore", ("palm", "finger", "thumb"))])
+def test_a_gripper_is_exported_with_its_links_on_a_link_of_its_arm(
+    tip: str, links: tuple[str, ...], tmp_path: Path
+) -> None:
+    said_first = LIFTER[0].read_text().replace('tip_link="palm"', f'tip_link="{tip}"')
+    (tmp_path / "lifter.srdf").write_text(said_first.replace('parent_link="palm"', f'parent_link="{tip}"'))
+    made = import_files([tmp_path / "lifter.srdf", LIFTER[1]], "lifter", "srdf")
+    found = said(compiled(tmp_path / "made", made, LIFTER[1]))
+    assert found.effectors == (EndEffector("hand", "hand", tip, "arm"),)
+    assert found.groups["hand"] == SemanticGroup("hand", joints=("grasp",), links=links)
 
 
 FITS = '<virtual_joint name="world_joint" type="fixed" parent_frame="world" child_link="base"/>'

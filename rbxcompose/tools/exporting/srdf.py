@@ -1,9 +1,10 @@
 """What MoveIt reads of a robot: its URDF, an SRDF with its arms and the pairs of links to ignore, limits of joints."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import yaml
 
+from rbxcompose.domains.arms.motion.groups import moved_links
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.model import Body
@@ -48,8 +49,9 @@ def semantics_of(contents: Contents, name: str) -> Semantics:
         there = contents.of(controllers).get(one.model.gripper or "")
         if there is not None and description is not None:
             hand = (one.model.gripper or "").removesuffix(_CONTROLLER)
-            hands[hand] = SemanticGroup(hand, joints=tuple(there.claimed))
-            effectors.append(EndEffector(hand, hand, _palm(description.body, there.claimed[0]), arm))
+            carrier, links = _ends(description.body, one.group.tip, there.claimed)
+            hands[hand] = SemanticGroup(hand, joints=tuple(there.claimed), links=links)
+            effectors.append(EndEffector(hand, hand, carrier, arm))
     return Semantics(
         name,
         {**{arm: _group(arm, entry, description) for arm, entry in found.items()}, **hands},
@@ -77,6 +79,12 @@ def _poses(robot: ArmOfRobot) -> dict[str, dict[str, float]]:
     return {pose: {joint: at.value for joint, at in written.items()} for pose, written in robot.model.poses.items()}
 
 
-def _palm(known: Body, joint: str) -> str:
-    """Return the link that carries a finger."""
-    return known.joints[joint].parent
+def _ends(known: Body, tip: str, fingers: Sequence[str]) -> tuple[str, tuple[str, ...]]:
+    """Return the link of an arm that carries its gripper, and the links of the gripper, with those between."""
+    own = {joint.child for joint in known.joints_above(tip)}
+    carrier = known.joints[fingers[0]].parent
+    links = [link for link, joints in moved_links(known, fingers).items() if joints]
+    while carrier not in own and carrier in known.joint_above:
+        links.insert(0, carrier)
+        carrier = known.joint_above[carrier].parent
+    return carrier, tuple(links)
