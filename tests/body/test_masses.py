@@ -111,6 +111,12 @@ def test_limits_that_keep_a_joint_from_moving_are_told(name: str) -> None:
     assert found == ([f"RBX2011 {expected}"] if expected else [])
 
 
+@for_all("kind", ["planar", "floating"])
+def test_a_joint_of_more_than_one_position_is_taken_to_be_at_rest(kind: str) -> None:
+    links = f'<link name="base"/><link name="arm"/>{joint("arm", kind)}'
+    assert told(links) == [f"RBX2024 joint 'to_arm' is {kind}, and is taken to be at rest"]
+
+
 def test_the_axis_of_a_joint_that_needs_none_may_be_zero() -> None:
     fixed = joint("arm", "fixed").replace("0 0 1", "0 0 0")
     assert told(f'<link name="base"/><link name="arm"/>{fixed}') == []

@@ -133,6 +133,15 @@ def test_a_frame_in_which_the_body_moves_is_one_of_the_scene(tmp_path: Path) -> 
     assert "odom" not in config(project, "arm").urdf
 
 
+def test_a_base_may_move_the_child_of_a_planar_joint_of_the_urdf(tmp_path: Path) -> None:
+    ends = '<parent link="odom"/><child link="base_footprint"/>'
+    joint = f'<joint name="ground" type="planar">{ends}<axis xyz="0 0 1"/></joint>'
+    urdf = f'<robot name="r"><link name="odom"/><link name="base_footprint"/>{joint}</robot>'
+    robot = "body: {urdf: r.urdf}\ncomponents: {base: {type: diff_drive_sim}}\n" + BASE[BASE.index("muxes") :]
+    checked = Project(tmp_path).check(robot, files={"robots/one/r.urdf": urdf})
+    assert [code for code in checked.codes if code != "RBX5002"] == ["RBX2024"], checked.text
+
+
 def test_a_part_places_no_robot(tmp_path: Path) -> None:
     part = {"it": "body: {virtual_joint: {frame: world}}\n"}
     checked = Project(tmp_path).check("include: {it: ../../parts/it.yaml}\n", part)

@@ -11,7 +11,7 @@ from rbxcompose.base.findings import Finding, Related, Severity, kind
 from rbxcompose.base.geometry import Transform3, Vector3, rotate
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.body.files import MeshFault, mesh_places, named_also
-from rbxcompose.domains.body.model import Body, BodyJoint, BodyLink, Geometry, Inertial, JointLimits, Shape
+from rbxcompose.domains.body.model import FLOATING, Body, BodyJoint, BodyLink, Geometry, Inertial, JointLimits, Shape
 from rbxcompose.domains.body.urdf import rpy_of
 from rbxcompose.domains.body.xml_reader import XmlElement
 
@@ -30,6 +30,7 @@ NO_MOTION = kind("RBX2011", Severity.WARNING)
 NO_MESH = kind("RBX2012")
 MILLIMETRES = kind("RBX2013", Severity.WARNING)
 DEGREES = kind("RBX2021", Severity.WARNING)
+AT_REST = kind("RBX2024", Severity.WARNING)
 TURNED_IN_DEGREES = kind("RBX2023", Severity.WARNING)
 LARGEST = 20.0  # [m]
 _WRITE = "write what the motor can do"
@@ -224,6 +225,9 @@ def lint(
         if (away := math.hypot(*joint.origin.translation)) > LARGEST:
             message = f"joint '{plain(joint.name, _SHOWN)}' is {away:g} m away from the link that carries it"
             yield MILLIMETRES.at(joint.span, message, help=_LACKS_UNIT)
+        if joint.kind in FLOATING:
+            message = f"joint '{plain(joint.name, _SHOWN)}' is {joint.kind}, and is taken to be at rest"
+            yield AT_REST.at(joint.span, message, help="write 'fixed'; if it places the robot, leave it out")
         if joint.limits is not None and joint.moves:
             yield from _limits(joint, joint.limits)
             yield from _leading(joint, body)

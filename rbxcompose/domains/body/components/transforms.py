@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator
 
 from rbxcompose.base.geometry import Transform3
-from rbxcompose.domains.body.model import Body, BodyJoint
+from rbxcompose.domains.body.model import FLOATING, Body, BodyJoint
 from rbxcompose.domains.body.urdf import body_of as urdf_body
 from rbxcompose.domains.body.urdf import read_text
 from rbxcompose.msgs.builtin_interfaces import Time
@@ -73,7 +73,8 @@ class Transforms(Component[TransformsConfig]):
     def capabilities(cls, config: TransformsConfig) -> tuple[Capability, ...]:
         """Declare the frames that it writes."""
         body = body_of(config.urdf)
-        joints = [WritesFrame(_port(item), Setting(item.parent), Setting(item.child)) for item in body.joints.values()]
+        own = [joint for joint in body.joints.values() if joint.kind not in FLOATING]
+        joints = [WritesFrame(_port(item), Setting(item.parent), Setting(item.child)) for item in own]
         coinciding = WritesFrame("tf_static", Setting(config.map, "map"), Setting(config.odom, "odom"))
         return tuple(joints) if config.is_localised else (coinciding, *joints)
 
