@@ -78,7 +78,7 @@ def test_what_is_left_out_is_reported_where_it_is_written(tmp_path: Path) -> Non
     after = import_files([tmp_path / "lifter.srdf", LIFTER[1]], "lifter", "srdf")
     line = LIFTER[0].read_text().count("\n")
     new = [("RBX2230", line), ("RBX2311", line + 1), ("RBX2313", line + 2), ("RBX2230", line + 3)]
-    assert [told for told in after.told if told not in before.told] == new
+    assert [each for each in after.told if each not in before.told] == new
     assert after.data["arms"]["arm"] == before.data["arms"]["arm"]
     for words in ("a further group 'Arm' has", "did you mean 'Arm'?", "'Low' is called 'low'", "joint 'grasp' has no"):
         assert words in after.words
