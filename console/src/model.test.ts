@@ -1,6 +1,7 @@
-import { describe, expect, it } from "vitest";
+import { afterEach, describe, expect, it, vi } from "vitest";
 import type { Component } from "./description";
-import { armsOf, centred, moversOf, onWay, planOf, positionsOf, randomized, sliderOf, wayOf } from "./model";
+import { armsOf, centred, JointDrive, moversOf, onWay, planOf, positionsOf, randomized, sliderOf, wayOf } from "./model";
+import type { Message, Outcome } from "./rosbridge";
 
 const port = (name: string, kind: string, topic: string, type: string) =>
   ({ name, kind, topic, type, unit: "", skill: "", is_command: false, claims: "", is_pausable: false, measures: {}, choices: {}, outcomes: {} }) as const;
@@ -46,6 +47,49 @@ describe("what moves", () => {
     ];
     expect(armsOf([{ ...SERVOS, name: "arm", ports }])).toEqual([{ name: "arm", locate: "/arm/locate", inverse: "/arm/ik", plan: "/arm/plan", execute: "/arm/go" }]);
     expect(armsOf([{ ...SERVOS, ports: ports.slice(1) }])).toEqual([]);
+  });
+});
+
+describe("joints that are moved by goals", () => {
+  afterEach(() => vi.useRealTimers());
+  const mover = { action: "/head/move", type: "rbxcompose_msgs/action/MoveJoints", names: new Map([["pan_joint", "pan"], ["tilt_joint", "tilt"]]) };
+
+  function make() {
+    vi.useFakeTimers();
+    const goals: { goal: Message; end(outcome: Outcome): void }[] = [];
+    const act = (_action: string, _type: string, goal: Message) => {
+      const done = new Promise<Outcome>((end) => goals.push({ goal, end }));
+      return { done, cancel: () => undefined };
+    };
+    const ended: [joints: string[], why: string][] = [];
+    const drive = new JointDrive({ act }, mover, (joints, why) => void ended.push([joints, why]));
+    return { drive, goals, ended, later: () => vi.advanceTimersByTimeAsync(1000) };
+  }
+
+  it("go in one goal, and a newer goal keeps those that are still on their way", async () => {
+    const { drive, goals, ended, later } = make();
+    drive.move({ pan_joint: 1, tilt_joint: 0.5 });
+    await later();
+    expect(goals.map(({ goal }) => goal)).toEqual([{ joints: ["pan", "tilt"], positions: [1, 0.5] }]);
+    drive.move({ tilt_joint: -0.5 });
+    goals[0]!.end({ status: 6, values: "replaced by a newer goal" });
+    await later();
+    expect(goals[1]!.goal).toEqual({ joints: ["pan", "tilt"], positions: [1, -0.5] });
+    expect(ended).toEqual([]);
+    goals[1]!.end({ status: 4, values: {} });
+    await later();
+    expect(ended).toEqual([[["pan_joint", "tilt_joint"], ""]]);
+    drive.move({ tilt_joint: 0 });
+    await later();
+    expect(goals[2]!.goal).toEqual({ joints: ["tilt"], positions: [0] });
+  });
+
+  it("say which of them are not where they were to be, and why", async () => {
+    const { drive, goals, ended, later } = make();
+    drive.move({ pan_joint: 1 });
+    goals[0]!.end({ status: 6, values: { message: "blocked" } });
+    await later();
+    expect(ended).toEqual([[["pan_joint"], "blocked"]]);
   });
 });
 

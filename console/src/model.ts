@@ -1,6 +1,9 @@
 /** The robot's body as its page shows it: joints with limits in units for people, and what moves them. */
 import type { Component } from "./description";
-import { isMessage, type Json, type Message } from "./rosbridge";
+import { Sender } from "./parameters";
+import { isMessage, SUCCEEDED, type Json, type Message, type Rosbridge } from "./rosbridge";
+
+const PAUSE = 150; // [ms] between two goals of a mover
 
 /** What a URDF says of a joint that can be moved. */
 export interface JointLimits {
@@ -67,6 +70,42 @@ export function moversOf(components: readonly Component[]): Mover[] {
       return [{ action: port.topic, type: port.type, names: new Map(names) }];
     }),
   );
+}
+
+/** Sends the goals of a mover. The robot ends a goal for a newer one: each has all joints that are still on their way. */
+export class JointDrive {
+  readonly #sender: Sender<Record<string, number>>;
+  #way: Record<string, number> = {};
+
+  /** `ended` takes the joints of the newest goal once it has ended, and why they are not where they were to be, or "". */
+  constructor(link: Pick<Rosbridge, "act">, { action, type, names }: Mover, ended: (joints: string[], why: string) => void) {
+    this.#sender = new Sender(async (way) => {
+      const end = (why: string) => {
+        if (this.#way !== way) return; // a newer goal says how it ends
+        this.#way = {};
+        ended(Object.keys(way), why);
+      };
+      const goal = { joints: Object.keys(way).map((name) => names.get(name)!), positions: Object.values(way) };
+      link.act(action, type, goal).done.then(
+        ({ status, values }) => end(status === SUCCEEDED ? "" : reason(values) || "canceled"),
+        (error: Error) => end(error.message),
+      );
+    }, PAUSE);
+  }
+
+  /** Moves joints to positions [rad, m], by their names in the body. */
+  move(positions: Record<string, number>): void {
+    this.#way = { ...this.#way, ...positions };
+    this.#sender.put(this.#way);
+  }
+}
+
+/** Returns why something failed, of a text or of what has one. */
+export function reason(answer: Json): string {
+  if (typeof answer === "string") return answer;
+  if (!isMessage(answer)) return "";
+  const code = answer.error_code ?? null;
+  return String((isMessage(code) ? code.message : undefined) ?? answer.message ?? "");
 }
 
 /** An arm whose tip can be brought to a pose. */

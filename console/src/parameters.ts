@@ -177,14 +177,14 @@ export class Changes {
  * Sends values one after the other: while one is on its way, only the newest waits, and there is a pause between two.
  * A slider makes hundreds of values in a second; the robot gets a few of them, and always the last.
  */
-export class Sender {
-  readonly #send: (value: Value) => Promise<void>;
+export class Sender<T = Value> {
+  readonly #send: (value: T) => Promise<void>;
   readonly #pause: number;
-  #waiting: { value: Value } | null = null;
+  #waiting: { value: T } | null = null;
   #isBusy = false;
   #running: Promise<void> = Promise.resolve();
 
-  constructor(send: (value: Value) => Promise<void>, pause: number) {
+  constructor(send: (value: T) => Promise<void>, pause: number) {
     this.#send = send;
     this.#pause = pause;
   }
@@ -199,7 +199,7 @@ export class Sender {
     return this.#running;
   }
 
-  put(value: Value): void {
+  put(value: T): void {
     this.#waiting = { value };
     if (!this.#isBusy) this.#running = this.#run();
   }

@@ -163,8 +163,44 @@ def test_sliders_move_a_ghost_unless_they_may_move_the_robot(
     (goal,) = crane.goals(1)
     assert (goal["action"], goal["args"]["joints"]) == ("/crane/move", ["turn"])
     assert goal["args"]["positions"] == [pytest.approx(-math.pi / 6)]
-    page.get_by_label("Slide 0 to 50").fill("20")
-    expect(page.get_by_text("Nothing of the robot moves slide joint by a goal")).to_be_visible()
+    expect(page.get_by_label("Slide 0 to 50")).to_be_disabled()
+    expect(page.get_by_title("Nothing of the robot moves slide by a goal.")).to_be_visible()
+    page.get_by_label("Move the joints of the robot").uncheck()
+    expect(page.get_by_label("Slide 0 to 50")).to_be_enabled()
+
+
+def test_a_goal_of_joints_that_ends_early_is_said_and_the_sliders_follow_the_robot(
+    open_page: Callable[..., Page], crane: FakeGateway
+) -> None:
+    page = open_page(page_name="model")
+    turn, slide = page.get_by_label("Turn -90 to 90"), page.get_by_label("Slide 0 to 50")
+    expect(slide).to_have_value("10")
+    page.get_by_label("Move the joints of the robot").check()
+    page.get_by_role("button", name="Centre").click()
+    expect(turn).to_have_value("0")
+    expect(slide).to_have_value("10")  # nothing moves it
+    (goal,) = crane.goals(1)
+    crane.act("action_result", goal, {"message": "blocked"}, status=6, result=True)
+    expect(page.get_by_text("Turn stopped: blocked.")).to_be_visible()
+    crane.say("/joint_states", {"name": ["turn_joint", "slide_joint"], "position": [0.25, 0.01]})
+    expect(turn).to_have_value("14.5")
+    turn.fill("30")
+    expect(page.get_by_text("Turn stopped: blocked.")).to_be_hidden()
+
+
+def test_joints_of_a_stopped_robot_are_not_moved(open_page: Callable[..., Page], crane: FakeGateway) -> None:
+    crane.answers |= dict.fromkeys(("/console/stop", "/console/release"), lambda _: {"success": True, "message": ""})
+    page = open_page(page_name="model")
+    turn = page.get_by_label("Turn -90 to 90")
+    page.get_by_label("Move the joints of the robot").check()
+    page.get_by_role("button", name="STOP").click()
+    expect(turn).to_be_disabled()
+    expect(page.get_by_text("The robot is stopped.")).to_be_visible()
+    page.get_by_role("button", name="Randomize").click()
+    page.get_by_role("button", name="Release").click()
+    expect(turn).to_be_enabled()
+    expect(page.get_by_text("The robot is stopped.")).to_be_hidden()
+    assert crane.goals() == []
 
 
 @pytest.mark.soak  # a real robot shows its world in the tests of its gateway

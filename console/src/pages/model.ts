@@ -1,23 +1,24 @@
 /** Model: the robot in 3D, its joints by sliders, its links, and goals for arms by dragging their tips. */
 import { watchComponents, type Component } from "../description";
-import { emptyCard, h, icon, setText } from "../dom";
+import { whyNot } from "../config";
+import { disable, emptyCard, h, icon, setText } from "../dom";
 import type { RobotScene, Pose, View } from "../elements/robot_scene";
 import { formatName, numberIn } from "../format";
 import { runningGoal, sendGoal, type KeptGoal } from "../goals";
-import { armsOf, centred, moversOf, onWay, planOf, positionsOf, randomized, sliderOf, thingsOf, wayOf, type Arm, type JointSlider, type Mover, type Waypoint } from "../model";
+import { armsOf, centred, JointDrive, moversOf, onWay, planOf, positionsOf, randomized, reason, sliderOf, thingsOf, wayOf, type Arm, type JointSlider, type Waypoint } from "../model";
 import type { Page, Robot } from "../page";
 import { PartsEditor } from "../parts_editor";
-import { Sender, tidy } from "../parameters";
+import { tidy } from "../parameters";
 import { isMessage, type Json, type Message } from "../rosbridge";
 import { quaternionOf } from "../forms";
 import { Surroundings } from "../surroundings";
 import "./model.css";
 
 const LOOK = 50; // [ms] between two positions of joints
-const PAUSE = 150; // [ms] between two goals of a slider
 const SOLVED = 1; // moveit_msgs/MoveItErrorCodes
 const MOVING = "Moving\u2026";
 const FINISHED = 4; // action_msgs/GoalStatus
+const STOPPED = "The robot is stopped.";
 const NOT_CONNECTED = "The robot's model cannot be loaded: not connected.";
 
 export const page: Page = {
@@ -80,7 +81,8 @@ class ModelView {
   #editor: PartsEditor | null = null;
   readonly #surroundings: Surroundings;
   readonly #closers: (() => void)[] = [];
-  #movers: Mover[] = [];
+  #drives = new Map<string, JointDrive>(); // by the joints that they move
+  readonly #failures = new Map<JointDrive, string>();
   #described = "";
   #known: Arm[] = [];
   #wanted: Record<string, number> = {};
@@ -95,6 +97,10 @@ class ModelView {
     this.element.append(stage, h("div", { class: "model-side" }, this.#parts, this.#arms, this.#joints(), this.#links()));
     if (robot.config.role === "configure") this.#offerParts();
     this.#closers.push(
+      robot.stopped.watch((isStopped) => {
+        if (!isStopped) this.#failures.clear();
+        this.#enable();
+      }),
       watchComponents(robot.link, (components) => this.#learn(components)),
       robot.link.subscribe("/joint_states", (state) => this.#moved(state), { type: "sensor_msgs/msg/JointState", throttle: LOOK }),
       robot.link.subscribe("/scene", (message) => scene.setThings(thingsOf(message)), { type: "rbxcompose_msgs/msg/SceneObjects" }),
@@ -154,8 +160,13 @@ class ModelView {
     const described = JSON.stringify(components);
     if (described === this.#described || components.length === 0) return;
     this.#described = described;
-    this.#movers = moversOf(components);
-    this.#moves.disabled = this.#movers.length === 0;
+    this.#drives.clear();
+    this.#failures.clear();
+    for (const mover of moversOf(components).reverse()) { // the first that moves a joint counts
+      const drive = new JointDrive(this.#robot.link, mover, (joints, why) => this.#ended(drive, joints, why));
+      for (const name of mover.names.keys()) this.#drives.set(name, drive);
+    }
+    this.#enable();
     this.#known = armsOf(components);
     this.#showArms();
     this.#surroundings.learn(components);
@@ -177,7 +188,7 @@ class ModelView {
   #joints(): HTMLElement {
     if (this.#sliders.length === 0) return h("section", { class: "card" }, h("h2", {}, "Joints"), h("p", { class: "label" }, "No joint of this body can be moved."));
     const rows = this.#sliders.map((slider) => {
-      const row = new JointRow(slider, (value) => this.#want({ [slider.name]: value }), (value) => this.#send(slider.name, value));
+      const row = new JointRow(slider, (value) => this.#want({ [slider.name]: value }));
       this.#rows.set(slider.name, row);
       return row.element;
     });
@@ -196,10 +207,14 @@ class ModelView {
 
   /** Shows wanted positions [rad, m]: by the ghost, or if joints are moved, by the robot itself. */
   #want(positions: Record<string, number>): void {
-    for (const [name, value] of Object.entries(positions)) this.#rows.get(name)?.want(value);
+    const may = Object.entries(positions).filter(([name]) => !this.#rows.get(name)?.isDisabled);
+    for (const [name, value] of may) this.#rows.get(name)?.want(value);
     if (this.#moves.checked) {
-      for (const [name, value] of Object.entries(positions)) this.#rows.get(name)?.sender.put(value);
-      return;
+      for (const drive of new Set(may.map(([name]) => this.#drives.get(name)!))) {
+        this.#failures.delete(drive);
+        drive.move(Object.fromEntries(may.filter(([name]) => this.#drives.get(name) === drive)));
+      }
+      return this.#say();
     }
     this.#wanted = { ...this.#wanted, ...positions };
     this.#ghost(this.#wanted);
@@ -214,20 +229,31 @@ class ModelView {
     this.#wanted = {};
     this.#ghost(null);
     for (const row of this.#rows.values()) row.follow();
-    setText(this.#says, "");
+    this.#failures.clear();
+    this.#enable();
   }
 
-  async #send(name: string, value: number): Promise<void> {
-    const mover = this.#movers.find(({ names }) => names.has(name));
-    if (!mover) {
-      setText(this.#says, `Nothing of the robot moves ${formatName(name).toLowerCase()} by a goal.`);
-      return;
+  /** Takes how the newest goal of joints has ended: their sliders follow the robot again. */
+  #ended(drive: JointDrive, joints: string[], why: string): void {
+    for (const name of joints) this.#rows.get(name)?.follow();
+    if (why) this.#failures.set(drive, `${joints.map(nameOf).join(", ")} stopped: ${why}.`);
+    this.#say();
+  }
+
+  /** Lets sliders that would move the robot be moved only where they can. */
+  #enable(): void {
+    disable(whyNot(this.#robot.config, "operate") || (this.#drives.size > 0 ? "" : "Nothing of the robot moves joints by goals."), this.#moves);
+    const stop = this.#robot.stopped.value ? STOPPED : "";
+    for (const [name, row] of this.#rows) {
+      const why = stop || (this.#drives.has(name) ? "" : `Nothing of the robot moves ${nameOf(name).toLowerCase()} by a goal.`);
+      row.disable(this.#moves.checked ? why : "");
     }
-    const goal = { joints: [mover.names.get(name)!], positions: [value] };
-    this.#robot.link.act(mover.action, mover.type, goal).done.then(
-      ({ status, values }) => setText(this.#says, status === FINISHED || status === 5 ? "" : reason(values)),
-      (error: Error) => setText(this.#says, error.message),
-    );
+    this.#say();
+  }
+
+  #say(): void {
+    const stop = this.#moves.checked && this.#robot.stopped.value ? [STOPPED] : [];
+    setText(this.#says, [...stop, ...this.#failures.values()].join(" "));
   }
 
   // Links
@@ -450,31 +476,25 @@ function codeOf(answer: Json): number {
   return isMessage(code ?? null) ? Number((code as Message).val) : 0;
 }
 
-/** Returns why something failed, of a text or of what has one. */
-function reason(answer: Json): string {
-  if (typeof answer === "string") return answer;
-  if (!isMessage(answer)) return "";
-  const code = answer.error_code ?? null;
-  return String((isMessage(code) ? code.message : undefined) ?? answer.message ?? "");
+function nameOf(joint: string): string {
+  return formatName(joint.replace(/_joint$/, ""));
 }
 
 /** A joint with its slider: it follows the robot until it is moved. */
 class JointRow {
   readonly element: HTMLElement;
-  readonly sender: Sender;
   readonly #slider: JointSlider;
   readonly #input: HTMLInputElement;
   readonly #output = h("output", {}, "\u2013");
   #isOwn = false;
 
-  constructor(slider: JointSlider, wanted: (value: number) => void, send: (value: number) => Promise<void>) {
+  constructor(slider: JointSlider, wanted: (value: number) => void) {
     this.#slider = slider;
     const { name, least, most, step, unit } = slider;
-    this.sender = new Sender((value) => send(Number(value)), PAUSE);
     this.#input = h("input", { id: `joint-${name}`, type: "range", min: String(least), max: String(most), step: String(step) });
     this.#input.oninput = () => wanted(Number(this.#input.value) * slider.scale);
     const limits = h("span", { class: "label" }, ` ${least} to ${most}\u202f${unit}`);
-    const label = h("label", { for: this.#input.id }, formatName(name.replace(/_joint$/, "")), limits);
+    const label = h("label", { for: this.#input.id }, nameOf(name), limits);
     this.element = h("div", { class: "slider" }, label, this.#output, this.#input);
     this.#show(0);
   }
@@ -485,6 +505,15 @@ class JointRow {
     this.#show(value);
   }
 
+  get isDisabled(): boolean {
+    return this.#input.disabled;
+  }
+
+  disable(why: string): void {
+    disable(why, this.#input);
+  }
+
+  /** Shows where the robot has it, as soon as it says so. */
   follow(): void {
     this.#isOwn = false;
   }
