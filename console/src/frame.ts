@@ -62,7 +62,7 @@ export function showFrame(config: Config, link: Rosbridge): void {
   const stop = new Stop(link);
   stop.state.watch(({ is }) => robot.stopped.set(is !== "free" && is !== "refused"));
   const host = h("main", { id: "page" });
-  document.body.replaceChildren(bar, stopButtons(robot, stop), tabs, lostBanner(link), stopBanner(stop), host, notice);
+  document.body.replaceChildren(bar, stopButtons(robot, stop), tabs, lostBanner(link), stopBanner(config, stop), host, notice);
   link.state.watch((state) => document.body.classList.toggle("offline", state.is !== "open"));
   followConfig(robot, stop, route(host, tabs, robot));
 }

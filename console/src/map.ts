@@ -265,6 +265,12 @@ export function readGrid(message: Message): Grid | null {
   return { frame: frameOf(message), width, height, resolution, origin, data };
 }
 
+/** Returns whether a point in the frame of a grid lies on it. */
+export function isOn({ origin, width, height, resolution }: Grid, point: Vector): boolean {
+  const { x, y } = applied(inverted(origin), point);
+  return x >= 0 && y >= 0 && x < width * resolution && y < height * resolution;
+}
+
 /** Returns the pixels of a grid of costs, RGBA: the dearer a cell, the less is seen through it. */
 export function costPixels({ width, height, data }: Grid, dear: Colour): Uint8ClampedArray<ArrayBuffer> {
   const pixels = new Uint8ClampedArray(4 * width * height);

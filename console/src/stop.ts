@@ -1,5 +1,5 @@
 /** STOP and RELEASE: what is known of them, and the two buttons that stand on every page and need no lease. */
-import { whyNot } from "./config";
+import { whyNot, type Config } from "./config";
 import { disable, h, icon, setText } from "./dom";
 import type { Robot } from "./page";
 import { CallError, isMessage, UnansweredError, type Message, type Rosbridge } from "./rosbridge";
@@ -64,7 +64,7 @@ export class Stop {
 }
 
 /** Returns the line that says what is known of a stop; it stays until the robot stands or a person takes note. */
-export function stopBanner(stop: Stop): HTMLElement {
+export function stopBanner(config: Config, stop: Stop): HTMLElement {
   const message = h("p", { role: "alert" });
   const noted = h("button", { type: "button" }, "Dismiss");
   noted.onclick = () => stop.dismiss();
@@ -72,20 +72,20 @@ export function stopBanner(stop: Stop): HTMLElement {
   stop.state.watch((state) => {
     banner.hidden = state.is === "free";
     noted.hidden = state.is !== "refused";
-    setText(message, wordsOf(state));
+    setText(message, wordsOf(state, whyNot(config, "operate") ? "somebody with the role operate presses" : "you press"));
   });
   return banner;
 }
 
-/** Returns what a person should know of a stop. */
-export function wordsOf(state: StopState): string {
+/** Returns what a person should know of a stop; `press` says who may press Release. */
+export function wordsOf(state: StopState, press = "you press"): string {
   switch (state.is) {
     case "free":
       return "";
     case "sent":
       return "STOP is being sent.";
     case "stopped":
-      return `Stopped${state.by ? ` by ${state.by}` : ""}. Nothing moves until you press Release.`;
+      return `Stopped${state.by ? ` by ${state.by}` : ""}. Nothing moves until ${press} Release.`;
     case "owed":
       return `STOP has not arrived: ${state.why}. It is sent again until the robot answers. Use the switch on the robot.`;
     case "refused":

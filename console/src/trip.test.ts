@@ -127,7 +127,38 @@ describe("a goal that this browser sent", () => {
     trip.learn("/go_to", statuses(["new", 2]));
     expect(trip.state.value.is).toBe("driving");
     trip.learn("/go_to", statuses());
-    expect(trip.state.value.is).toBe("none");
+    expect(trip.state.value.text).toContain("no longer drives to Dock");
+  });
+
+  it("is said to have ended, and how if that is known, when the connection is back", async () => {
+    const { trip, goals, go, settled } = make();
+    const lose = async (...pairs: [id: string, status: number][]) => {
+      go("Dock");
+      trip.learn("/go_to", statuses(...pairs));
+      goals.at(-1)!.fail(new LostError("the connection was lost"));
+      await settled();
+      expect(trip.state.value.text).toContain("whether the robot still drives to Dock");
+    };
+    await lose(["first", 2]);
+    trip.learn("/go_to", statuses(["first", 4]));
+    expect(trip.state.value).toMatchObject({ is: "arrived", text: "Arrived at Dock" });
+    await lose(["first", 4], ["second", 2]);
+    trip.learn("/go_to", statuses(["second", 5]));
+    expect(trip.state.value.text).toBe("Canceled on the way to Dock");
+    await lose(["second", 5]); // lost before the robot has said its id
+    trip.learn("/go_to", statuses(["second", 5], ["other", 2]));
+    expect(trip.state.value.text).toContain("whether the robot still drives to Dock");
+    trip.learn("/go_to", statuses(["second", 5], ["other", 4]));
+    expect(trip.state.value).toMatchObject({ is: "unknown", text: expect.stringContaining("no longer drives to Dock") });
+  });
+
+  it("was not refused if it ends with its server underway", async () => {
+    const { trip, goals, go, settled } = make();
+    go("Dock");
+    trip.learn("/go_to", statuses(["new", 2]));
+    goals[0]!.fail(new CallError("the server is gone"));
+    await settled();
+    expect(trip.state.value).toMatchObject({ is: "failed", text: "No longer drives to Dock: the server is gone" });
   });
 
   it("is told apart from the goals of others, and from those that have ended", async () => {

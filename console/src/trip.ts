@@ -39,9 +39,10 @@ export class Trip {
   readonly state = new Signal<TripState>(NONE);
   readonly #link: Pick<Rosbridge, "act" | "call">;
   #sent: Goal | null = null;
-  #to: Destination | null = null; // of a goal that was sent, until the robot has told its id
+  #to: Destination | null = null; // of the newest goal
+  #id = ""; // of that goal, once the robot has said it
   #known: ReadonlySet<string> = new Set(); // ids of goals that the robot has told
-  #followed: { action: string; id: string; name: string } | null = null; // a goal that was sent before the page was loaded
+  #followed: { action: string; id: string } | null = null; // a goal whose end is not sent to this page
 
   constructor(link: Pick<Rosbridge, "act" | "call">) {
     this.#link = link;
@@ -49,17 +50,22 @@ export class Trip {
 
   /** Drives to a pose, by an action of a type; `message` is the goal. A newer trip takes the place of an older one. */
   begin(action: string, type: string, message: Message, to: Destination): void {
-    const { name, pose, frame } = to;
+    const { name } = to;
     const sent = this.#link.act(action, type, message, ({ distance_remaining: left }) => {
       if (this.#sent === sent && typeof left === "number") this.state.set({ ...this.state.value, left });
     });
     this.#sent = sent;
     this.#followed = null;
-    this.#to = to;
-    this.state.set({ is: "driving", text: `Driving to ${name}`, pose, frame, left: null });
+    [this.#to, this.#id] = [to, ""];
+    this.#drive();
     sent.done.then(
       (outcome) => this.#end(sent, endOf(outcome, name)),
-      (error: Error) => this.#end(sent, failureOf(error, name)),
+      (error: Error) => {
+        if (this.#sent !== sent) return;
+        const [id, isAccepted] = [this.#id, this.#id !== "" || this.state.value.left !== null];
+        this.#end(sent, failureOf(error, name, isAccepted));
+        if (id && error instanceof LostError) this.#followed = { action, id };
+      },
     );
   }
 
@@ -79,30 +85,41 @@ export class Trip {
   learn(action: string, { status_list }: Message): void {
     const statuses = (Array.isArray(status_list) ? status_list : []).flatMap(readStatus);
     const running = statuses.find(({ status }) => status < SUCCEEDED);
-    if (this.#to && running && !this.#known.has(running.id)) {
+    if (this.#sent && !this.#id && running && !this.#known.has(running.id)) {
+      this.#id = running.id;
       remember(KEPT, JSON.stringify({ id: running.id, ...this.#to }));
-      this.#to = null;
     }
     this.#known = new Set(statuses.map(({ id }) => id));
     if (this.#followed) {
-      const { id, name } = this.#followed;
+      const { id } = this.#followed;
       const status = statuses.find((each) => each.id === id)?.status;
-      if (status !== undefined && status < SUCCEEDED) return;
+      if (status !== undefined && status < SUCCEEDED) {
+        if (this.state.value.is !== "driving") this.#drive();
+        return;
+      }
       this.#followed = null;
-      const [is, text] = status === undefined ? ([NONE.is, NONE.text] as const) : endOf({ status, values: null }, name);
+      const { name } = this.#to!;
+      const [is, text] = status === undefined ? goneOf(name) : endOf({ status, values: null }, name);
       this.state.set({ ...NONE, is, text });
     } else if (running && !this.#sent && (this.state.value.is === "none" || this.state.value.is === "unknown")) {
       const kept = keptOf(running.id);
       if (!kept) return;
-      const { name, pose, frame } = kept;
-      this.#followed = { action, id: running.id, name };
-      this.state.set({ is: "driving", text: `Driving to ${name}`, pose, frame, left: null });
+      this.#to = kept;
+      this.#followed = { action, id: running.id };
+      this.#drive();
+    } else if (!running && this.state.value.is === "unknown") {
+      this.state.set({ ...this.state.value, text: goneOf(this.#to!.name)[1] });
     }
+  }
+
+  #drive(): void {
+    const { name, pose, frame } = this.#to!;
+    this.state.set({ is: "driving", text: `Driving to ${name}`, pose, frame, left: null });
   }
 
   #end(sent: Goal, [is, text]: readonly [TripState["is"], string]): void {
     if (this.#sent !== sent) return;
-    this.#sent = this.#to = null;
+    this.#sent = null;
     this.state.set({ ...NONE, is, text });
   }
 }
@@ -129,9 +146,14 @@ function endOf({ status, values }: Outcome, name: string): readonly [TripState["
   return ["failed", why ? `${words}: ${why}` : words];
 }
 
-function failureOf(error: Error, name: string): readonly [TripState["is"], string] {
-  if (!(error instanceof LostError)) return ["failed", `Refused to drive to ${name}: ${error.message}`];
+function failureOf(error: Error, name: string, isAccepted: boolean): readonly [TripState["is"], string] {
+  const what = isAccepted ? "No longer drives" : "Refused to drive";
+  if (!(error instanceof LostError)) return ["failed", `${what} to ${name}: ${error.message}`];
   return ["unknown", `The connection was lost: whether the robot still drives to ${name}, or has arrived, is unknown`];
+}
+
+function goneOf(name: string): readonly [TripState["is"], string] {
+  return ["unknown", `The robot no longer drives to ${name}; whether it has arrived is unknown`];
 }
 
 function whyOf(values: Json): string {

@@ -14,7 +14,7 @@ from playwright.sync_api import Page, expect
 from rbxcompose.base.requests import Refused
 from tests.console.browser import CHROMIUM
 from tests.console.fake_gateway import CONFIG, FakeGateway, FakeLog
-from tests.console.looks import PHONE, expect_fit, violations
+from tests.console.looks import PHONE, expect_fit, overflows, violations
 from tests.console.test_page_robot import DESCRIBED, component, port
 from tests.soak import rare
 
@@ -132,6 +132,8 @@ def test_it_is_seen_who_commands_and_an_input_is_locked(open_page: Callable[...,
     expect(mux.get_by_role("status")).to_have_text("Teleop commands")
     expect(mux.get_by_role("button", name="Unlock navigation")).to_be_visible()
     assert violations(page) == []
+    page.set_viewport_size({"width": 320, "height": 568})
+    assert not overflows(page)
 
 
 @pytest.mark.soak  # as one is locked
@@ -156,8 +158,23 @@ def test_who_may_only_look_is_offered_nothing_that_the_robot_refuses(
     has_mux(gateway)
     has_topics(gateway)
     rinse = port("rinse", "serves", "/rinse", "std_srvs/srv/Trigger", skill="rinse")
-    gateway.windows[DESCRIBED] = [component("cmd_vel", "mux", rinse, requests={"mux.LookAtMux": False})]
-    gateway.config = {**CONFIG, "role": "view"}
+    navigate = port("go_to", "serves_action", "/go_to", "nav2_msgs/action/NavigateToPose")
+    gateway.windows[DESCRIBED] = [
+        component("cmd_vel", "mux", rinse, requests={"mux.LookAtMux": False}),
+        component("go_to", "navigator", navigate),
+    ]
+    item = {
+        "path": "/arm/elbow",
+        "name": "elbow",
+        "depth": 1,
+        "level": 2,
+        "message": "hot",
+        "is_group": False,
+        "values": [],
+    }
+    group = item | {"path": "/arm", "name": "arm", "depth": 0, "is_group": True}
+    gateway.windows["diagnostics/ShowDiagnostics"] = {"time": 1.0, "level": 2, "cause": "hot", "lines": [group, item]}
+    gateway.config = {**CONFIG, "role": "view", "places": {"dock": {"x": 0.0, "y": 0.0, "heading": 0.0}}}
     gateway.windows["robot/RobotStatus"] = {"stop": {"by": "the console", "time": 1.0}}
     page = open_page(page_name="mux")
 
@@ -168,6 +185,7 @@ def test_who_may_only_look_is_offered_nothing_that_the_robot_refuses(
             expect(button).to_have_attribute("title", "This needs the link of the role operate.")
 
     expect_refused("Lock navigation", "Lock all", "Unlock all", "Release")
+    expect(page.get_by_text("Nothing moves until somebody with the role operate presses Release.")).to_be_visible()
     page.get_by_role("link", name="Drive").click()
     expect(page.locator(".hint").first).to_have_text("Driving needs the link of the role operate.")
     expect(page.get_by_label("Top speed")).to_be_disabled()
@@ -181,6 +199,11 @@ def test_who_may_only_look_is_offered_nothing_that_the_robot_refuses(
     page.get_by_role("button", name="/pose").click()
     page.get_by_text("Publish", exact=True).click()
     expect_refused("Publish once", "Publish again and again")
+    page.get_by_role("link", name="Map").click()
+    expect_refused("Go to Dock")
+    page.get_by_role("link", name="Diagnostics").click()
+    page.locator(".levels").get_by_role("button", name="arm").last.click()
+    expect_refused("Acknowledge", "Acknowledge this group")
 
 
 def test_the_log_grows_and_is_filtered(open_page: Callable[..., Page], gateway: FakeGateway) -> None:

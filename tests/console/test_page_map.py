@@ -392,6 +392,34 @@ def test_the_robot_is_told_where_it_is_if_something_listens(
     assert told["msg"]["pose"]["pose"]["orientation"] == pytest.approx(turned(math.pi / 2), abs=0.01)
     assert len(told["msg"]["pose"]["covariance"]) == 36
     assert len(rolling.goals()) == 1
+    info = {"width": 2, "height": 2, "resolution": 1.0, "origin": pose(-0.5, -0.5, 0.0)}
+    rolling.say("/map", {"header": {"frame_id": "map"}, "info": info, "data": [0, 0, 0, 0]})
+    wait_for_colour(page, 0.4, 0.4, [255, 255, 255, 255])
+    page.get_by_text("Another pose").click()
+    page.get_by_label("x [m]").fill("1.6")
+    page.get_by_role("button", name="Set initial pose").click()
+    expect(page.get_by_text("(1.60, 0.00) is outside of the map: nothing was sent")).to_be_visible()
+    page.get_by_label("x [m]").fill("1.4")
+    page.get_by_role("button", name="Set initial pose").click()
+    expect(page.get_by_text("The robot was told that it is at (1.40, 0.00)")).to_be_visible()
+    assert len([frame for _, frame in rolling.frames if frame["op"] == "publish"]) == 2
+
+
+def test_the_view_has_room_for_a_goal_only_while_it_goes_there(
+    open_page: Callable[..., Page], rolling: FakeGateway
+) -> None:
+    page = open_page(page_name="map")
+    page.get_by_text("Another pose").click()
+    page.get_by_label("x [m]").fill("50")
+    page.get_by_role("button", name="Go", exact=True).last.click()
+    expect_drive(page, "(50.00, 0.00)")
+    rolling.act("action_result", rolling.goals(1)[0], {"error_msg": "outside"}, status=6, result=True)
+    expect(state(page)).to_contain_text("Gave up")
+    page.evaluate("new Promise(then => requestAnimationFrame(() => requestAnimationFrame(then)))")
+    tool(page, "Go").click()
+    drag(page, at(page, 0.2, 0.1), at(page, 0.2, 0.6))
+    expect_drive(page, "(0.20, 0.10)")
+    assert is_goal(rolling.goals(2)[1], 0.2, 0.1, math.pi / 2)
 
 
 @pytest.mark.soak

@@ -167,8 +167,9 @@ export class MapCanvas extends HTMLElement {
   }
 
   show(scene: Scene): void {
+    const { goal } = this.#scene; // the view has room for it, which is wanted no longer once it has gone
     this.#scene = scene;
-    if (!this.#isMovedByHand && this.#pointers.size === 0) this.#fit(false);
+    if (!this.#isMovedByHand && this.#pointers.size === 0) this.#fit(goal !== null && goal !== scene.goal);
     this.#draw();
   }
 

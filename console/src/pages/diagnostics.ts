@@ -1,6 +1,7 @@
 /** Diagnostics: what is wrong and why, the tree with its details, and what changed when. */
+import { whyNot } from "../config";
 import { isFolded, learnChanges, levelOf, problems, spansOf, treeOf, type Change, type Tree, type TreeLine } from "../diagnostics";
-import { emptyCard, h, icon, refill, svg } from "../dom";
+import { disable, emptyCard, h, icon, refill, svg } from "../dom";
 import { formatAge } from "../format";
 import type { Page, Robot } from "../page";
 import type { Json } from "../rosbridge";
@@ -39,6 +40,7 @@ export const page: Page = {
 class DiagnosticsView {
   readonly element = h("div", { class: "diagnostics-view" });
   readonly #robot: Robot;
+  readonly #whyNot: string; // it may not be acknowledged by who looks at it
   readonly #head = h("section", { class: "card diagnostics-head", "aria-label": "Summary" });
   readonly #problems = h("ul", { class: "problems" });
   readonly #tree = h("ul", { class: "levels", role: "tree", "aria-label": "Groups and items" });
@@ -53,6 +55,7 @@ class DiagnosticsView {
 
   constructor(robot: Robot) {
     this.#robot = robot;
+    this.#whyNot = whyNot(robot.config, "operate");
     const summary = h("section", { class: "card", "aria-label": "Errors and warnings" }, this.#head, this.#problems);
     const tree = h("section", { class: "card", "aria-label": "Tree" }, this.#tree);
     this.element.append(h("div", {}, summary, tree), h("div", {}, this.#details, this.#history));
@@ -76,7 +79,8 @@ class DiagnosticsView {
     const found = problems(tree.lines);
     const words = found.length === 0 ? "Everything is fine" : `${look.word}: ${tree.cause || found[0]!.message}`;
     const acknowledge = h("button", { type: "button" }, icon("check"), "Acknowledge");
-    acknowledge.title = "Let levels that were latched follow the present again";
+    disable(this.#whyNot, acknowledge);
+    acknowledge.title ||= "Let levels that were latched follow the present again";
     acknowledge.onclick = () => void this.#acknowledge("");
     refill(
       this.#head,
@@ -132,6 +136,7 @@ class DiagnosticsView {
     const rows = line.values.map(([key, value]) => h("tr", {}, h("th", { scope: "row" }, key.replaceAll("_", " ")), h("td", {}, value)));
     const button = h("button", { type: "button", "data-key": line.path }, icon("check"), "Acknowledge this group");
     button.onclick = () => void this.#acknowledge(line.path);
+    disable(this.#whyNot, button);
     refill(
       this.#details,
       h("h2", {}, line.name),

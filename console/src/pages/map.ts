@@ -1,13 +1,14 @@
 /** Map: where the robot is, what it sees and where it goes; press a pose or choose a place, and it drives there. */
-import type { Place } from "../config";
+import { whyNot, type Place } from "../config";
 import { watchComponents, type Component, type Port } from "../description";
-import { h, icon, setText, type Icon } from "../dom";
+import { disable, h, icon, setText, type Icon } from "../dom";
 import { MapCanvas, type Drag, type ShownPlace, type Tool } from "../elements/map_canvas";
 import { formatAge, formatName, formatNumber, formatValue } from "../format";
 import {
   applied,
   distance,
   frameOf,
+  isOn,
   poseMessage,
   readGrid,
   readMarkers,
@@ -485,20 +486,21 @@ class MapView {
 
   #enable(): void {
     const isOpen = this.#robot.link.state.value.is === "open";
-    const mayGo = isOpen && !this.#robot.stopped.value && this.#navigator !== null;
+    const mayNot = whyNot(this.#robot.config, "operate") || (isOpen ? "" : "Not connected.");
+    const mayNotGo = mayNot || (this.#robot.stopped.value ? "The robot is stopped." : "");
     for (const { go } of this.#places) {
-      go.disabled = !mayGo;
+      disable(mayNotGo, go);
       go.hidden = this.#navigator === null;
     }
     const [go, initial] = [this.#tools.get("go")!, this.#tools.get("initial")!];
-    go.disabled = !mayGo;
+    disable(mayNotGo, go);
     go.hidden = this.#navigator === null;
-    initial.disabled = !isOpen;
+    disable(mayNot, initial);
     initial.hidden = !this.#hasLocaliser;
     const [byNumbers, set] = this.#numbers.querySelectorAll("button");
-    byNumbers!.disabled = !mayGo;
+    disable(mayNotGo, byNumbers!);
     byNumbers!.hidden = this.#navigator === null;
-    set!.disabled = !isOpen;
+    disable(mayNot, set!);
     set!.hidden = !this.#hasLocaliser;
     this.#numbers.parentElement!.hidden = this.#navigator === null && !this.#hasLocaliser;
     if (this.#tools.get(this.#tool)!.matches(":disabled, [hidden]")) this.#choose("move");
@@ -570,6 +572,12 @@ class MapView {
   }
 
   #setInitial(pose: Pose): void {
+    const maps = [...this.#drawn.values()].flatMap((each) => (each?.is === "grid" && !each.isCost ? [each.grid] : []));
+    const isOnMap = (grid: Grid) => {
+      const place = this.#place.frames.lookUp(grid.frame, this.#fixed);
+      return !place || isOn(grid, applied(place, { ...pose, z: 0 }));
+    };
+    if (maps.length > 0 && !maps.some(isOnMap)) return this.#robot.notify(`${nameOf(pose)} is outside of the map: nothing was sent`);
     const covariance = Array.from({ length: 36 }, (_, turn) => SPREAD[turn] ?? 0);
     const message = { header: { frame_id: this.#fixed }, pose: { pose: poseMessage(pose), covariance } };
     const isSent = this.#robot.link.publish(INITIAL, message);
