@@ -91,6 +91,27 @@ found["shy"] = asyncio.run(closed())
 print(json.dumps(found))
 """
 
+STAY = """
+import json, sys, urllib.error, urllib.request
+from contextlib import suppress
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+robot, token, stays = sys.argv[1:]
+asked = urllib.request.Request(f"http://{robot}:8090/console/config", headers={"Authorization": f"Bearer {token}"})
+with connect(f"ws://{robot}:8090/rosbridge") as socket:
+    socket.send(json.dumps({"op": "auth", "mac": token}))
+    socket.send(json.dumps({"op": "call_service", "service": "/rosapi/get_time"}))
+    print(json.loads(socket.recv())["result"], flush=True)
+    with suppress(ConnectionClosed):
+        while stays == "stays":
+            socket.recv()
+try:
+    print(urllib.request.urlopen(asked, timeout=10).status)
+except urllib.error.HTTPError as error:
+    print(error.code)
+"""
+
 
 @pytest.fixture
 def hosts(tmp_path: Path) -> Iterator[Hosts]:
@@ -123,6 +144,14 @@ def test_only_who_has_a_token_gets_in_and_each_does_what_its_role_may(hosts: Hos
     view = run("robot", "-m", "rbxcompose", "console", "--role", "view").strip().rpartition("=")[2]
     tokens = json.dumps({"operate": operate, "view": view})
     found = json.loads(run("laptop", str(tmp_path / "visit.py"), ROBOT, tokens).splitlines()[-1])
+    (tmp_path / "stay.py").write_text(textwrap.dedent(STAY), encoding="utf-8")
+    stay = hosts.start("laptop", sys.executable, str(tmp_path / "stay.py"), ROBOT, view, "stays")
+    assert stay.stdout
+    assert stay.stdout.readline() == "True\n"
+    run("robot", "-m", "rbxcompose", "console", "--renew")
+    assert stay.communicate(timeout=UP)[0] == "401\n"
+    renewed = run("robot", "-m", "rbxcompose", "console", "--role", "view").strip().rpartition("=")[2]
+    assert run("laptop", str(tmp_path / "stay.py"), ROBOT, renewed, "") == "True\n200\n"
     log = run("robot", "-m", "rbxcompose", "logs")
     run("robot", "-m", "rbxcompose", "down")
     assert found == {

@@ -24,7 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_robot_option(parser)
     parser.add_argument("--role", choices=_ROLES, default=Role.OPERATE.word, help="what its visitors may (%(default)s)")
-    parser.add_argument("--renew", action="store_true", help="make new tokens; `down` and `up` bring them into force")
+    parser.add_argument(
+        "--renew", action="store_true", help="make new tokens; robots of this machine take them at once"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -34,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
             renew_secret()
         except OSError as error:
             raise NotDoneError(REFUSED.at(None, f"{secret_path()}: {error.strerror}")) from error
-        emit("tokens are renewed: links that were given away open nothing once their robots are up again")
+        emit("tokens are renewed: links that were given away open nothing any more")
         return 0
     folder = find_robot(arguments.robot)
     name = folder.path.name

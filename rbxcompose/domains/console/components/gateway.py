@@ -78,6 +78,7 @@ _STOPPED = 1.0  # [s] for all processes to answer to a stop over the bus
 _SHY = 5.0  # [s] for a client to say who it is, or what it wants
 _AT_ONCE = 4  # requests that the robot is asked: it answers one after the other
 _REFUSALS = 10.0  # [s] between two notes of refused tokens
+_RENEWALS = 1.0  # [s] between two looks for renewed tokens
 _SAVING = 30.0  # [s] for a save
 _TRYING = 90.0  # [s] for a dry run, and for the tests of a mission
 _LONG = ("test", "try", "robot/")
@@ -456,6 +457,7 @@ class GatewaySession:
         self._lease_timer: asyncio.TimerHandle | None = None
         self._rates = TopicRates(partial(self._hear, Qos.STATE))
         self._rates_timer: asyncio.TimerHandle | None = None
+        self._secret_timer: asyncio.TimerHandle | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._is_command: dict[str, bool] = dict.fromkeys((protocol.STOP["type"], protocol.RELEASE["type"]), True)
         self._is_command |= dict.fromkeys(("robot.RobotStatus", _DESCRIBE["type"]), False)
@@ -508,6 +510,8 @@ class GatewaySession:
                 await stop.wait()
 
         self._loop.add_reader(self._guest.fileno(), self._pump)
+        if self._secret is not None:
+            self._follow_secret()
         if self.config.foxglove:
             self._serve_foxglove(self.config.foxglove)
         self._pump()
@@ -539,7 +543,7 @@ class GatewaySession:
         """Stop who drives, and leave the bus."""
         self._loop.remove_reader(self._guest.fileno())
         self._do(self._bridge.stop_driving(self._now, self._stamp))
-        for timer in (self._pump_timer, self._lease_timer, self._rates_timer):
+        for timer in (self._pump_timer, self._lease_timer, self._rates_timer, self._secret_timer):
             if timer is not None:
                 timer.cancel()
         for task in self._tasks:
@@ -652,6 +656,8 @@ class GatewaySession:
                     yield part(first, want.mime)
                     with suppress(WrongPictureError):
                         async for frame in frames:
+                            if self._role(request) is Role.NOBODY:
+                                break
                             yield part(frame, want.mime)
                 finally:
                     await frames.aclose()
@@ -683,6 +689,15 @@ class GatewaySession:
     @property
     def _cookie(self) -> str:
         return f"rbxcompose-{self.config.port}"  # cookies are for all ports of a host
+
+    def _follow_secret(self) -> None:
+        """Close all connections once the tokens are renewed, so that all show theirs again."""
+        with suppress(OSError):  # `console` reports what is wrong with it; until then, the old tokens count
+            if self._secret != (secret := own_secret()):
+                self._secret = secret
+                for number in self._wakes:
+                    self._disconnect(number)
+        self._secret_timer = self._loop.call_later(_RENEWALS, self._follow_secret)
 
     def _role_of(self, token: str) -> Role:
         return role_of(self._secret, self._folder.path.name, token) if self._secret else Role.CONFIGURE
