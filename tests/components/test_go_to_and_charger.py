@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -11,12 +12,22 @@ from hypothesis import strategies as st
 from rbxcompose.base.config import Place
 from rbxcompose.base.geometry import Pose2, quaternion_from_yaw
 from rbxcompose.bus.services import ServedRequest
-from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
+from rbxcompose.msgs.geometry_msgs import (
+    Point,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Twist,
+    Vector3,
+)
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.poses import pose_in
 from rbxcompose.msgs.rbxcompose_msgs import Recharge, SetBatteryLevel
 from rbxcompose.msgs.stamps import to_nanoseconds, to_seconds
 from rbxcompose.msgs.std_msgs import Float32, Header
+from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.sdk import Ended, Outcome, SentGoal
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
@@ -122,6 +133,29 @@ def test_a_goal_that_cannot_be_reached_ends_with_the_reason() -> None:
     robot.advance(1.0)
     why = "the position of the base is unknown in 'map'"
     assert [end.result for end in driver.ended] == [NavigateToPose.Result(error_code=1, error_msg=why)]
+
+
+def test_a_goal_waits_at_rest_while_no_position_comes_and_goes_on_with_the_next() -> None:
+    robot = Bench(instance("transforms", "transforms"), instance("go_to", "go_to"))
+    driver, commands = Driver(robot), robot.collect("cmd_vel", Twist)
+
+    def come_to(x: float) -> None:
+        moved = TransformStamped(header=Header(frame_id="map"), child_frame_id="base_footprint")
+        robot.publish("/tf", TFMessage(transforms=(replace(moved, transform=Transform(translation=Vector3(x=x))),)))
+
+    come_to(0.0)
+    driver.send(goal(1.0, 0.0))
+    robot.advance(1.0)
+    assert commands[-1].linear.x > 0.0
+    robot.advance(60.0)  # as when the link to the host of the base is cut
+    why = "no position of the base in 'map' has come for 2 s: waits for the next"
+    assert (driver.ended, commands[-1], str(robot.records).count(why)) == ([], Twist(), 1)
+    come_to(0.5)
+    robot.advance(0.2)
+    assert commands[-1].linear.x > 0.0
+    come_to(1.0)
+    robot.advance(0.2)
+    assert [end.outcome for end in driver.ended] == [Outcome.SUCCEEDED]
 
 
 def test_a_goal_in_another_frame_is_refused() -> None:

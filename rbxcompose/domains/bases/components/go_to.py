@@ -19,7 +19,7 @@ from rbxcompose.msgs.stamps import LONGEST, to_duration, to_time
 from rbxcompose.msgs.std_msgs import Header
 
 MAP = "map"
-UNKNOWN = 2.0  # [s] without a position, as after a restart of the base, after which a goal ends
+UNKNOWN = 2.0  # [s] without a position, as after a restart of the base; if there is none at all, a goal ends
 FARTHEST = 100_000.0  # [m] from the origin; no map is as large
 ServedPose = sdk.ServedGoal[NavigateToPose.Goal, NavigateToPose.Result, NavigateToPose.Feedback]
 
@@ -83,14 +83,16 @@ class GoTo(BaseDriver[GoToConfig]):
         if goal is None:
             self.driving, self.blind_since = None, math.inf
             return
-        pose = self.pose.now()
+        pose, known = self.pose.now(within=UNKNOWN), self.pose.now()
+        if pose is None and known is not None and math.isinf(self.blind_since):
+            self.warn(f"no position of the base in '{MAP}' has come for {UNKNOWN:g} s: waits for the next")
         self.blind_since = min(self.blind_since, self.now) if pose is None else math.inf
         if goal.cancel_requested:
             self.drive(AT_REST)
             goal.canceled()
         elif pose is None:
             self.drive(AT_REST)
-            if self.now - self.blind_since > UNKNOWN:
+            if known is None and self.now - self.blind_since > UNKNOWN:
                 self.fail(goal, f"the position of the base is unknown in '{MAP}'")
         else:
             self.follow(goal, pose, dt)
