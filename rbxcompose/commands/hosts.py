@@ -36,7 +36,7 @@ from rbxcompose.commands.console import (
 )
 from rbxcompose.commands.lookup import NOT_UP, find_robot
 from rbxcompose.commands.options import BUS, EACH, system_and_robot
-from rbxcompose.runtime.folder import made_base, system_record
+from rbxcompose.runtime.folder import is_starting, made_base, system_record
 
 if TYPE_CHECKING:  # verbs that may be for a system import this module, most often for a robot
     from rbxcompose.compiler.systems.bundle import Bundle
@@ -303,13 +303,23 @@ def label_of(shares: Shares, host: str, robot: str) -> str:
     return f"{host} {robot}".ljust(max(map(len, labels))) if several else host.ljust(max(map(len, labels)))
 
 
-def follow_commands(commands: Mapping[str, Sequence[str]], optional: Collection[str] = ()) -> int:
+def follow_commands(
+    commands: Mapping[str, Sequence[str]], optional: Collection[str] = (), begun: Callable[[], None] = lambda: None
+) -> int:
     """Run commands at once and show what they print; if one fails, end the others. Return the exit code.
 
-    Those of the labels that are `optional` may fail.
+    Those of the labels that are `optional` may fail. Once each has printed something, all have `begun`.
     """
+    silent = {*commands}
+
+    def show(label: str, line: str) -> None:
+        silent.discard(label)
+        if not silent:
+            begun()
+        emit(f"{label} | {plain(line)}")
+
     with noted_interrupts() as interrupts:
-        running = [Running(command, partial(_show, label)) for label, command in commands.items()]
+        running = [Running(command, partial(show, label)) for label, command in commands.items()]
         needed = [one for label, one in zip(commands, running, strict=True) if label not in optional]
         while any(item.poll() is None for item in running):
             if interrupts or any(item.poll() for item in needed):
@@ -321,10 +331,6 @@ def follow_commands(commands: Mapping[str, Sequence[str]], optional: Collection[
         codes = [item.wait() for item in needed]
     failed = [code for code in codes if code > 0]
     return INTERRUPTED if interrupts else min(failed, default=0)
-
-
-def _show(label: str, line: str) -> None:
-    emit(f"{label} | {plain(line)}")
 
 
 def follow_all(shares: Shares, words: Callable[[str], Sequence[str]]) -> int:
@@ -340,9 +346,15 @@ def ask_all(shares: Shares, words: Callable[[str], Sequence[str]], *, in_json: b
     """Run a verb for each share, and show what each says; return the highest exit code.
 
     A finding of the code that it `tolerates` does not count if the verb succeeds on another host, nor that a share is
-    not up which the system has no longer.
+    not up which the system has no longer. While an `up` is on its way here, hosts with that finding are asked again.
     """
-    done = on_all({f"{host} {robot}": share.rbxcompose(words(robot)) for (host, robot), share in shares.items()})
+    left = {f"{host} {robot}": share.rbxcompose(words(robot)) for (host, robot), share in shares.items()}
+    done = dict[str, Running]()
+    while left:
+        may_change = is_starting() and tolerates
+        done |= on_all(left)
+        lacking = [label for label in left if may_change and any(tolerates in line for line in done[label].lines)]
+        left = {label: left[label] for label in lacking}
     codes = {label: abs(entry.wait()) for label, entry in done.items()}
     if 0 in codes.values():
         counts = {" ".join(key): NOT_UP.code if share.is_former else tolerates for key, share in shares.items()}

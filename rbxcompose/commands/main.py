@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 import rbxcompose
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.garbage_collection import collect_rarely
-from rbxcompose.commands.verbs import about, in_groups, load, module_of, parser_of, verbs
+from rbxcompose.commands.verbs import about, in_groups, load, module_of, parser_of, starts_robots, verbs
 
 USAGE, INTERRUPTED = 2, 130  # as in `console`, which takes longer to import
 _ABOUT = "Docker Compose for robots: YAML in, a checked and running robot out."
@@ -51,6 +51,10 @@ def _interrupted(number: int, frame: object) -> NoReturn:
 
 
 def _run(name: str, words: Sequence[str]) -> int:
+    if starts_robots(name):
+        from rbxcompose.runtime.folder import mark_start
+
+        mark_start()
     _import_pydantic()
     from rbxcompose.commands.console import NotDoneError, ReportedError, answered, refuse
 

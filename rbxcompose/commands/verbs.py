@@ -26,7 +26,11 @@ MOST_USED = "most used"
 
 
 class Verb(Protocol):
-    """The contents of a verb's module; with `IS_COMMON = True`, it stands among the most used ones in the help."""
+    """The contents of a verb's module.
+
+    With `IS_COMMON = True`, it stands among the most used ones in the help. With `STARTS_ROBOTS = True`, `down`
+    waits for the robots that it starts.
+    """
 
     __doc__: str | None
 
@@ -55,6 +59,11 @@ def module_of(verb: str) -> str:
 def about(verb: str) -> str:
     """Return the first line of a verb's docstring, read from its text: importing all verbs would take too long."""
     return _text(verb).partition("\n")[0].strip('"')
+
+
+def starts_robots(verb: str) -> bool:
+    """Return whether a verb starts robots, before the import of that verb, which takes as long as a start."""
+    return "\nSTARTS_ROBOTS = True\n" in _text(verb)
 
 
 def in_groups() -> dict[str, list[str]]:

@@ -114,6 +114,7 @@ class OffsetFilter:
 
 STATE, LOCK, SOCKET = "state.json", "lock", "control.sock"
 _BUS = "bus"
+_STARTING = "starting.lock"  # shared by each `up` on its way; it stands beside the folders of robots
 FINDINGS = "findings.json"
 """What `check` found when the robot came up, as `check --format json` writes it."""
 MESSAGES = "messages.json"
@@ -264,6 +265,25 @@ def system_record(path: str) -> Path:
     It stands beside the folders of robots, whose names have no dot.
     """
     return base_folder() / f"{hashlib.sha256(os.path.realpath(path).encode()).hexdigest()[:32]}.system"
+
+
+def mark_start(*, is_over: bool = False) -> None:
+    """Note for `is_starting` that this process is about to bring robots up, until it ends or the start `is_over`."""
+    with contextlib.suppress(OSError):  # what is wrong with the folder is reported where the robot starts
+        descriptor = os.open(made_base() / _STARTING, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        fcntl.lockf(descriptor, fcntl.LOCK_SH)  # of this process alone: a supervisor that it forks does not hold it
+        if is_over:
+            os.close(descriptor)  # this releases it, by whichever descriptor it was locked
+
+
+def is_starting() -> bool:
+    """Return whether another process of this user is about to bring up robots whose folders may not be known yet."""
+    try:
+        with open(base_folder() / _STARTING, "rb+") as file:
+            fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return isinstance(error, BlockingIOError)
+    return False
 
 
 def all_folders() -> list[RobotFolder]:

@@ -16,7 +16,7 @@ from rbxcompose.domains.console.commands.console import show_link
 from rbxcompose.domains.devices.serial_ports import serial_ports
 from rbxcompose.domains.devices.udev import look_at, port_findings
 from rbxcompose.domains.programs.runnable import ask_for_real, program_findings
-from rbxcompose.runtime.folder import RobotFolder, RunOptions
+from rbxcompose.runtime.folder import RobotFolder, RunOptions, mark_start
 from rbxcompose.runtime.log import NAME, Follower, Record, StoryWriter, summary
 from rbxcompose.runtime.supervision import launch
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED
@@ -95,6 +95,8 @@ class _Watch:
         name = self._plan.robot
         match report:
             case launch.Begun():
+                if not self._options.is_detached:  # else this process ends soon, or another robot follows
+                    mark_start(is_over=True)
                 folder = RobotFolder.of(name)
                 with suppress(OSError):  # the disk is full, which is reported once the robot is up
                     folder.write_findings(self._findings)

@@ -22,7 +22,7 @@ from rbxcompose.compiler.systems.bundle import NOT_EXPORTED, Bundle, bundle_of
 from rbxcompose.compiler.systems.certificates import NO_SECURITY, common_name, folder_of, tls_of
 from rbxcompose.compiler.systems.model import PlacedRobot, System
 from rbxcompose.compiler.systems.share import exchange_of, robots_on, share_of
-from rbxcompose.runtime.folder import ChosenLayers, RobotFolder, RunOptions
+from rbxcompose.runtime.folder import ChosenLayers, RobotFolder, RunOptions, mark_start
 from rbxcompose.runtime.supervision.plan_change import Fate
 from rbxcompose.runtime.supervision.supervisor import SERVICE_MANAGER
 from rbxcompose.tools.commands.security import certificate_findings
@@ -70,9 +70,8 @@ def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> i
         commands[hosts.label_of(shares, host, robot)] = remote.rbxcompose(
             words, folder=folder, has_terminal=not arguments.detach
         )
-    return hosts.follow_commands(
-        commands, [hosts.label_of(shares, *key) for key, share in shares.items() if share.model.optional]
-    )
+    optional = [hosts.label_of(shares, *key) for key, share in shares.items() if share.model.optional]
+    return hosts.follow_commands(commands, optional, partial(mark_start, is_over=True))
 
 
 def _already_up(shares: hosts.Shares) -> list[Key]:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import shutil
 import signal
+import subprocess
 
 import pytest
 
 from rbxcompose.base.files import TEMPORARY
-from rbxcompose.runtime.folder import STATE
+from rbxcompose.runtime.folder import STATE, RobotFolder, is_starting
 from rbxcompose.runtime.processes import titled
+from tests.forked import RBXCOMPOSE, Forked
 from tests.runtime.conftest import robot
-from tests.runtime.real_robot import PATIENCE, Robot, eventually
+from tests.runtime.real_robot import PATIENCE, ROOT, Robot, eventually
 from tests.soak import rare
 
 __all__ = ["robot"]
@@ -27,6 +29,19 @@ def test_of_many_that_start_it_at_once_one_does(robot: Robot) -> None:
     assert all("error[RBX9001]" in output and "is already up" in output for output in refused)
     assert len(robot.processes()) == 5
     assert robot.do("down").returncode == 0
+
+
+def test_down_ends_a_robot_whose_up_is_on_its_way(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = [*RBXCOMPOSE, "up", "-d", "robots/turtlebot"]
+    pipe = subprocess.PIPE
+    up = Forked(words, env=robot.environment, cwd=ROOT, stdout=pipe, stderr=subprocess.STDOUT, text=True)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", robot.environment["XDG_RUNTIME_DIR"])
+    eventually(is_starting)
+    done = robot.do("down", "turtlebot")
+    assert (done.returncode, done.stdout) == (0, "turtlebot is down\n"), done.stderr
+    up.communicate(timeout=PATIENCE)
+    assert not is_starting()
+    assert not RobotFolder.of("turtlebot").is_known
 
 
 @pytest.mark.parametrize("removed", ["*", *rare("state.json", "control.sock", "lock")])

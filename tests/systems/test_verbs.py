@@ -282,3 +282,29 @@ def test_what_an_edit_takes_away_need_not_be_up(
     out = capfd.readouterr().out
     assert "here b:" not in out
     assert "down" not in out
+
+
+def test_while_an_up_is_on_its_way_down_asks_hosts_again_that_lack_a_robot(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    code = """
+import sys
+file = open(sys.argv[2], "a+"); file.write("."); file.seek(0)
+is_up = len(file.read()) == (2 if sys.argv[2] == "b" else 1)
+print(sys.argv[2], "is down" if is_up else "error[RBX9002]"); sys.exit(not is_up)
+"""
+    monkeypatch.setattr(Remote, "rbxcompose", lambda self, words, **options: [sys.executable, "-S", "-c", code, *words])
+    starts = iter((True, False))
+    monkeypatch.setattr(hosts, "is_starting", lambda: next(starts))
+    assert main(["down", "s.yaml"]) == 0
+    out = capfd.readouterr().out
+    assert ("a is down" in out, "b is down" in out, "RBX9002" in out) == (True, True, False)
+
+
+@pytest.mark.parametrize("last_words", ["print('begins')", ""])
+def test_a_start_on_several_hosts_is_over_once_each_has_said_something(last_words: str) -> None:
+    begun: list[bool] = []
+    texts = {"one": "print('begins')", "two": last_words}
+    commands = {host: [sys.executable, "-S", "-c", text] for host, text in texts.items()}
+    assert hosts.follow_commands(commands, begun=lambda: begun.append(True)) == 0
+    assert any(begun) is bool(last_words)

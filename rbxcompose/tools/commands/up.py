@@ -20,6 +20,7 @@ from rbxcompose.tools.run_view import machine_findings, real_time_only, run_plan
 
 GROUP = "run"
 IS_COMMON = True
+STARTS_ROBOTS = True
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
