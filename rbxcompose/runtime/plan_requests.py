@@ -35,7 +35,7 @@ class PlanComparison:
     generation: int
     why_not: str
     shares_change: bool = False  # what is known of other hosts, or carried to other robots
-    said: tuple[str, ...] = ()  # by components, of their work that is under way
+    said: tuple[str, ...] = ()  # that links open again; by components, of their work that is under way
 
     @classmethod
     def of(cls, found: Changes, generation: int, why_not: str, said: tuple[str, ...] = ()) -> PlanComparison:
@@ -44,7 +44,8 @@ class PlanComparison:
             ComponentChange(one.instance.name, one.instance.type, one.instance.process, one.fate, one.reasons)
             for one in found.fated
         )
-        return cls(found.before.robot, components, found.impossible, generation, why_not, found.shares_change, said)
+        notes = (found.links_text, *said) if found.links_change else said
+        return cls(found.before.robot, components, found.impossible, generation, why_not, found.shares_change, notes)
 
 
 @dataclass(frozen=True, slots=True)

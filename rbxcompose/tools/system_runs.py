@@ -295,7 +295,8 @@ class _SystemChange:
         for (host, _), one in found.items():
             if not isinstance(one, str):
                 lines = changes_text(one).splitlines()
-                emit("\n".join(f"{host} | {line}" for line in (lines if _touches(one) else lines[:1])))
+                kept = 0 if _touches(one) else len(one["components"])  # lines of components that stay as they are
+                emit("\n".join(f"{host} | {line}" for line in (lines[0], *lines[kept + 1 :])))
 
     def _carry_out(self, generations: Mapping[Key, int]) -> int:
         """Change these shares, which are in these generations, in this order."""

@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 from rbxcompose.base.levels import Level
-from rbxcompose.compiler.plan.model import OtherHost, Plan, Share
+from rbxcompose.compiler.plan.model import LinkTls, OtherHost, Plan, Share
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import HostReport, RobotEnd
 from rbxcompose.runtime.folder import ClockOffset
+from rbxcompose.runtime.plan_requests import PlanComparison
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.runtime.supervision.other_hosts import SILENT
-from rbxcompose.runtime.supervision.plan_change import changes
+from rbxcompose.runtime.supervision.plan_change import changes, summary
 from rbxcompose.sdk.component import MissionOver
 from tests.runtime.stage import Stage, robot
 
@@ -126,10 +127,23 @@ def test_a_changed_link_is_opened_again_by_the_router_and_the_other_files_are_kn
     after = replace(before, share=replace(before.share, version="2", downsample={"/odom": 1.0}))
     found = changes(before, after)
     assert (found.shares_change, found.links_change, found.impossible) == (True, True, ())
+    opens_again = "they open again, and what moves across them brakes meanwhile"
+    assert summary(found) == f"links: other data may cross; {opens_again}"
+    assert PlanComparison.of(found, 1, "", ("a mission runs",)).said == (summary(found), "a mission runs")
     stage.conductor.change(found, lambda text, is_refused: None)
     assert [process for process, _ in stage.orders(say.Adopt)] == ["router"]
     tell(stage, version="2", run="second")
     assert not any("runs other files" in text for _, text in stage.records)
     only_files = changes(after, replace(after, share=replace(before.share, version="3", downsample={"/odom": 1.0})))
     assert (only_files.shares_change, only_files.links_change) == (True, False)
+    assert summary(only_files) == "nothing to do"
     assert changes(after, replace(after, share=None)).impossible
+
+
+def test_a_change_of_the_security_of_links_says_so_with_their_ends() -> None:
+    plan = shared()
+    assert plan.share is not None
+    plain = replace(plan, share=replace(plan.share, connect=("tcp/10.0.0.2:7500",)))
+    secured = replace(plan.share, tls=LinkTls("ca", "certificate", "key"), connect=("tls/10.0.0.2:7500",))
+    words = "links: none -> mtls, tcp/10.0.0.2:7500 -> tls/10.0.0.2:7500; they open again"
+    assert summary(changes(plain, replace(plan, share=secured))).startswith(words)

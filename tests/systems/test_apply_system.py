@@ -29,7 +29,8 @@ if "--undo" in words:
 fate = "restarted" if changes == "yes" else "kept"
 part = {"name": "base", "type": "t", "process": "p", "fate": fate, "reasons": []}
 why = "it moves" if refuses == "yes" else ""
-found = {"robot": "r", "components": [part], "generation": 3, "why_not": why, "shares_change": False, "said": []}
+found = {"robot": "r", "components": [part], "generation": 3, "why_not": why, "shares_change": False}
+found["said"] = ["links: none -> mtls"]
 print(json.dumps(found))
 if fails == "yes" and "--yes" in words:
     print("error[RBX9004]: 'r' refuses: only in part")
@@ -65,11 +66,15 @@ def applied(folder: Path, monkeypatch: pytest.MonkeyPatch, hosts: Sequence[_Host
     return code, " ".join(log.read_text(encoding="utf-8").split()) if log.exists() else ""
 
 
-def test_all_are_asked_and_only_those_with_changes_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_are_asked_and_only_those_with_changes_change(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     code, log = applied(tmp_path, monkeypatch, [_Host(tmp_path, "a"), _Host(tmp_path, "b", changes=False)])
     assert code == 0
     assert log.count("--dry-run") == 2
     assert log.endswith("a --yes")
+    out = capsys.readouterr().out
+    assert "b | r: 1 kept\nb | links: none -> mtls\n" in out, "components that stay as they are have no lines"
 
 
 @pytest.mark.parametrize("partial", [False, True])

@@ -85,6 +85,11 @@ class LinkTls:
     key: str
     mutual: bool = True
 
+    @property
+    def security(self) -> str:
+        """Return the `security` of a system with such links."""
+        return "mtls" if self.mutual else "tls"
+
 
 @dataclass(frozen=True, slots=True)
 class HostAccess:

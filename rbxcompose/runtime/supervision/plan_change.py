@@ -81,6 +81,15 @@ class Changes:
         before, after = map(_links, (self.before, self.after))
         return before != after
 
+    @property
+    def links_text(self) -> str:
+        """Return what changes of the links if the router opens them again, else nothing."""
+        if not self.links_change:
+            return ""
+        pairs = zip(*map(_link_words, (self.before, self.after)), strict=True)
+        found = ", ".join(f"{before} -> {after}" for before, after in pairs if before != after)
+        return f"links: {found or 'other data may cross'}; they open again, and what moves across them brakes meanwhile"
+
     def names(self, fate: Fate) -> list[str]:
         """Return the components that share a fate."""
         return [one.instance.name for one in self.fated if one.fate is fate]
@@ -139,6 +148,13 @@ def changes(before: Plan, after: Plan, failed: Collection[str] = ()) -> Changes:
 def _links(plan: Plan) -> tuple[object, ...]:
     others = tuple(replace(other, instances=()) for other in plan.share.others) if plan.share else ()
     return plan.share and replace(plan.share, others=others, version=""), plan.exchange
+
+
+def _link_words(plan: Plan) -> tuple[str, str]:
+    """Return the `security` of the links with other hosts and robots, and their endpoints."""
+    ends = [end for end in (plan.share, plan.exchange) if end]
+    security = next((end.tls.security for end in ends if end.tls), "none")
+    return security, ", ".join(endpoint for end in ends for endpoint in (*end.listen, *end.connect)) or "no endpoint"
 
 
 def _moved(before: Plan, after: Plan) -> Iterator[str]:
@@ -350,9 +366,10 @@ class Changing:
 
 
 def summary(changes: Changes) -> str:
-    """Return one line that says what happens to which components."""
+    """Return one line that says what happens to which components, and to links."""
     named = ((fate, changes.names(fate)) for fate in Fate if fate is not Fate.KEPT)
-    return ", ".join(f"{' '.join(names)} {fate}" for fate, names in named if names) or "nothing to do"
+    components = ", ".join(f"{' '.join(names)} {fate}" for fate, names in named if names)
+    return "; ".join(filter(None, (components, changes.links_text))) or "nothing to do"
 
 
 WhenConsidered = Callable[[Sequence[str], str], None]  # what components say, and why they refuse, which may be empty
