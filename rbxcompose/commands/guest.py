@@ -22,7 +22,8 @@ from zenoh.handlers import Callback
 
 from rbxcompose.base.clock import MonotonicClock
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import kind
+from rbxcompose.base.findings import Finding, Severity, kind
+from rbxcompose.base.printable import plain
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.graph import Graph, GraphEnd, GraphName, WireType, find
 from rbxcompose.bus.local import Inbox
@@ -50,6 +51,7 @@ NO_ROUTER = kind("RBX9020")
 NO_NAME = kind("RBX9022")
 NOBODY = kind("RBX9025")
 SAID_NO = kind("RBX9026")
+SILENT = kind("RBX9053", Severity.WARNING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,6 +268,12 @@ def wanted(names: Sequence[GraphName], name: str, what: str) -> GraphName:
         words = f"there is no {what} '{name}'"
         raise NotDoneError(NO_NAME.misspelt(None, words, name, [graph_name.name for graph_name in names], f"{what}s"))
     return found
+
+
+def silence(name: str) -> Finding:
+    """Return the warning that no message of a topic, or of those of a pattern, has come though there is a publisher."""
+    help_text = "of a publisher on another host, 'security: mtls' lets pass only what a component here subscribes to"
+    return SILENT.at(None, f"'{plain(name, 60)}' has a publisher, but no message of it has come", help=help_text)
 
 
 def write_names(names: Sequence[GraphName], ends: tuple[str, str], arguments: argparse.Namespace) -> int:

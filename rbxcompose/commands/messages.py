@@ -16,7 +16,7 @@ from rbxcompose.base.printable import FORBIDDEN
 from rbxcompose.bus.graph import GraphName, WireType, find
 from rbxcompose.bus.names import name_problem
 from rbxcompose.commands.console import INTERRUPTED, NotDoneError, emit, refuse, write_report
-from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, SAID_NO, Guest, ReceivedMessage, wanted
+from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, SAID_NO, Guest, ReceivedMessage, silence, wanted
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode, NodePlaces, ScalarNode, TreeNode, plain_value
 from rbxcompose.msgs import registry
@@ -32,6 +32,7 @@ _SHOWN = "MESSAGE"  # name of the message text in findings
 M = TypeVar("M", bound=Message)
 T = TypeVar("T", bound=Interface)
 _PERIOD = 1.0  # [s] between two notices about messages left out
+_SILENT = 3  # periods without a first message, after which there is a notice about that
 
 
 def message_from(message: type[M], text: str) -> M | None:
@@ -176,9 +177,11 @@ def echo(guest: Guest, arguments: argparse.Namespace) -> int:
     if reader.is_useless:
         return 1
     left = math.inf if arguments.count is None else arguments.count
+    waits = _SILENT if topic.givers else 0
 
     def received(received: ReceivedMessage) -> None:
-        nonlocal left
+        nonlocal left, waits
+        waits = 0
         message = reader.read(received) if left > 0 else None
         if message is not None:
             left -= 1
@@ -191,6 +194,9 @@ def echo(guest: Guest, arguments: argparse.Namespace) -> int:
         if guest.dropped > dropped:
             sys.stderr.write(f"left out: {guest.dropped - dropped} messages, which came too fast to show\n")
             dropped = guest.dropped
+        if waits == 1:
+            write_report(Report([silence(topic.name)]), {})
+        waits = max(0, waits - 1)
     return 0
 
 

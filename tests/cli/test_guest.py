@@ -14,12 +14,15 @@ import pytest
 from rbxcompose.base.clock import MonotonicClock
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.endpoints import tcp_endpoint
+from rbxcompose.bus.graph import GraphEnd, GraphName, WireType
 from rbxcompose.bus.zenoh_session import open_router
 from rbxcompose.commands import messages
 from rbxcompose.commands.console import ENDINGS
-from rbxcompose.commands.guest import Guest
+from rbxcompose.commands.guest import Guest, ReceivedMessage
 from rbxcompose.commands.lookup import BusPlace
 from rbxcompose.msgs import registry
+from rbxcompose.msgs.cdr import encode
+from rbxcompose.msgs.std_msgs import Bool
 from rbxcompose.runtime.process_group.connection import CallbackInbox
 from tests.programs.test_child import eventually
 from tests.systems.test_links import free_port
@@ -38,7 +41,7 @@ class Alone(Guest):
         self.cancels = 0
 
     def graph(self) -> Any:
-        return SimpleNamespace(actions=())
+        return SimpleNamespace(actions=(), topics=())
 
     def bus(self, kind: object = None) -> Any:
         return SimpleNamespace(action_client=lambda owner, name, action: self)
@@ -62,6 +65,35 @@ def test_a_goal_that_does_not_end_when_it_is_cancelled_is_left_after_the_timeout
         assert messages.send(guest, argparse.Namespace(name="/say", content="", timeout=0.01, json=False)) == 1
     assert guest.cancels == 1
     assert "'/say': the goal has not ended within 0.01 s of the request to cancel it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("givers", "comes_at", "notices"), [("/base", 9, 1), ("/base", 2, 0), ("", 9, 0)], ids=["silent", "in time", "open"]
+)
+def test_an_echo_says_once_that_nothing_comes_of_a_publisher(
+    givers: str, comes_at: int, notices: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kind = WireType(Bool.TYPE, Bool.HASH)
+    topic = GraphName("/on", tuple(GraphEnd(node, kind, b"", None) for node in givers.split()), ())
+    monkeypatch.setattr(GraphName, "kinds", [kind])
+    monkeypatch.setattr(messages, "wanted", lambda *_: topic)
+    arrival: Any = SimpleNamespace(payload=encode(Bool(data=True)), attachment=b"")
+    listeners: list[Any] = []
+    periods = iter(range(1, 12))
+    with Alone() as guest:
+
+        def run(until: Any, timeout: float) -> bool:
+            if next(periods) >= comes_at:
+                listeners[0](ReceivedMessage(0.0, kind, arrival))
+            return bool(until())
+
+        monkeypatch.setattr(guest, "run", run)
+        monkeypatch.setattr(guest, "listen", lambda topic, receive: listeners.append(receive))
+        guest._queues = []
+        assert messages.echo(guest, argparse.Namespace(topic="/on", count=2, json=False)) == 0
+    words = "warning[RBX9053]: '/on' has a publisher, but no message of it has come"
+    shown = capsys.readouterr()
+    assert (shown.err.count(words), shown.out.count("data: true")) == (notices, 2)
 
 
 @pytest.mark.parametrize("first", ENDINGS)

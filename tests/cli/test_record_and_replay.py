@@ -100,6 +100,10 @@ def test_a_topic_that_was_silent_is_in_the_file(shell: Shell, router: str) -> No
     with Guest(BusPlace(router, 0), stays=True) as sender:
         sender.bus().publisher("base", "/cmd_vel", Twist, Qos.COMMAND)
         shell.do("record", "--router", router, "-o", "silent.mcap", "--for", "0.3s")
+        words = ("-o", "named.mcap", "--for", "0.3s", "--topics", "cmd_vel", "cmd_*", "odom")
+        shown = shell.do("record", "--router", router, *words)
+        silent = ["cmd_vel", "cmd_*"]
+        assert re.findall(r"warning\[RBX9053\]: '(.*)' has a publisher, but no message of it has come", shown) == silent
     with (shell.folder / "silent.mcap").open("rb") as file:
         reader = RecordingReader(file)
         assert list(reader.messages()) == []

@@ -15,7 +15,7 @@ import json
 import math
 import re
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
@@ -29,7 +29,7 @@ from rbxcompose.bus.names import data_key, decode_attachment
 from rbxcompose.bus.tokens import SPACE, EndpointToken, parse_token
 from rbxcompose.bus.transport import Arrival
 from rbxcompose.commands.console import NotDoneError, ReportedError, emit, misused, refuse
-from rbxcompose.commands.guest import Guest
+from rbxcompose.commands.guest import Guest, silence
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place, find_robot
 from rbxcompose.commands.options import add_json_option, out_option, seconds
 from rbxcompose.runtime.recording.files import ENDING, Recorder, Split
@@ -173,6 +173,8 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: b
         warn(LOST.at(None, f"{tap.lost:,} messages came too fast to be recorded", help="choose fewer with '--topics'"))
     warn_of_unmatched(tap.unmatched, tap.others)
     counts = recorder.counts
+    for pattern in tap.silent({topic.name for topic in counts}):
+        warn(silence(pattern))
     if is_json:
         messages = {topic.name: number for topic, number in counts.items()}
         files = [str(path) for path in recorder.paths]
@@ -265,6 +267,16 @@ class Tap:
     def lost(self) -> int:
         """Return how many messages had to make room for newer ones."""
         return max(0, self._arrived - self._taken - len(self._waiting))
+
+    def silent(self, heard: Collection[str]) -> list[str]:
+        """Return the patterns that topics match, but none of those that were `heard`."""
+
+        def is_in(names: Iterable[str], pattern: str) -> bool:
+            return any(matches(name, pattern) for name in names)
+
+        names = {topic.name for topic in self.topics.values()}
+        patterns = dict.fromkeys(self._wanted.patterns)
+        return [pattern for pattern in patterns if is_in(names, pattern) and not is_in(heard, pattern)]
 
     def take(self) -> Iterator[Recorded]:
         """Yield the messages that have arrived, and subscribe to new topics."""
