@@ -15,6 +15,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
+from itertools import count
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -350,11 +351,15 @@ def ask_all(shares: Shares, words: Callable[[str], Sequence[str]], *, in_json: b
     """
     left = {f"{host} {robot}": share.rbxcompose(words(robot)) for (host, robot), share in shares.items()}
     done = dict[str, Running]()
-    while left:
+    for tries in count():
         may_change = is_starting() and tolerates
         done |= on_all(left)
         lacking = [label for label in left if may_change and any(tolerates in line for line in done[label].lines)]
         left = {label: left[label] for label in lacking}
+        if not left:
+            break
+        if not tries:
+            sys.stderr.write(f"an 'up' is on its way here: asks again for {', '.join(left)}\n")
     codes = {label: abs(entry.wait()) for label, entry in done.items()}
     if 0 in codes.values():
         counts = {" ".join(key): NOT_UP.code if share.is_former else tolerates for key, share in shares.items()}

@@ -34,25 +34,34 @@ def run_plan(
     rules: LiveRules | None = None,
     reload: LiveReload | None = None,
     findings: str = "[]",
+    *,
+    others_follow: bool = False,
 ) -> int:
     """Run a robot to its end, or if detached until it is up, and return the exit code.
 
     Its live settings keep `rules`. Meanwhile, `reload` follows its files. `findings` of `check` [JSON] are kept for its
-    page.
+    page. If `others_follow`, this process is about to start other robots after it.
     """
     plan = plan.in_one_process() if options.is_stepped else plan
     started = launch.start_supervisor(plan, options, rules)
-    return _Watch(plan, options, started, reload, findings).run()
+    return _Watch(plan, options, started, reload, findings, others_follow=others_follow).run()
 
 
 class _Watch:
     """Watches one run from its first report to its last."""
 
     def __init__(
-        self, plan: Plan, options: RunOptions, started: launch.Started, reload: LiveReload | None, findings: str
+        self,
+        plan: Plan,
+        options: RunOptions,
+        started: launch.Started,
+        reload: LiveReload | None,
+        findings: str,
+        *,
+        others_follow: bool,
     ) -> None:
         self._plan, self._options, self._started, self._reload = plan, options, started, reload
-        self._findings = findings
+        self._findings, self._others_follow = findings, others_follow
         self._is_up = False
         self._story = StoryWriter([instance.name for instance in plan.instances], colour=has_colour(sys.stdout))
         self._log: Follower | None = None  # None until the log of this run has begun
@@ -95,7 +104,7 @@ class _Watch:
         name = self._plan.robot
         match report:
             case launch.Begun():
-                if not self._options.is_detached:  # else this process ends soon, or another robot follows
+                if not self._others_follow:
                     mark_start(is_over=True)
                 folder = RobotFolder.of(name)
                 with suppress(OSError):  # the disk is full, which is reported once the robot is up

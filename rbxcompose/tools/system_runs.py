@@ -123,7 +123,8 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
         if not _is_ready(partial(_machine_findings, plan, system, robot, arguments.host, path), system.sources):
             return FINDINGS
         own = replace(options, layers=layers_of(system, robot, real=arguments.real))
-        if (exit_code := run_plan(plan, own, LiveRules(robot.robot, (system, robot)))) or not options.is_detached:
+        rules, others_follow = LiveRules(robot.robot, (system, robot)), robot is not chosen[-1]
+        if (exit_code := run_plan(plan, own, rules, others_follow=others_follow)) or not options.is_detached:
             return exit_code
     return 0
 

@@ -110,7 +110,7 @@ def test_a_robot_is_named_behind_a_colon(written: str, asked: str, capfd: pytest
 
 def up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Bring the system up, without its processes."""
-    monkeypatch.setattr(system_runs, "run_plan", lambda *_: 0)
+    monkeypatch.setattr(system_runs, "run_plan", lambda *_, **__: 0)
     assert main(["up", "-d", "s.yaml"]) == 0
 
 

@@ -83,7 +83,8 @@ class GoTo(BaseDriver[GoToConfig]):
         if goal is None:
             self.driving, self.blind_since = None, math.inf
             return
-        pose, known = self.pose.now(within=UNKNOWN), self.pose.now()
+        pose = self.pose.now(within=UNKNOWN)
+        known = pose or self.pose.now()
         if pose is None and known is not None and math.isinf(self.blind_since):
             self.warn(f"no position of the base in '{MAP}' has come for {UNKNOWN:g} s: waits for the next")
         self.blind_since = min(self.blind_since, self.now) if pose is None else math.inf
