@@ -188,13 +188,16 @@ def planned(system: System, robot: PlacedRobot, host: str) -> Plan:
 def _is_ready(examine: Callable[[], Report], sources: Mapping[str, str]) -> bool:
     """Show what this machine lacks for its share, and return whether it may start.
 
-    A service manager starts it with the machine, whose network, clock and devices may come later: then it waits.
+    A service manager starts it with the machine, whose network, clock and devices may come later: then it waits, and
+    `down` does not wait for it.
     """
     write_report(found := examine(), sources)
     if found.has_errors and SERVICE_MANAGER in os.environ:
         sys.stderr.write("it starts as soon as this is mended\n")
+        mark_start(is_over=True)
         while (found := examine()).has_errors:
             time.sleep(_LOOK)
+        mark_start()
     return not found.has_errors
 
 

@@ -135,15 +135,16 @@ def test_a_unit_waits_for_what_its_machine_has_not_yet(
     is_unit: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     lacking = [system_runs.OTHER_MACHINE.at(None, "there is no address yet")] * 3
-    waits, started = list[float](), list[str]()
+    waits, started, marks = list[float](), list[str](), list[bool]()
     monkeypatch.setattr(system_runs, "_address_problem", lambda *_: lacking.pop() if lacking else None)
     monkeypatch.setattr("time.sleep", waits.append)
 
-    def start(plan: Plan, *_: object) -> int:
+    def start(plan: Plan, *_: object, **__: object) -> int:
         started.append(plan.robot)
         return 0
 
     monkeypatch.setattr(system_runs, "run_plan", start)
+    monkeypatch.setattr(system_runs, "mark_start", lambda *, is_over=False: marks.append(is_over))
     monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
     if is_unit:
         monkeypatch.setenv("NOTIFY_SOCKET", "/run/systemd/notify")
@@ -152,6 +153,7 @@ def test_a_unit_waits_for_what_its_machine_has_not_yet(
     error = capsys.readouterr().err
     assert error.count("error[RBX6111]: there is no address yet") == 1
     assert ("it starts as soon as this is mended" in error) is is_unit
+    assert marks == ([True, False] if is_unit else []), "'down' does not wait for who waits"
 
 
 def test_over_ssh_only_the_robot_that_is_named_is_started(
