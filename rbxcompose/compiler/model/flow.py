@@ -66,8 +66,11 @@ class MessageFlow:
 
 
 def period_of(component: RobotComponent) -> float | None:
-    """Return the time between two messages of a component [s], None if it does not send at its own rate only."""
-    listens = any(isinstance(end.port, In) for end in component.ends)
+    """Return the time between two messages of a component [s], None if it does not send at its own rate only.
+
+    Who commands motion does so in each step, whatever it listens to.
+    """
+    listens = any(isinstance(end.port, In) for end in component.ends) and not component.declared(CommandsMotion)
     rate = component.cls.rate_of(component.config)
     return None if listens or rate <= 0 else 1 / rate
 
