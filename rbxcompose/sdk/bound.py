@@ -267,13 +267,18 @@ class NewestMessage(Generic[H]):
         """Take messages in a frame, or in any; `wrong` says what is wrong with those in another one."""
         self._frame, self._wrong = frame, wrong
         self._message: H | None = None
+        self._stamp = 0  # of the newest one [ns]
         self._waits = math.inf  # since when transforms have been missing [s]
         self.problem = ""
         """Why it cannot be used so far."""
 
     def put(self, message: H) -> None:
-        """Take a message in place of the one before."""
-        self._message = message
+        """Take a message in place of the one before, unless that only comes again: a sensor that hangs may do so."""
+        before, self._stamp = self._stamp, to_nanoseconds(message.header.stamp)
+        if before and before == self._stamp:
+            self.problem = "it comes again and again with the same stamp"
+        else:
+            self._message = message
 
     def take(self, now: float, *looks: Look) -> tuple[H, list[Transform3]] | None:
         """Return the message with the poses of frames at its time, once; None as long as there is none [s]."""

@@ -6,11 +6,13 @@ from contextlib import ExitStack
 from functools import cache
 from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, get_args
 
-from rbxcompose.base.clock import Clock
+from rbxcompose.base.clock import NANOSECONDS, Clock
 from rbxcompose.base.config import Config
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Command, Query, Refused, Request, Requests, answering, requests
+from rbxcompose.msgs.builtin_interfaces import Time
+from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.sdk.bound import Window
 from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.ports import In, Port
@@ -198,6 +200,11 @@ class Component(Generic[C]):
     def stamp(self) -> int:
         """Return the time for message headers [ns]."""
         return self.context.clock.stamp()
+
+    def time_of(self, stamp: Time) -> float:
+        """Return the robot time of a stamp [s]: that of now for one that is zero, or ahead of now."""
+        age = (self.stamp - to_nanoseconds(stamp)) / NANOSECONDS if stamp != Time() else 0.0
+        return self.now - max(0.0, age)
 
     @property
     def is_at_rest(self) -> bool:

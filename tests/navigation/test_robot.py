@@ -227,6 +227,25 @@ def test_a_robot_whose_laser_tells_nothing_does_not_drive_blindly(tmp_path: Path
         assert room.ends[0].outcome is Outcome.SUCCEEDED
 
 
+@pytest.mark.parametrize(
+    ("later", "said"), [(0.0, "it comes again and again with the same stamp"), (0.1, "its scans are 2.0 s old")]
+)
+def test_a_laser_that_hangs_or_comes_late_is_as_good_as_silent(tmp_path: Path, later: float, said: str) -> None:
+    room = Room(tmp_path, SCANNED)
+    room.bench.advance(2.0)
+    room.bench.bus.action_client("me", "/go_to", NavigateToPose)(
+        NavigateToPose.Goal(pose=PoseStamped(Header(frame_id="map"), Pose(Point(2.0, 0.3)))), room.ends.append
+    )
+    stamp = room.bench.clock.now() - (2.0 if later else 0.0)
+    while not room.ends:
+        room.bench.publish("/scan", replace(SCAN, header=Header(to_time(round(stamp * 1e9)), "base_link")))
+        room.bench.advance(0.1)
+        stamp += later
+    assert room.reason() == f"the laser on 'scan' is of no use: {said}"
+    assert room.base.core.distance < 0.5
+    assert room.base.is_at_rest
+
+
 def test_a_manoeuvre_waits_for_the_first_scan_and_without_any_fails_at_once_where_the_robot_stands(
     tmp_path: Path,
 ) -> None:

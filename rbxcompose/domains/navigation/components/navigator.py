@@ -249,7 +249,9 @@ class Navigator(BaseDriver[NavigatorConfig]):
         message, (at,) = placed
         sensor = at.to_pose2()
         if self.costs.see(sensor, *rays_of(message), min(self.config.sees, message.range_max), self.now):
-            self.seen, self.unusable = self.now, ""
+            self.seen = self.time_of(message.header.stamp)
+            is_late = self.now - self.seen > self.config.silence
+            self.unusable = f"its scans are {self.now - self.seen:.1f} s old" if is_late else ""
             self.show()
         else:
             self.unusable = "none of its numbers is a distance"
