@@ -187,7 +187,7 @@ def test_a_scan_without_echoes_changes_nothing(ranges: ArrayLike) -> None:
     before, quality = ride.core.poses, ride.core.quality
     assert not ride.core.see(LASER, np.arange(len(np.asarray(ranges))), ranges)
     assert np.array_equal(ride.core.poses, before)
-    assert ride.core.quality == quality
+    assert ride.core.quality is quality
     assert ride.core.see(LASER, ANGLES, ride.scan())
 
 

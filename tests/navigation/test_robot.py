@@ -39,6 +39,7 @@ from rbxcompose.msgs.rbxcompose_msgs import BackUp, World
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header, String
+from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.msgs.visualization_msgs import Marker, MarkerArray
 from rbxcompose.sdk.bound import Ended, Outcome
 from rbxcompose.sdk.ports import Qos
@@ -659,6 +660,39 @@ def localised(tmp_path: Path) -> tuple[Room, list[PoseWithCovarianceStamped], li
 
 def is_at(room: Room, told: list[PoseWithCovarianceStamped]) -> bool:
     return bool(told) and all(pose_in(one.pose.pose).distance(room.base.core.pose) < 0.2 for one in told)
+
+
+def test_before_the_first_scan_a_robot_is_at_its_start_by_odometry(tmp_path: Path) -> None:
+    room = Room(tmp_path, SCANNED + "  localisation: {type: particles}\n")
+    statuses = room.bench.statuses("localisation: scan")
+    placed = room.bench.collect("/tf", TFMessage)
+    room.bench.advance(2.0)
+    corrections = [each for message in placed for each in message.transforms if each.child_frame_id == "odom"]
+    assert {(each.transform.translation.x, each.transform.translation.y) for each in corrections} == {(0.0, 0.0)}
+    assert {(status.level, status.message) for status in statuses} == {
+        (Level.OK, "no scan has been compared with the map yet")
+    }
+
+
+def test_a_late_laser_does_not_make_odometry_begin_again(tmp_path: Path) -> None:
+    robot = ROBOT.replace("noise:", "latency: 0.8 s, noise:").replace("0.4 m/s", "0.5 m/s")
+    room = Room(tmp_path, robot + "  localisation: {type: particles}\n")
+    statuses = room.bench.statuses("localisation: scan")
+    assert room.go(-0.6, 1.5).outcome is Outcome.SUCCEEDED
+    assert Level.ERROR not in {status.level for status in statuses}
+
+
+def test_an_initial_pose_is_given_in_the_map(tmp_path: Path) -> None:
+    room = Room(tmp_path, ROBOT + "  localisation: {type: particles}\n")
+    told = room.bench.collect("/amcl_pose", PoseWithCovarianceStamped)
+    pose = PoseWithCovariance(message_of(Pose2(2.0, 2.0)), np.zeros(36))
+    room.bench.publish("/initialpose", PoseWithCovarianceStamped(Header(frame_id="odom"), pose), Qos.EVENT)
+    room.bench.advance(1.0)
+    assert room.bench.texts()[-1].endswith("an initial pose must be given in 'map', not in 'odom'")
+    assert told == []
+    room.bench.publish("/initialpose", PoseWithCovarianceStamped(Header(), pose), Qos.EVENT)
+    room.bench.advance(1.0)
+    assert told
 
 
 @pytest.mark.parametrize("how", ["fails", "is replaced"])

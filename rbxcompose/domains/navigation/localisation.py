@@ -86,8 +86,9 @@ class ParticleFilter:
         self._sampled = Pose2()  # odometry up to which particles have moved
         self.correction = Pose2()
         """Pose of the odometry's frame in `map`; only starts and scans change it, and the first odometry."""
-        self.quality = 0.0
-        """Share of the newest scan's beams that end within two sigma of something in the map, seen from the pose."""
+        self.quality = math.nan
+        """Share of the newest scan's beams that end within two sigma of something in the map, seen from the pose; no
+        number before the first scan."""
         self.start_anywhere()
 
     def start(self, pose: Pose2, spread: float, turn_spread: float, *others: Pose2) -> None:
@@ -152,6 +153,11 @@ class ParticleFilter:
         return is_due
 
     @property
+    def has_moved(self) -> bool:
+        """Return whether it has taken any odometry: before that, the correction does not count."""
+        return self._odometry is not None
+
+    @property
     def pose(self) -> Pose2:
         """Return where the robot is in `map`: the middle of the heaviest cluster at the last scan, and moved since.
 
@@ -176,7 +182,7 @@ class ParticleFilter:
         self._poses = poses
         self._is_due = True
         self._slow = self._fast = self.settings.hit * math.exp(-0.5) + self.settings.random  # at one sigma: it fits
-        self.quality = 0.0
+        self.quality = math.nan
         self._sampled = self._odometry or Pose2()
         self.correction = estimate.compose(self._sampled.inverse())
 

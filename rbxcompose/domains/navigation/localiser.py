@@ -134,10 +134,10 @@ class Localiser(sdk.Component[C]):
         """
         raise NotImplementedError
 
-    def remember(self, pose: Pose2, odometry: Pose2, covariance: Array) -> None:
-        """Know where the robot is in `map` and in `odom`, with the covariance of its pose (3, 3), over restarts."""
+    def remember(self, pose: Pose2, odometry: Pose2, covariance: Array, at: float) -> None:
+        """Know where the robot was in `map` and in `odom` at a time [s], with the covariance of its pose (3, 3)."""
         spread, turn_spread = np.sqrt((covariance[[0, 1], [0, 1]].max(), covariance[2, 2])).tolist()
-        self.keep(RecallPlace(pose, odometry, spread, turn_spread, self.now))
+        self.keep(RecallPlace(pose, odometry, spread, turn_spread, at))
 
     def keep(self, known: RecallPlace | None) -> None:
         """Know a place, or none; let the supervisor know it, too, if that is news."""
@@ -159,9 +159,17 @@ class Localiser(sdk.Component[C]):
         known = geometry.PoseWithCovariance(message_of(pose), spread.ravel())
         self.estimate(geometry.PoseWithCovarianceStamped(Header(stamp, MAP_FRAME), known))
 
+    def given(self, message: geometry.PoseWithCovarianceStamped) -> tuple[Pose2, float, float] | None:
+        """Return a pose that somebody pointed at in a viewer, and its standard deviations [m, rad].
 
-def given_pose(message: geometry.PoseWithCovarianceStamped) -> tuple[Pose2, float, float]:
-    """Return a pose that somebody pointed at in a viewer, and its standard deviations [m, rad]."""
-    covariance = np.asarray(message.pose.covariance, float).reshape(6, 6)
-    spread, turn_spread = math.sqrt(max(0.0, covariance[0, 0])), math.sqrt(max(0.0, covariance[5, 5]))
-    return pose_in(message.pose.pose), spread or GIVEN[0], turn_spread or GIVEN[1]
+        None if it is in another frame than `map` or not finite, with a warning.
+        """
+        frame, pose = message.header.frame_id, pose_in(message.pose.pose)
+        is_finite = math.isfinite(pose.x + pose.y + pose.heading)
+        if frame not in ("", MAP_FRAME) or not is_finite:
+            wrong = f"must be given in '{MAP_FRAME}', not in '{frame}'" if is_finite else "is not finite"
+            self.warn(f"an initial pose {wrong}")
+            return None
+        covariance = np.asarray(message.pose.covariance, float).reshape(6, 6)
+        spread, turn_spread = math.sqrt(max(0.0, covariance[0, 0])), math.sqrt(max(0.0, covariance[5, 5]))
+        return pose, spread or GIVEN[0], turn_spread or GIVEN[1]

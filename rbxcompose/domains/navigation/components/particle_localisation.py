@@ -12,15 +12,7 @@ from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.navigation.localisation import LocalisationSettings, ParticleFilter
-from rbxcompose.domains.navigation.localiser import (
-    BASE,
-    BEGAN_AGAIN,
-    ODOM,
-    RESTARTED,
-    Localiser,
-    RecallPlace,
-    given_pose,
-)
+from rbxcompose.domains.navigation.localiser import BASE, BEGAN_AGAIN, ODOM, RESTARTED, Localiser, RecallPlace
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_of
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import OccupancyGrid
@@ -96,7 +88,7 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
         super().configure()
         self.filter: ParticleFilter | None = None
         self.scan = NewestMessage[LaserScan]()
-        self.correction = Pose2()  # of `odom` in `map`, until the map is known
+        self.correction: Pose2 | None = None  # of `odom` in `map`, as soon as map and odometry are known
 
     def activate(self) -> None:
         """Watch how well the map explains what the laser sees."""
@@ -116,6 +108,8 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
         if self.doubt:
             help_text = "give a pose on 'initialpose', or let it drive by hand until it has found itself"
             return sdk.TaskStatus(Level.ERROR, f"{self.doubt}, so nothing drives: {help_text}")
+        if math.isnan(self.filter.quality):
+            return sdk.TaskStatus(Level.OK, "no scan has been compared with the map yet")
         share = f"the map explains {self.filter.quality:.0%} of what the laser sees"
         return sdk.TaskStatus(Level.OK if self.filter.quality >= LOST else Level.WARN, share)
 
@@ -130,7 +124,7 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
 
     def on_initialpose(self, message: geometry.PoseWithCovarianceStamped) -> None:
         """Begin again at a pose that somebody pointed at in a viewer."""
-        if self.begin(*given_pose(message)):
+        if (given := self.given(message)) and self.begin(*given):
             self.doubt, self.recalled = "", None
             self.keep(None)  # until the next scan
 
@@ -173,6 +167,8 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
             return
         if (odometry := self.odometry.now()) is not None:
             self.look_back(odometry)
+            if not self.filter.has_moved:
+                self.filter.move(odometry)
         if (placed := self.scan.take(self.now, self.bound["laser"], self.odometry)) is None:
             return  # diagnostics of transforms say so
         message, (laser, base) = placed
@@ -186,14 +182,14 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
         if is_weighed:
             self.tell(self.filter, message.header)
         if not self.doubt:
-            self.remember(self.filter.pose, base.to_pose2(), covariance)
+            self.remember(self.filter.pose, base.to_pose2(), covariance, self.time_of(message.header.stamp))
 
     def step(self, dt: float) -> None:
         """Publish where `odom` is in `map`, unless that is in doubt."""
         self.take_scan()
-        if self.filter is not None:
+        if self.filter is not None and self.filter.has_moved:
             self.correction = self.filter.correction
-        if not self.doubt:
+        if self.correction is not None and not self.doubt:
             self.place(self.correction)
 
     def tell(self, found: ParticleFilter, of: Header) -> None:

@@ -16,7 +16,7 @@ from rbxcompose.base.arrays import Array, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, Transform3, rotate, wrap_angle
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.navigation.localiser import BEGAN_AGAIN, Localiser, RecallPlace, given_pose
+from rbxcompose.domains.navigation.localiser import BEGAN_AGAIN, Localiser, RecallPlace
 from rbxcompose.domains.vision.tag_watcher import SQUARE, TagWatcher, TagWatcherConfig, WatchedTag
 from rbxcompose.domains.worlds.physics.solids import rotation_matrix
 from rbxcompose.msgs import geometry_msgs as geometry
@@ -223,12 +223,9 @@ class TagLocalisation(Localiser[TagLocalisationConfig], TagWatcher[TagLocalisati
 
     def on_initialpose(self, message: geometry.PoseWithCovarianceStamped) -> None:
         """Begin again at a pose that somebody pointed at in a viewer."""
-        pose, spread, turn_spread = given_pose(message)
-        if math.isfinite(pose.x + pose.y + pose.heading):
-            self.filter.start(pose, spread, turn_spread)
+        if (given := self.given(message)) is not None:
+            self.filter.start(*given)
             self.recalled = None
-        else:
-            self.warn("an initial pose is not finite")
 
     def see(self, tags: list[WatchedTag]) -> None:
         """Take the tags of a picture, from where the robot was when it was taken."""
@@ -251,7 +248,7 @@ class TagLocalisation(Localiser[TagLocalisationConfig], TagWatcher[TagLocalisati
             self.filter.move(base)
             if self.filter.pose is not None:
                 self.doubt = ""
-                self.remember(self.filter.pose, base, self.filter.covariance)
+                self.remember(self.filter.pose, base, self.filter.covariance, self.now)
         if (correction := self.filter.correction) is not None:
             self.place(correction)
         self.status(*self.state())
