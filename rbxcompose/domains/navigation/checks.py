@@ -27,13 +27,17 @@ ROUNDING = 1e-3  # [m] of lengths that people measure, and of round shapes
 
 @check("RBX3602", Severity.WARNING, closed=())
 def place_without_room(robot: Robot) -> Iterator[Finding]:
-    """A place is outside of the map, or the robot does not fit there."""
+    """A place, or where the robot is to start, is outside of the map, or the robot does not fit there."""
     if (found := _navigation(robot)) is None:
         return
-    around = robot.manifest.contents.of(world)
+    around, localisation = robot.manifest.contents.of(world), found.model.localisation
     for name, place in robot.manifest.places.items():
         if why := _why_not(found, around, place):
             yield place_without_room.at(_written(robot, name), f"the robot cannot drive to '{name}': {why}")
+    start = None if localisation.anywhere else localisation.start
+    if start is not None and (why := _why_not(found, around, start.pose)):
+        span = robot.value("navigation", "localisation", "start")
+        yield place_without_room.at(span, f"the robot cannot be where it starts: {why}")
 
 
 @check("RBX3610", Severity.WARNING, closed=())
@@ -225,7 +229,7 @@ def _written(robot: Robot, name: str) -> Span:
     return robot.value("places", name) if is_own else robot.value("world")
 
 
-def _why_not(found: NavigationOfRobot, around: WorldOfRobot | None, place: Place) -> str:
+def _why_not(found: NavigationOfRobot, around: WorldOfRobot | None, place: Place | Pose2) -> str:
     """Return why a robot cannot stand at a place; nothing if it can."""
     if not found.grid.contains((place.x, place.y)):
         return "it is outside of the map"
