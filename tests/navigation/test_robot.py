@@ -297,6 +297,21 @@ def test_recoveries_are_a_mission_that_users_may_replace(tmp_path: Path) -> None
     assert room.contacts == []
 
 
+def test_a_robot_that_is_held_by_what_its_laser_does_not_see_tries_recoveries(tmp_path: Path) -> None:
+    step = "objects:\n  step: {box: [20 cm, 1 m, 5 cm], at: {x: -1 m, y: 0 m}}\n"
+    room = Room(tmp_path, SCANNED, WORLD + step)
+    room.bench.bus.action_client("me", "/go_to", NavigateToPose)(
+        NavigateToPose.Goal(pose=PoseStamped(Header(frame_id="map"), Pose(Point(-0.4, 0.0)))), room.ends.append
+    )
+    tried = "go_to: runs mission recover, attempt 1: it gets no further"
+    for _ in range(300):
+        room.bench.publish("/scan", SCAN)
+        room.bench.advance(0.1)
+    assert room.contacts
+    assert tried in room.bench.texts()
+    assert not room.ends
+
+
 def test_what_is_driven_to_and_fro_is_no_progress(tmp_path: Path) -> None:
     navigator = Room(tmp_path).bench.component("go_to")
     assert isinstance(navigator, Navigator)

@@ -117,7 +117,7 @@ class NavigatorConfig(sdk.Config):
     silence: Annotated[sdk.Time, sdk.Live()] = Field(1.0, gt=0)
     """Without a scan for so long, the robot stops."""
     patience: Annotated[sdk.Time, sdk.Live()] = Field(15.0, gt=0)
-    """If it gets no further for so long, though nothing is being tried, the goal fails."""
+    """If it gets no further for so long, it tries a recovery; the goal fails if there is none, or it cannot drive."""
     recovery: Annotated[str, sdk.Live()] = ""
     """The mission that runs when it gets no further; empty if it only waits."""
     trees: tuple[str, ...] = ()
@@ -397,7 +397,8 @@ class Navigator(BaseDriver[NavigatorConfig]):
             else:
                 goal.succeeded()
         elif self.now - self.waits >= self.config.patience:
-            self.fail(goal, self.reason or "it gets no further")
+            self.path, self.reason = None, "it gets no further"
+            self.recover(goal)
         else:
             self.report(goal, pose)
 
@@ -419,9 +420,10 @@ class Navigator(BaseDriver[NavigatorConfig]):
     def recover(self, goal: NavigatorGoal) -> None:
         """Run the mission that may help; without one, wait."""
         self.approaches = False
-        self.wait(goal, self.reason)
-        if self.goal is not goal or not self.config.recovery or not self.bound[RUN].is_available:
+        if not self.config.recovery or not self.bound[RUN].is_available:
+            self.wait(goal, self.reason)
             return
+        self.rest()
         self.recoveries, self.attempts = self.recoveries + 1, self.attempts + 1
         mission = goal.request.behavior_tree or self.config.recovery
         self.info(f"runs mission {mission}, attempt {self.attempts}: {self.reason}")

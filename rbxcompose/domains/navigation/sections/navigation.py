@@ -125,7 +125,7 @@ class WayPlannerModel(Config):
     """How ways are planned."""
 
     patience: Time = Field(15.0, gt=0)
-    """If the robot gets no further for so long, though nothing is being tried, the goal fails."""
+    """If the robot gets no further for so long, it tries a recovery; the goal fails if it cannot drive at all."""
 
 
 class FollowerModel(Config):
