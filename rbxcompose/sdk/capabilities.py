@@ -104,6 +104,8 @@ class CommandsMotion(Capability):
     """[m/s]."""
     max_turn_rate: Setting[float] | None = None
     """[rad/s]."""
+    acceleration: Setting[float] | None = None
+    """By which it accelerates and brakes [m/s^2]."""
     protects: bool = False
     """Whether it commands only to protect the robot, so that nobody else may overrule it."""
 
@@ -119,6 +121,14 @@ class Navigates(Capability):
     """[m/s], unless declared as what it commands."""
     least_time: Callable[[Pose2, Pose2, Drives | None], float] | None = None
     """Returns the least time from a pose to another on this base [s]; without it, that of the way at full speed."""
+    radius: Setting[float] | None = None
+    """Of the circle around its origin that it keeps free [m]; None if it keeps another shape free."""
+    inflation: Setting[float] | None = None
+    """Up to this distance from obstacles, ways are dearer to it [m]."""
+    sees: Setting[float] | None = None
+    """Up to this distance, what its sensor sees counts [m]; None without one."""
+    silence: Setting[float] | None = None
+    """Without news of its sensor for so long, it stops [s]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.sdk import (
+    Acceleration,
     AngularSpeed,
     Capability,
     Charges,
@@ -81,6 +82,8 @@ class WheelsConfig(Config):
     """On the spot."""
     patience: Time = 0.5
     """It waits so long for a command."""
+    grip: Acceleration = 1.0
+    """It brakes so hard."""
     body: str = "base_footprint"
     """The frame that it moves."""
 
@@ -107,6 +110,7 @@ class ToyWheels(Wheels):
             max_turn_rate=Setting(config.spin, "spin"),
             drops_above=Setting(2.0),
             stops_after=Setting(config.patience, "patience"),
+            acceleration=Setting(config.grip, "grip"),
         )
         return base, WritesFrame("frames", Setting("odom"), Setting(config.body, "body"))
 
@@ -158,6 +162,8 @@ class PilotConfig(Config):
     """On the spot."""
     off_by: Length = 0.05
     """How near it comes."""
+    push: Acceleration = 0.5
+    """How hard it brakes."""
 
 
 class ScannerConfig(Config):
@@ -188,7 +194,8 @@ class Pilot(Component[PilotConfig]):
     @classmethod
     def capabilities(cls, config: PilotConfig) -> tuple[Capability, ...]:
         """Return how fast it is, and how near it comes."""
-        commands = CommandsMotion("velocity", Setting(config.pace, "pace"), Setting(config.turn, "turn"))
+        limits = Setting(config.pace, "pace"), Setting(config.turn, "turn"), Setting(config.push, "push")
+        commands = CommandsMotion("velocity", *limits)
         return commands, Navigates("goals", Setting(config.off_by, "off_by"))
 
 

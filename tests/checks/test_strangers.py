@@ -99,6 +99,9 @@ def test_findings_name_the_strangers_own_settings(tmp_path: Path) -> None:
     [finding] = found("  base: {type: toy_wheels}\n  pilot:\n    type: toy_pilot\n    pace: 0.9 m/s\n", tmp_path)
     assert finding.help == "make 'pace' of 'pilot' at most 0.5 m/s"
     assert [one.message for one in finding.related] == ["'fastest' of the base"]
+    [finding] = found("  base: {type: toy_wheels}\n  pilot:\n    type: toy_pilot\n    push: 2 m/s^2\n", tmp_path)
+    assert finding.message == "'pilot' accelerates and brakes by 2 m/s^2, but its base 'base' can do 1 m/s^2 at most"
+    assert finding.help == "make 'push' of 'pilot' at most 1 m/s^2"
 
 
 def test_what_is_fixed_is_told_at_the_type(tmp_path: Path) -> None:

@@ -67,6 +67,27 @@ def test_a_value_that_breaks_a_rule_across_components_is_found(robot: Robot) -> 
     )
 
 
+def test_navigation_keeps_the_room_that_the_robot_needs_also_while_it_runs(tmp_path: Path) -> None:
+    text = (
+        "rbx: 1\nkind: Robot\nname: one\nbody: {urdf: rbx:robots/turtlebot/turtlebot.urdf}\n"
+        "world: rbx:worlds/house.yaml\ncomponents:\n  base: {type: diff_drive_sim}\n  laser: {type: laser_sim, frame: base_link}\nnavigation: {}\n"
+    )
+    robot = check_text(text, tmp_path).compilation.robot
+    assert robot is not None
+    rules, go_to = LiveRules(robot), robot.components["go_to"].config
+    for name, value, code in (
+        ("radius", "5 cm", "RBX3613"),
+        ("inflation", "1 mm", "RBX3614"),
+        ("sees", "10 cm", "RBX3642"),
+        ("silence", "10 s", "RBX3642"),
+        ("acceleration", "5 m/s^2", "RBX3503"),
+    ):
+        broken = rules.why_not({}, {"go_to": set_to(go_to, name, value)})
+        assert broken is not None
+        assert f"({code})" in broken.reason
+    assert rules.why_not({}, {"go_to": set_to(go_to, "radius", "0.3 m")}) is None
+
+
 def test_what_other_components_have_now_counts(robot: Robot) -> None:
     now = {"base": set_to(robot.components["base"].config, "max_speed", "0.9 m/s")}
     new = set_to(robot.components["go_to"].config, "speed", "0.55 m/s")

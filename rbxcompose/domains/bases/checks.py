@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Mapping
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import NAMES, WIRING, Finding, FindingKind, Related, Severity
 from rbxcompose.base.geometry import Vector3, rotate
-from rbxcompose.base.units import ANGULAR_SPEED, LENGTH, SPEED, TIME, Dimension, format_quantity
+from rbxcompose.base.units import ACCELERATION, ANGULAR_SPEED, LENGTH, SPEED, TIME, Dimension, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import OTHER_TYPE, MessageFlow, is_written, period_of, setting_span
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent
@@ -99,7 +99,7 @@ _FIELDS = {("linear", "x"): ("max_speed", SPEED, "m/s"), ("angular", "z"): ("max
 
 @check("RBX3503", Severity.WARNING, closed=(WIRING, NAMES))
 def clamped_speed(robot: Robot) -> Iterator[Finding]:
-    """A component drives faster than its base can."""
+    """A component drives, or brakes, faster than its base can."""
     yield from _excesses(robot, clamped_speed, is_absurd=False)
 
 
@@ -108,11 +108,15 @@ def _excesses(robot: Robot, kind: FindingKind, *, is_absurd: bool) -> Iterator[F
     for drive in MessageFlow(robot).drives():
         driver, base, wants, has = drive.driver, drive.base, drive.commands, drive.drives
         factor = has.drops_above.value if has.drops_above else math.inf
-        speeds = (wants.max_speed, has.max_speed, SPEED), (wants.max_turn_rate, has.max_turn_rate, ANGULAR_SPEED)
-        for wanted, limit, dimension in speeds:
+        limits = (
+            (wants.max_speed, has.max_speed, SPEED, factor, "drives at"),
+            (wants.max_turn_rate, has.max_turn_rate, ANGULAR_SPEED, factor, "drives at"),
+            (wants.acceleration, has.acceleration, ACCELERATION, math.inf, "accelerates and brakes by"),
+        )
+        for wanted, limit, dimension, dropped, does in limits:
             if not (wanted and limit and wanted.value > limit.value):
                 continue
-            if (wanted.value > factor * limit.value) is not is_absurd:
+            if (wanted.value > dropped * limit.value) is not is_absurd:
                 continue
             fast, most = format_quantity(wanted.value, dimension), format_quantity(limit.value, dimension)
             times = "twice" if factor == 2.0 else f"{factor:g} times"
@@ -125,7 +129,7 @@ def _excesses(robot: Robot, kind: FindingKind, *, is_absurd: bool) -> Iterator[F
             related = Related(at_base, f"'{limit.field}' of the base" if limit.field else "the base")
             yield kind.at(
                 span,
-                f"'{driver.name}' drives at {fast}, but its base '{base.name}' {reacts}",
+                f"'{driver.name}' {does} {fast}, but its base '{base.name}' {reacts}",
                 help=remedy,
                 related=[related] if at_base != span else [],
             )

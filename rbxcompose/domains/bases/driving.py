@@ -36,9 +36,10 @@ class BaseDriver(sdk.Component[C]):
 
     @classmethod
     def capabilities(cls, config: Any) -> tuple[sdk.Capability, ...]:
-        """Declare how fast it drives."""
-        speed, turn_rate = sdk.Setting(config.speed, "speed"), sdk.Setting(config.turn_rate, "turn_rate")
-        return (*super().capabilities(config), sdk.CommandsMotion("cmd_vel", speed, turn_rate))
+        """Declare how fast it drives, and by which acceleration if that can be set."""
+        names = "speed", "turn_rate", "acceleration"
+        limits: Any = (sdk.Setting(getattr(config, name), name) if hasattr(config, name) else None for name in names)
+        return (*super().capabilities(config), sdk.CommandsMotion("cmd_vel", *limits))
 
     def drive(self, velocity: Velocity2) -> None:
         """Publish a velocity."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import product
 
 from rbxcompose.base.arrays import np
 from rbxcompose.base.config import Place
@@ -11,6 +12,7 @@ from rbxcompose.base.findings import NAMES, WIRING, Finding, Severity, Span
 from rbxcompose.base.geometry import Pose2, wrap_angle
 from rbxcompose.base.units import FREQUENCY, LENGTH, TIME, format_quantity
 from rbxcompose.compiler.check_runner import check
+from rbxcompose.compiler.model.flow import setting_span
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.navigation.costs import CostZone
@@ -19,9 +21,11 @@ from rbxcompose.domains.worlds.contact import MAP, outside_polygon, overlap
 from rbxcompose.domains.worlds.sections.world import WorldOfRobot, world
 from rbxcompose.domains.worlds.shapes import Point2, PolygonFootprint, hull_of, outline_of, sections_of
 from rbxcompose.manifest.tree import at
+from rbxcompose.sdk.capabilities import CommandsMotion, Navigates
 from rbxcompose.sdk.ports import Out
 
 SCANS = 2  # within the time after which a laser counts as silent: one may come late
+BLIND = 2.0  # [m] at most, driven without a scan
 ROUNDING = 1e-3  # [m] of lengths that people measure, and of round shapes
 
 
@@ -97,7 +101,10 @@ def navigation_without_laser(robot: Robot) -> Iterator[Finding]:
 @check("RBX3613", Severity.WARNING, closed=())
 def footprint_too_small(robot: Robot) -> Iterator[Finding]:
     """Navigation takes the robot for smaller than it is."""
-    if (found := _navigation(robot)) is None or found.model.footprint is None:
+    if (found := _navigation(robot)) is None:
+        return
+    radius, _ = _kept(robot, found)
+    if found.model.footprint is None and radius == found.radius:
         return
     described, around = robot.manifest.contents.of(body), robot.manifest.contents.of(world)
     if isinstance(footprint := found.footprint, PolygonFootprint):
@@ -109,15 +116,15 @@ def footprint_too_small(robot: Robot) -> Iterator[Finding]:
             )
         return
     outline = outline_of(described.body)[0] if described else 0.0
-    if outline > found.radius + ROUNDING:
+    if outline > radius + ROUNDING:
         larger, words = outline, "its body extends"
-    elif around is not None and around.radius > found.radius + ROUNDING:
+    elif around is not None and around.radius > radius + ROUNDING:
         larger, words = around.radius, "in its world it extends"
     else:
         return
     yield footprint_too_small.at(
         robot.value("navigation", "footprint", "radius"),
-        f"navigation keeps {_shown(found.radius)} free around the robot, and {words} {_shown(larger)}",
+        f"navigation keeps {_shown(radius)} free around the robot, and {words} {_shown(larger)}",
         help="leave out 'footprint': the radius is that of the body" if described else "make it at least as large",
     )
 
@@ -127,7 +134,7 @@ def inflation_within_robot(robot: Robot) -> Iterator[Finding]:
     """Ways are not dearer near to obstacles, because inflation ends within the robot."""
     if (found := _navigation(robot)) is None:
         return
-    inflation, reach = found.model.costs.inflation.radius, found.footprint.reach
+    reach, inflation = _kept(robot, found)
     if inflation > reach:
         return
     yield inflation_within_robot.at(
@@ -167,6 +174,31 @@ def scans_too_rare(robot: Robot) -> Iterator[Finding]:
         )
 
 
+@check("RBX3642", Severity.WARNING, closed=())
+def drives_blind(robot: Robot) -> Iterator[Finding]:
+    """Obstacles count so near, or a laser counts as silent so late, that the robot cannot stop in time."""
+    if (found := _navigation(robot)) is None or (go_to := robot.components.get(GO_TO)) is None:
+        return
+    reach, _ = _kept(robot, found)
+    for made, motion in product(go_to.declared(Navigates), go_to.declared(CommandsMotion)):
+        if not (made.sees and made.silence and motion.max_speed and motion.acceleration):
+            continue
+        needs = reach + motion.max_speed.value**2 / (2 * motion.acceleration.value)
+        if made.sees.value < needs:
+            yield drives_blind.at(
+                setting_span(robot, (go_to, made.sees.field)),
+                f"obstacles count within {_shown(made.sees.value)} only, and the robot needs {_shown(needs)} to stop",
+                help=f"make it larger: the robot extends {_shown(reach)}, and brakes on the rest",
+            )
+        if (blind := motion.max_speed.value * made.silence.value) > BLIND:
+            yield drives_blind.at(
+                setting_span(robot, (go_to, made.silence.field)),
+                f"after its last scan, the robot drives on for {format_quantity(made.silence.value, TIME)}:"
+                f" {_shown(blind)} at full speed",
+                help="a few times the time between two scans is enough, such as '1 s'",
+            )
+
+
 @check("RBX3623", Severity.WARNING, closed=(WIRING, NAMES))
 def laser_sees_robot(robot: Robot) -> Iterator[Finding]:
     """A laser sees a link of its own robot, which navigation takes for an obstacle."""
@@ -202,6 +234,15 @@ def laser_sees_robot(robot: Robot) -> Iterator[Finding]:
 def _navigation(robot: Robot) -> NavigationOfRobot | None:
     contents = robot.manifest.contents
     return contents.of(navigation) if "navigation" in contents.root else None
+
+
+def _kept(robot: Robot, found: NavigationOfRobot) -> tuple[float, float]:
+    """Return how far the robot extends for navigation, and up to where ways are dearer [m], as it is set now."""
+    radius, inflation = found.footprint.reach, found.model.costs.inflation.radius
+    for _, made in robot.declared(Navigates):
+        radius = made.radius.value if made.radius else radius
+        inflation = made.inflation.value if made.inflation else inflation
+    return radius, inflation
 
 
 def _laser(robot: Robot) -> tuple[RobotComponent, float | None] | None:

@@ -173,10 +173,12 @@ class Navigator(BaseDriver[NavigatorConfig]):
 
     @classmethod
     def capabilities(cls, config: NavigatorConfig) -> tuple[sdk.Capability, ...]:
-        """Declare how fast it drives and how near it comes."""
+        """Declare how fast it drives, how near it comes, and how much room it keeps."""
+        names = "inflation", *(() if config.corners else ("radius",)), *(("sees", "silence") if config.scan else ())
+        room: dict[str, Any] = {name: sdk.Setting(getattr(config, name), name) for name in names}
         return (
             *super().capabilities(config),
-            sdk.Navigates("go_to", sdk.Setting(config.tolerance, "tolerance")),
+            sdk.Navigates("go_to", sdk.Setting(config.tolerance, "tolerance"), **room),
             sdk.NeedsExtra(sdk.Setting("scipy"), sdk.Setting("navigation")),
         )
 

@@ -279,7 +279,8 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         "heading_tolerance": f"{model.follower.heading_tolerance!r} rad",
     }
     follower = {name: ("navigation", "follower", name) for name in FollowerModel.model_fields}
-    places = {**follower, "inflation": ("navigation", "costs", "inflation", "radius")}
+    costs = {"sees": ("obstacles", "range"), "silence": ("obstacles", "silence"), "inflation": ("inflation", "radius")}
+    places = {**follower, **{name: ("navigation", "costs", *place) for name, place in costs.items()}}
     if model.localisation.type in ("particles", "tags"):
         yield _localisation(model.localisation, contents.of(world), wiring)
     elif model.localisation.type == "fake":
