@@ -70,7 +70,8 @@ def test_a_value_that_breaks_a_rule_across_components_is_found(robot: Robot) -> 
 def test_navigation_keeps_the_room_that_the_robot_needs_also_while_it_runs(tmp_path: Path) -> None:
     text = (
         "rbx: 1\nkind: Robot\nname: one\nbody: {urdf: rbx:robots/turtlebot/turtlebot.urdf}\n"
-        "world: rbx:worlds/house.yaml\ncomponents:\n  base: {type: diff_drive_sim}\n  laser: {type: laser_sim, frame: base_link}\nnavigation: {}\n"
+        "world: rbx:worlds/house.yaml\nnavigation: {}\ncomponents:\n"
+        "  base: {type: diff_drive_sim}\n  laser: {type: laser_sim, frame: base_link}\n"
     )
     robot = check_text(text, tmp_path).compilation.robot
     assert robot is not None
