@@ -38,13 +38,13 @@ ROOMS: dict[str, Cost] = {
     "compiler": Cost(code=7786, files=53, small=1, imports=878),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
     "domains/arms": Cost(code=12784, files=64, small=1, imports=1106),
-    "domains/bases": Cost(code=2100, files=16, small=0, imports=193),
+    "domains/bases": Cost(code=2105, files=16, small=0, imports=193),
     "domains/body": Cost(code=3584, files=27, small=2, imports=365),
     "domains/console": Cost(code=3562, files=20, small=0, imports=249),
     "domains/devices": Cost(code=1890, files=15, small=0, imports=183),
     "domains/diagnostics": Cost(code=2348, files=23, small=4, imports=210),
     "domains/muxes": Cost(code=2120, files=13, small=1, imports=132),
-    "domains/navigation": Cost(code=4090, files=27, small=2, imports=383),
+    "domains/navigation": Cost(code=4140, files=27, small=2, imports=378),
     "domains/policies": Cost(code=889, files=6, small=0, imports=73),
     "domains/power": Cost(code=439, files=5, small=0, imports=31),
     "domains/programs": Cost(code=3825, files=26, small=0, imports=372),
@@ -55,14 +55,14 @@ ROOMS: dict[str, Cost] = {
     "missions": Cost(code=12008, files=78, small=3, imports=1030),
     "msgs": Cost(code=1559, files=14, small=3, imports=93),
     "runtime": Cost(code=7690, files=38, small=0, imports=678),
-    "sdk": Cost(code=1384, files=8, small=0, imports=159),
+    "sdk": Cost(code=1399, files=8, small=0, imports=161),
     "testing": Cost(code=374, files=5, small=2, imports=55),
     "tools": Cost(code=17660, files=116, small=8, imports=1855),
 }
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 113280,
+    "lines of code": 113350,
     "files": 749,
     "files of 1 to 30 lines of code": 42,
     "lines of imports": 10391,
