@@ -4,6 +4,7 @@ import argparse
 import json
 import os
 import sys
+import time
 from contextlib import suppress
 from typing import TypeVar
 
@@ -14,7 +15,14 @@ from rbxcompose.base.requests import Command, Refused, Request
 from rbxcompose.commands.console import NotDoneError, emit
 from rbxcompose.commands.options import add_system_options, system_and_robot
 from rbxcompose.runtime.control import ANSWER, NoAnswerError, ask
-from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, UnsafeFolderError, all_folders
+from rbxcompose.runtime.folder import (
+    BrokenStateError,
+    RobotFolder,
+    RobotState,
+    UnsafeFolderError,
+    all_folders,
+    is_starting,
+)
 from rbxcompose.runtime.log import write_problem
 from rbxcompose.runtime.requests import RobotStatus
 
@@ -25,6 +33,7 @@ WHICH = kind("RBX9003")
 REFUSED = kind("RBX9004")
 NO_ANSWER = kind("RBX9005")
 UNSAFE = kind("RBX9006")
+_LOOK = 0.05  # [s] between looks for a robot that is about to come up
 _ADDRESSED = "the robot, by name or file; or a system"
 NO_SUPERVISOR = "its supervisor has died"
 
@@ -79,6 +88,23 @@ def find_robot(wanted: str | None) -> RobotFolder:
     raise NotDoneError(NOT_UP.at(None, f"no robot '{robot}' is up{where}", help=help_text))
 
 
+def awaited_robot(wanted: str | None) -> RobotFolder:
+    """Find a robot as `find_robot` does, or once its `up` has begun: who reads that none is up may come near."""
+    is_reported = False
+    while True:
+        may_come = is_starting()
+        try:
+            if known_state(folder := find_robot(wanted)) is not None or not may_come:
+                return folder
+        except NotDoneError as error:
+            if error.finding.code != NOT_UP.code or not may_come:
+                raise
+            if not is_reported:
+                sys.stderr.write(f"{error.finding.message}, but an 'up' is on its way: waits for it\n")
+            is_reported = True
+        time.sleep(_LOOK)
+
+
 def robots_up() -> list[RobotFolder]:
     """Return the folders of all robots that are up or were left behind.
 
@@ -128,6 +154,22 @@ def answer_of(folder: RobotFolder, request: Request[A], *, timeout: float = ANSW
         raise NotDoneError(REFUSED.at(None, f"'{name}' refuses: {refusal}")) from refusal
     except NoAnswerError as error:
         raise NotDoneError(no_answer(folder)) from error
+
+
+def answer_soon(folder: RobotFolder, request: Request[A], patience: float) -> A:
+    """Ask a robot that may have just begun, and will soon listen, again for some time [s].
+
+    Raises:
+        NotDoneError: if it still refuses or does not answer.
+    """
+    deadline = time.monotonic() + patience
+    while True:
+        try:
+            return answer_of(folder, request, timeout=patience)
+        except NotDoneError:
+            if time.monotonic() > deadline:
+                raise
+        time.sleep(_LOOK)
 
 
 def no_answer(folder: RobotFolder) -> Finding:

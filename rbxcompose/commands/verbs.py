@@ -28,8 +28,8 @@ MOST_USED = "most used"
 class Verb(Protocol):
     """The contents of a verb's module.
 
-    With `IS_COMMON = True`, it stands among the most used ones in the help. With `STARTS_ROBOTS = True`, `down`
-    waits for the robots that it starts.
+    With `IS_COMMON = True`, it stands among the most used ones in the help. With `STARTS_ROBOTS = True`, `stop` and
+    `down` wait for the robots that it starts.
     """
 
     __doc__: str | None

@@ -31,12 +31,18 @@ def test_of_many_that_start_it_at_once_one_does(robot: Robot) -> None:
     assert robot.do("down").returncode == 0
 
 
-def test_down_ends_a_robot_whose_up_is_on_its_way(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("is_stopped", [False, *rare(True)])
+def test_stop_and_down_wait_for_a_robot_whose_up_is_on_its_way(
+    robot: Robot, is_stopped: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     words = [*RBXCOMPOSE, "up", "-d", "robots/turtlebot"]
     pipe = subprocess.PIPE
     up = Forked(words, env=robot.environment, cwd=ROOT, stdout=pipe, stderr=subprocess.STDOUT, text=True)
     monkeypatch.setenv("XDG_RUNTIME_DIR", robot.environment["XDG_RUNTIME_DIR"])
     eventually(is_starting)
+    if is_stopped:
+        done = robot.do("stop", "turtlebot")
+        assert done.returncode == 0, done.stderr
     done = robot.do("down", "turtlebot")
     assert (done.returncode, done.stdout) == (0, "turtlebot is down\n"), done.stderr
     up.communicate(timeout=PATIENCE)

@@ -34,7 +34,7 @@ ROOMS: dict[str, Cost] = {
     "__main__": Cost(code=4, files=1, small=1, imports=2),
     "base": Cost(code=3797, files=25, small=3, imports=215),
     "bus": Cost(code=2382, files=17, small=0, imports=160),
-    "commands": Cost(code=2609, files=24, small=3, imports=326),
+    "commands": Cost(code=2641, files=24, small=3, imports=334),
     "compiler": Cost(code=7786, files=53, small=1, imports=878),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
     "domains/arms": Cost(code=12784, files=64, small=1, imports=1106),
@@ -62,10 +62,10 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 113350,
+    "lines of code": 113362,
     "files": 749,
     "files of 1 to 30 lines of code": 42,
-    "lines of imports": 10391,
+    "lines of imports": 10393,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 369,

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
-import time
 from typing import TYPE_CHECKING
 
-from rbxcompose.base.requests import Refused
 from rbxcompose.commands.console import NotDoneError, emit
-from rbxcompose.commands.lookup import NO_ANSWER, NOT_UP, add_addressed_robot, find_robot, known_state
+from rbxcompose.commands.lookup import NO_ANSWER, NOT_UP, add_addressed_robot, answer_soon, awaited_robot, known_state
 from rbxcompose.commands.options import EACH
-from rbxcompose.runtime.control import NoAnswerError, ask, supervisor_of
-from rbxcompose.runtime.folder import RobotFolder, RobotState, is_starting
+from rbxcompose.runtime.control import supervisor_of
+from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, wait_until_ended
 from rbxcompose.runtime.requests import BringDown
 from rbxcompose.runtime.supervision.leftovers import end_leftovers, kill_supervisor
@@ -25,7 +22,6 @@ GROUP = "run"
 IS_COMMON = True
 ON_SYSTEM = EACH
 _ANSWER = 1.0  # [s]
-_LOOK = 0.05  # [s] between looks for a robot that is about to come up
 _ORDERLY = 3.0  # [s] for a supervisor to bring everything down, after it has come to rest
 
 
@@ -37,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """End the robot: orderly if its supervisor answers, else by force."""
-    folder = _awaited_robot(arguments.robot or arguments.path)
+    folder = awaited_robot(arguments.robot or arguments.path)
     report = _end(folder)
     if arguments.json:
         emit(json.dumps({"robot": folder.path.name, "told": report}))
@@ -55,23 +51,6 @@ def run_on_system(command: SystemCommand) -> int:
     if (exit_code := command.ask(tolerates=NOT_UP.code)) == 0:
         remember(command.path, {}, gone=command.shares)
     return exit_code
-
-
-def _awaited_robot(wanted: str | None) -> RobotFolder:
-    """Find a robot as `find_robot` does, or once its `up` has begun: who reads that none is up may come near."""
-    is_reported = False
-    while True:
-        may_come = is_starting()
-        try:
-            if known_state(folder := find_robot(wanted)) is not None or not may_come:
-                return folder
-        except NotDoneError as error:
-            if error.finding.code != NOT_UP.code or not may_come:
-                raise
-            if not is_reported:
-                sys.stderr.write(f"{error.finding.message}, but an 'up' is on its way: waits for it\n")
-            is_reported = True
-        time.sleep(_LOOK)
 
 
 def _end(folder: RobotFolder) -> list[str]:
@@ -101,13 +80,8 @@ def _supervisor(folder: RobotFolder, state: RobotState | None) -> Process | None
 
 
 def _asked(folder: RobotFolder) -> bool:
-    deadline = time.monotonic() + _ANSWER
-    while True:
-        try:
-            ask(folder, BringDown(), timeout=_ANSWER)
-        except (NoAnswerError, Refused):
-            if time.monotonic() > deadline:
-                return False
-            time.sleep(_LOOK)  # it may have just begun, and soon listen
-        else:
-            return True
+    try:
+        answer_soon(folder, BringDown(), _ANSWER)
+    except NotDoneError:
+        return False
+    return True

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Stop the robot, over the bus if its supervisor does not answer."""
-    folder = lookup.find_robot(arguments.robot)
+    folder = lookup.awaited_robot(arguments.robot)
     answer = _stopped(folder)
     lookup.show_answer(arguments, folder, answer)
     return 0
@@ -41,7 +41,10 @@ def _stopped(folder: RobotFolder) -> str:
         except NotDoneError as error:
             if error.finding.code != lookup.NO_ANSWER.code:
                 raise
-    return stop_by_bus(folder)
+    try:
+        return stop_by_bus(folder)
+    except NotDoneError:
+        return lookup.answer_soon(folder, StopRobot(), _ANSWER)
 
 
 def stop_by_bus(folder: RobotFolder) -> str:
