@@ -40,11 +40,10 @@ def test_stop_and_down_wait_for_a_robot_whose_up_is_on_its_way(
     up = Forked(words, env=robot.environment, cwd=ROOT, stdout=pipe, stderr=subprocess.STDOUT, text=True)
     monkeypatch.setenv("XDG_RUNTIME_DIR", robot.environment["XDG_RUNTIME_DIR"])
     eventually(is_starting)
-    if is_stopped:
-        done = robot.do("stop", "turtlebot")
-        assert done.returncode == 0, done.stderr
+    stopped = robot.do("stop", "turtlebot") if is_stopped else None
     done = robot.do("down", "turtlebot")
     assert (done.returncode, done.stdout) == (0, "turtlebot is down\n"), done.stderr
+    assert stopped is None or stopped.returncode == 0
     up.communicate(timeout=PATIENCE)
     assert not is_starting()
     assert not RobotFolder.of("turtlebot").is_known
