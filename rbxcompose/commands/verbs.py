@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import keyword
+from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol, cast
 
 from rbxcompose.base.plugins import file_of, modules_of
@@ -63,7 +64,9 @@ def about(verb: str) -> str:
 
 def starts_robots(verb: str) -> bool:
     """Return whether a verb starts robots, before the import of that verb, which takes as long as a start."""
-    return "\nSTARTS_ROBOTS = True\n" in _text(verb)
+    with suppress(OSError):  # then its import says so
+        return "\nSTARTS_ROBOTS = True\n" in _text(verb)
+    return False
 
 
 def in_groups() -> dict[str, list[str]]:
