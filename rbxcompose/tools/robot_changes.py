@@ -149,7 +149,8 @@ class LiveReload:
     def __init__(self, compiled: Callable[[], Compilation], first: Compilation, layers: ChosenLayers) -> None:
         """`compiled` compiles the files again, with the same `layers` as at `first`."""
         self._compiled, self._newest, self._layers = compiled, first, layers
-        self._files = FileWatch(files_of(first))
+        self._paths = files_of(first)
+        self._files = FileWatch(self._paths)
         self._is_pending = False  # the newest is to be applied as soon as possible
         self._reported = ""  # the reported reason for waiting
         self._next_look = self._next_try = 0.0  # [s, monotonic]
@@ -167,7 +168,8 @@ class LiveReload:
 
     def _compile(self) -> None:
         self._newest = found = self._compiled()
-        self._files.follow(files_of(found))
+        self._paths = files_of(found, self._paths)
+        self._files.follow(self._paths)
         write_report(found.report, found.sources)
         self._reported = ""
         self._is_pending = found.plan is not None
@@ -198,8 +200,11 @@ class LiveReload:
             refuse(error.finding)
 
 
-def files_of(found: Compilation) -> Set[Path]:
-    """Return the files that a robot was read from; after mistakes also their folders, where a file may be missing."""
+def files_of(found: Compilation, before: Set[Path] = frozenset()) -> Set[Path]:
+    """Return the files that a robot was read from.
+
+    After mistakes also their folders, and the files `before`: those that are missing now may come back.
+    """
     names = (name for name in found.sources if name != SET and not name.startswith(PREFIX))
     files = {Path(name).absolute() for name in names}
-    return files | {path.parent for path in files} if found.plan is None else files
+    return files | {path.parent for path in files} | before if found.plan is None else files

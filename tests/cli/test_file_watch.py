@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from rbxcompose.tools.robot_changes import FileWatch
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.tools.robot_changes import FileWatch, files_of
 
 
 def changed(watch: FileWatch) -> bool:
@@ -53,3 +54,23 @@ def test_a_change_before_the_files_are_others_is_not_lost(tmp_path: Path) -> Non
     assert changed(watch)
     other.write_text("new")
     assert changed(watch)
+
+
+def test_a_file_that_is_missing_for_a_moment_is_still_followed(tmp_path: Path) -> None:
+    robot, mission = tmp_path / "robots/one/robot.yaml", tmp_path / "missions/go.yaml"
+    for file, text in (
+        (robot, "rbx: 1\nkind: Robot\nname: one\nmissions: {go: ../../missions/go.yaml}\n"),
+        (mission, "rbx: 1\nkind: Mission\nname: go\ndo: [{log: hello}]\n"),
+    ):
+        file.parent.mkdir(parents=True)
+        file.write_text(text)
+    followed = files_of(compile_robot(str(robot), environment={}))
+    assert mission in followed
+    text = mission.read_text()
+    mission.unlink()
+    broken = compile_robot(str(robot), environment={})
+    assert broken.plan is None
+    watch = FileWatch(files_of(broken, followed))
+    mission.write_text(text)
+    assert changed(watch)
+    assert files_of(compile_robot(str(robot), environment={}), {tmp_path / "gone"}) == followed
