@@ -9,6 +9,7 @@ from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Refused, to_data
 from rbxcompose.domains.diagnostics.requests import Acknowledge, ListChanges, ShowDiagnostics
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
+from rbxcompose.runtime.channel import Repeated
 from rbxcompose.testing import Bench, instance
 
 
@@ -134,6 +135,33 @@ def test_other_groups_take_effect_while_the_robot_runs_and_keep_what_is_known() 
     tree = robot.host.ask("diagnostics", ShowDiagnostics())
     assert [line.path for line in tree.lines] == ["/arm", "/arm/arm", "/rest", "/rest/diagnostics"]
     assert (tree.level, len(robot.host.ask("diagnostics", ListChanges()))) == (Level.ERROR, 3)
+
+
+def test_what_is_latched_outlives_a_restart_and_the_history_begins_with_it() -> None:
+    robot = strangers({"analyzers": {"arm": {"match": ["arm"], "latch": True}}}, 2, 0)
+    robot.host.failed("diagnostics", RuntimeError("planted"))
+    robot.advance(2.0)
+    tree = robot.host.ask("diagnostics", ShowDiagnostics())
+    assert (tree.level, tree.cause) == (Level.ERROR, "/arm: arm: hm (latched since 0.1 s, OK now)")
+    first = robot.host.ask("diagnostics", ListChanges())[0]
+    assert (first.path, first.cause) == ("/diagnostics", "has started again: earlier changes are forgotten")
+    robot.host.ask("diagnostics", Acknowledge())
+    robot.advance(0.3)
+    robot.host.failed("diagnostics", RuntimeError("planted"))
+    robot.advance(2.0)
+    assert robot.host.ask("diagnostics", ShowDiagnostics()).level is Level.OK
+
+
+def test_what_is_latched_after_a_restart_does_not_replace_what_was_latched_before() -> None:
+    robot = Bench(instance("diagnostics", "diagnostics", {"analyzers": {"arm": {"match": ["arm"], "latch": True}}}))
+    robot.host.is_restart = True  # as in a process that has started again: its supervisor sends them a little later
+    robot.host.prepare(robot.plan.instances)
+    robot.host.activate(["diagnostics"])
+    robot.publish("/diagnostics", DiagnosticArray(status=(DiagnosticStatus(2, "arm", "hm"),)))
+    robot.advance(0.1)
+    assert not any(isinstance(event, Repeated) for event in robot.events)
+    robot.advance(0.5)
+    assert any(isinstance(event, Repeated) for event in robot.events)
 
 
 def test_the_profile_of_ros_1_reports_at_its_rate_only() -> None:

@@ -175,3 +175,36 @@ def test_after_a_change_of_the_groups_the_states_of_those_that_stay_are_kept() -
     assert report["/power"] == (ERROR, "battery: low (latched since 0.0 s, OK now)")
     assert report["/sky"] == (WARN, "moon: full")
     assert "/Other" not in report
+
+
+def test_a_level_that_is_there_when_latch_comes_is_latched() -> None:
+    old = fed(status("battery", ERROR, "low"), analyzers={"power": {"match": ["battery"]}}, now=1.0)
+    new = aggregator({"power": {"match": ["battery"], "latch": True}})
+    new.take_over(old, 2.0)
+    new.feed(3.0, [status("battery", OK, "fine")])
+    assert tree(new, 3.0)["/power"] == (ERROR, "battery: low (latched since 1.0 s, OK now)")
+    assert new.acknowledge(4.0) == ["/power"]
+    assert level(new, "/power", 4.0) is OK
+
+
+def test_a_level_that_is_over_when_latch_comes_is_not_latched() -> None:
+    old = fed(status("battery", ERROR, "low"), analyzers={"power": {"match": ["battery"]}})
+    assert old.acknowledge(0.5) == []
+    old.feed(1.0, [status("battery", OK, "fine")])
+    new = aggregator({"power": {"match": ["battery"], "latch": True}})
+    new.take_over(old, 2.0)
+    assert (level(new, "/power", 2.0), new.acknowledge(3.0)) == (OK, [])
+
+
+def test_what_was_latched_is_recalled_unless_it_is_worse_by_now() -> None:
+    groups: Groups = {name: {"match": [name], "latch": True} for name in ("arm", "base", "gone")}
+    old = fed(status("arm", WARN, "warm"), status("base", WARN, "slow"), status("gone", WARN), analyzers=groups)
+    new = aggregator({**groups, "gone": {"match": ["gone"]}})
+    new.feed(5.0, [status("arm", OK), status("base", ERROR, "stuck")])
+    new.recall(6.0, old.latched())
+    new.feed(7.0, [status("base", OK)])
+    report = tree(new, 7.0)
+    assert report["/arm"] == (WARN, "arm: warm (latched since 0.0 s, OK now)")
+    assert report["/base"] == (ERROR, "base: stuck (latched since 0.0 s, OK now)")
+    assert new.acknowledge(8.0) == ["/arm", "/base"]
+    assert level(new, "/base", 8.0) is OK

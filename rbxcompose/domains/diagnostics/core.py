@@ -10,7 +10,7 @@ from heapq import heappop, heappush
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.diagnostics.requests import LevelChange
+from rbxcompose.domains.diagnostics.requests import LatchedLevel, LevelChange
 from rbxcompose.domains.diagnostics.settings import (
     OTHER,
     SHOWN,
@@ -155,8 +155,8 @@ class Group:
         self.is_classic = False
         self.floor = OK  # the least level with items that are not the robot's own
         self._now = OK  # the level of the last update without delay or latch
-        self.latched_at = math.inf
-        self._latched = ""  # the message when the level was latched
+        self._since = math.inf  # when the level rose first since it was OK, or since it was acknowledged
+        self._reached = ""  # the message when the level was reached
         self.check_at = math.inf  # [s], after which time alone may change it
         self.is_urgent = False  # a level counts at once, whatever `debounce` says
         self.had_items = False
@@ -168,6 +168,11 @@ class Group:
     def is_failed(self) -> bool:
         """Return whether what depends on it is silenced: not by a level that is only latched."""
         return self.is_visible and self.level in FAILED and self._now in FAILED
+
+    @property
+    def is_latched(self) -> bool:
+        """Return whether the level can only rise until it is acknowledged."""
+        return self.analyzer.latch and self._since < math.inf
 
     def add(self, item: Item) -> GroupItem:
         """Add an item; its level counts from the next `move`."""
@@ -277,19 +282,22 @@ class Group:
         self._now = level
         self.check_at = min(self.check_at, self._late_at(now))
         self.is_visible = self._shall_show(now)
-        if self.rank(level) < self.rank(before) and self.analyzer.latch and self.latched_at <= now:
+        if self.rank(level) < self.rank(before) and self.is_latched:
             level = before
         self._leaving = math.inf if level is before else min(self._leaving, now)
         hold = self.analyzer.holds[self.rank(level) < self.rank(before)]
         if level is not before and (self.is_urgent or now - self._leaving >= hold):
             self.level, self._leaving = level, math.inf
-            if self.analyzer.latch and self.rank(level) > self.rank(before):
-                self.latched_at, self._latched = min(self.latched_at, now), self.cause(now)
+            if self.rank(level) > self.rank(before):
+                self._since = min(self._since, now)
+            elif level is OK:
+                self._since = math.inf
         elif level is not before:
             self.check_at = min(self.check_at, self._leaving + hold)
         self.is_urgent = False
         if self.level is not before:
             self.update_message(now)
+            self._reached = self.message
         return self.level is not before
 
     def update_message(self, now: float) -> None:
@@ -298,8 +306,8 @@ class Group:
         is_better = self.rank(present) < self.rank(self.level)
         if present is self.level:
             self.message = cause
-        elif is_better and self.latched_at <= now:
-            self.message = f"{self._latched} (latched since {self.latched_at:.1f} s, {present.name} now)"
+        elif is_better and self.is_latched:
+            self.message = f"{self._reached} (latched since {self._since:.1f} s, {present.name} now)"
         else:
             self.message = f"{present.name} for less than {self.analyzer.holds[is_better]:g} s: {cause}"
 
@@ -318,17 +326,29 @@ class Group:
 
     def acknowledge(self) -> bool:
         """Forget that a level is latched; return whether one was."""
-        was_latched, self.latched_at = self.latched_at < math.inf, math.inf
+        was_latched = self.is_latched
+        if was_latched:
+            self._since = math.inf
         return was_latched
+
+    @property
+    def latched(self) -> LatchedLevel:
+        """Return what is latched, for `recall`."""
+        return LatchedLevel(self.key, self.level, self._since, self._reached)
+
+    def recall(self, latched: LatchedLevel) -> None:
+        """Go on with what was latched before a restart; a level that is worse by now stays."""
+        if self.analyzer.latch:
+            if self.rank(latched.level) >= self.rank(self.level):
+                self.level, self._reached = latched.level, latched.message
+            self._since = min(self._since, latched.since)
 
     def take_over(self, old: Group) -> None:
         """Go on with the level of the group that was in this place."""
-        self.level, self.latched_at, self._latched = old.level, old.latched_at, old._latched
+        self.level, self._since, self._reached = old.level, old._since, old._reached
         self._leaving = old._leaving
         self._born, self._empty_since, self.had_items = old._born, old._empty_since, old.had_items
         self.message = old.message
-        if not self.analyzer.latch:
-            self.latched_at = math.inf
 
     def shown(self) -> DiagnosticStatus:
         """Return the header, with what each item and group below it reports."""
@@ -515,6 +535,19 @@ class Aggregator:
                 done.append(group.path)
         self._settle(now)
         return done
+
+    def latched(self) -> tuple[LatchedLevel, ...]:
+        """Return all that is latched."""
+        return tuple(group.latched for group in self._layout.groups if group.is_latched)
+
+    def recall(self, now: float, latched: Iterable[LatchedLevel]) -> None:
+        """Go on with what was latched before a restart, in the groups that are still there."""
+        known = {row.key: row for row in latched}
+        for group in self._layout.groups:
+            if group.key in known:
+                group.recall(known[group.key])
+                self._touch(group)
+        self._settle(now)
 
     def level(self) -> tuple[Level, str]:
         """Return the level of the whole robot, and the group that gives it with its cause."""

@@ -71,6 +71,24 @@ class ListChanges(Query[tuple[LevelChange, ...]]):
 
 
 @dataclass(frozen=True, slots=True)
+class LatchedLevel:
+    """A level that is latched since a robot time [s], with its cause; `key` are the analyzers down to its group."""
+
+    key: tuple[str, ...]
+    level: Level
+    since: float
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class RecallLatches(Command):
+    """Go on with the levels that were latched before a restart."""
+
+    about = TYPE
+    latched: tuple[LatchedLevel, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Acknowledge(Command):
     """Let the latched levels of a group, and of those below it, follow the present again; all if `path` is empty."""
 

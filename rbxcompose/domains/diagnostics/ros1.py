@@ -13,6 +13,7 @@ from dataclasses import replace
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level, level_of
 from rbxcompose.domains.diagnostics.core import Admission, LevelHistory, TreeRow
+from rbxcompose.domains.diagnostics.requests import LatchedLevel
 from rbxcompose.domains.diagnostics.settings import (
     DEFAULT_TIMEOUT,
     OTHER,
@@ -301,6 +302,13 @@ class Ros1Aggregator:
     def acknowledge(self, now: float, path: str = "") -> list[str]:
         """Return nothing: no level is latched."""
         return []
+
+    def latched(self) -> tuple[LatchedLevel, ...]:
+        """Return nothing: see `acknowledge`."""
+        return ()
+
+    def recall(self, now: float, latched: Iterable[LatchedLevel]) -> None:
+        """Do nothing: see `acknowledge`."""
 
     def level(self) -> tuple[Level, str]:
         """Return the level of the last report, and its cause."""

@@ -18,6 +18,7 @@ from rbxcompose.sdk import Component, In, MessageLimits, Out, Refused, answers, 
 if TYPE_CHECKING:
     from rbxcompose.domains.diagnostics.core import TreeRow
 
+PATIENCE = 0.2  # [s] after a restart, in which the supervisor repeats what was latched
 PAUSE = 0.05  # [s] between two reports at least, so that flapping levels cost little
 MOST_ARRAYS = 30.0  # [Hz] of one publisher: more takes too much of a core, as do larger ones
 ARRAY = MessageLimits(size=200_000)
@@ -60,10 +61,19 @@ class Diagnostics(Component[DiagnosticsConfig]):
         self.reported = self.alarmed = -math.inf  # the last report, and the last immediate one
         self.rows = 0  # of the last report
         self.published = 0  # changes of levels
+        self.kept: tuple[requests.LatchedLevel, ...] = ()  # what the supervisor has, for a restart
+        self.keeps_from = math.inf if self.context.is_again else -math.inf
+        if self.context.is_again:
+            cause = "has started again: earlier changes are forgotten"
+            self.core.history.add(self.now, f"/{self.name}", Level.STALE, Level.OK, cause)
+
+    def start(self) -> None:
+        """Keep what is latched only after what was kept before a restart has come again."""
+        self.keeps_from = min(self.keeps_from, self.now + PATIENCE)
 
     def take_over(self, old: Diagnostics) -> None:
         """Keep what is known: statuses, levels of groups that stay, and the history."""
-        self.levels, self.published = old.levels, old.published
+        self.levels, self.published, self.kept = old.levels, old.published, old.kept
         if type(self.core) is type(old.core):
             self.core.take_over(old.core, self.now)  # type: ignore[arg-type]
         else:
@@ -89,6 +99,7 @@ class Diagnostics(Component[DiagnosticsConfig]):
         """Notice what falls silent."""
         self.core.advance(self.now)
         self.settle()
+        self.keep()
 
     def wake(self) -> None:
         """Report what could not be reported at once, or what comes more often than steps."""
@@ -126,6 +137,13 @@ class Diagnostics(Component[DiagnosticsConfig]):
         for row in rows:
             if row.is_group and row.depth == 0:
                 self.log_level(row.status)
+        self.keep()
+
+    def keep(self) -> None:
+        """Let the supervisor know what is latched, for a restart, if that has changed."""
+        if self.now >= self.keeps_from and (latched := self.core.latched()) != self.kept:
+            self.kept = latched
+            self.context.repeat([requests.RecallLatches(latched)])
 
     def log_level(self, group: DiagnosticStatus) -> None:
         """Log a new level of a group."""
@@ -158,6 +176,13 @@ class Diagnostics(Component[DiagnosticsConfig]):
         known = list(self.core.history.after(request.after))
         kept = _within(range(len(known)), [len(change.path) + len(change.cause) + 100 for change in known])
         return tuple(known[index] for index in kept)
+
+    @answers(requests.RecallLatches)
+    def recall(self, request: requests.RecallLatches) -> str:
+        """Go on with what was latched before a restart."""
+        self.core.recall(self.now, request.latched)
+        self.settle()
+        return "levels are latched as before the restart"
 
     @answers(requests.Acknowledge)
     def acknowledge(self, request: requests.Acknowledge) -> str:
