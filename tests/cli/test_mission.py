@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,7 +13,7 @@ import pytest
 
 from rbxcompose.base.requests import Request, as_data, from_data, to_data
 from rbxcompose.commands import main as command
-from rbxcompose.missions.execution.requests import CancelMission, LookAtMission, ShowPicture
+from rbxcompose.missions.execution.requests import CancelMission, ListedSnapshot, LookAtMission, ShowPicture
 from rbxcompose.missions.view.picture import picture_from_data
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.requests import ReleaseRobot
@@ -161,6 +162,18 @@ def test_watch_tells_programs_the_whole_and_then_what_changes(
         (False, "halted"),
     ]
     assert len(lines[1]["statuses"]) < len(lines[0]["statuses"])
+
+
+def test_a_run_that_did_not_end_is_listed_with_its_time_and_what_can_be_done(
+    robot: Robot, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for changed, ways in (("", "'mission resume rest --from-snapshot' goes on with it, "), ("the mission 'rest'", "")):
+        left = {"rest": ListedSnapshot("rest", 1_800_000_000.0, "wait", {}, changed)}
+        monkeypatch.setattr(robot.mission, "left_over", left.get)
+        line = told(capsys, "ls").splitlines()[-1]
+        assert re.sub(r"\d", "0", line) == (
+            f"a run of rest did not end (0000-00-00 00:00): {ways}'mission forget rest' drops it"
+        )
 
 
 def test_programs_are_answered_in_json(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,6 +11,7 @@ from rbxcompose.base.requests import Refused
 from rbxcompose.missions.engine.logbook import OtherInterventionError, replay
 from rbxcompose.missions.execution.requests import (
     CancelMission,
+    ForgetMission,
     ListMissions,
     ListSnapshots,
     PauseMission,
@@ -282,6 +283,22 @@ def test_a_run_that_was_replaced_by_another_one_can_go_on_once() -> None:
     assert left(robot) == []
     robot.mission.handle(CancelMission())
     assert left(robot) == []
+
+
+def test_what_did_not_end_can_be_forgotten(folder: Path) -> None:
+    crashed()
+    robot = Real()
+    robot.start()
+    robot.advance(2.0)
+    assert robot.mission.handle(ForgetMission()) == "the run of mission test that did not end is forgotten"
+    assert left(robot) == []
+    assert (folder / FILE).exists()  # that of the run that goes on
+    with pytest.raises(Refused, match="there is no snapshot"):
+        robot.mission.handle(ForgetMission("test"))
+    again = Real()
+    assert left(again) == [("go_to corner", "", False)]
+    again.mission.handle(ForgetMission("test"))
+    assert (left(again), (folder / FILE).exists()) == ([], False)
 
 
 def test_people_see_what_has_changed_since_and_which_inputs_there_were() -> None:

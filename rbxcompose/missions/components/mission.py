@@ -147,7 +147,7 @@ class Mission(Component[MissionConfig]):
     def recovered(self, name: str) -> MissionRun | None:
         """Return a mission that a crash had cut short, if it is to go on where it was; else None."""
         policy = self.config.after_crash.get(name, RESTART)
-        snapshot = self.snapshots.read(name, is_latest=True) if policy != RESTART else None
+        snapshot = self.snapshots.read(name) if policy != RESTART else None
         if snapshot is None:
             return None
         found = self.snapshots.left_over(name, runs=False)
@@ -473,16 +473,27 @@ class Mission(Component[MissionConfig]):
     @answers(requests.RestoreMission)
     def restore(self, request: requests.RestoreMission) -> str:
         """Go on with a mission where a crash had cut it short."""
-        names = [request.mission] if request.mission else [*self.config.programs]
-        found = {name: snapshot for name in names if (snapshot := self.snapshots.read(name))}
-        if len(found) != 1:
-            several = f"several missions have one: {', '.join(found)}; name one"
-            raise Refused(several if found else "there is no snapshot of a mission that was cut short")
-        name, snapshot = next(iter(found.items()))
+        name, snapshot = self.cut_short(request.mission)
         run = self.missions.resumed(name, snapshot, self.now)
         self.snapshots.take_up(name)
         self.keep(requests.RunMission(name, is_repeated=True))
         return self.continue_with(run, is_asked=False)
+
+    @answers(requests.ForgetMission)
+    def forget(self, request: requests.ForgetMission) -> str:
+        """Drop the snapshot of a mission that a crash had cut short."""
+        name, _ = self.cut_short(request.mission)
+        self.snapshots.forget(name, runs=name in self.missions.names)
+        return f"the run of mission {name} that did not end is forgotten"
+
+    def cut_short(self, mission: str) -> tuple[str, Mapping[str, Any]]:
+        """Return a mission that a crash had cut short, the only one if none is named, and its snapshot."""
+        names, active = [mission] if mission else [*self.config.programs], self.missions.names
+        found = {name: left[1] for name in names if (left := self.snapshots.left_over(name, runs=name in active))}
+        if len(found) != 1:
+            several = f"several missions have one: {', '.join(found)}; name one"
+            raise Refused(several if found else "there is no snapshot of a mission that was cut short")
+        return next(iter(found.items()))
 
     @answers(requests.ListSnapshots)
     def list_snapshots(self, request: requests.ListSnapshots) -> tuple[requests.ListedSnapshot, ...]:

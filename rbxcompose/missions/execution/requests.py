@@ -87,6 +87,11 @@ class RestoreMission(_OfMission):
 
 
 @dataclass(frozen=True, slots=True)
+class ForgetMission(_OfMission):
+    """Forget the run of a mission that a crash or a loss of power had cut short, so that nobody goes on with it."""
+
+
+@dataclass(frozen=True, slots=True)
 class StepMission(_OfMission):
     """Let a mission go on to the start of its next leaf, or to the next transition of a machine."""
 

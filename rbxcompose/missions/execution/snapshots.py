@@ -27,6 +27,7 @@ PERIOD = 1.0  # [s] between two snapshots of a mission
 ROUNDING = 1e-6  # [s]
 VERSION = 1
 _ASIDE = ".before"  # the snapshot of an earlier run that did not end
+_ENDED = (("", _ASIDE), (_ASIDE,))  # what may be left of such runs, without and with one that runs
 
 
 class SnapshotStore:
@@ -58,14 +59,20 @@ class SnapshotStore:
         self._write(self._path(run.name), content)
         return None
 
-    def read(self, mission: str, *, is_latest: bool = False) -> Mapping[str, Any] | None:
-        """Return the snapshot of a mission that did not end: of the latest run, else of one before."""
-        found = next(self._found(mission, ("",) if is_latest else ("", _ASIDE)), None)
+    def read(self, mission: str) -> Mapping[str, Any] | None:
+        """Return the snapshot of the latest run of a mission, if that did not end."""
+        found = next(self._found(mission, ("",)), None)
         return found[1] if found else None
 
     def left_over(self, mission: str, *, runs: bool) -> tuple[float, Mapping[str, Any]] | None:
         """Return the time and the content of the snapshot of a run that did not end; that of one that runs is none."""
-        return next(self._found(mission, (_ASIDE,) if runs else ("", _ASIDE)), None)
+        return next(self._found(mission, _ENDED[runs]), None)
+
+    def forget(self, mission: str, *, runs: bool) -> None:
+        """Drop what `left_over` returns, and what is older."""
+        for aside in _ENDED[runs]:
+            with suppress(OSError):
+                self._path(mission, aside).unlink()
 
     def _found(self, mission: str, asides: Iterable[str]) -> Iterator[tuple[float, Mapping[str, Any]]]:
         for path in (self._path(mission, aside) for aside in asides if self._folder):

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
+from rbxcompose.base.clock import local_time
 from rbxcompose.base.requests import Command, Query, Refused, to_data
 from rbxcompose.commands.console import NotDoneError, emit, table
 from rbxcompose.commands.lookup import REFUSED, WHICH, add_asking_options, answer_of, find_robot, pass_on
@@ -70,6 +71,7 @@ def _operating() -> tuple[_Row, ...]:
         ("cancel", "end a mission for good", _to(requests.CancelMission, "name"), _NAMED),
         ("pause", "hold a mission; its timers stand still", _to(requests.PauseMission, "name"), _NAMED),
         ("resume", "resume a mission where it was held", _resume, resumed),
+        ("forget", "drop a run that a crash cut short, seen in 'ls'", _to(requests.ForgetMission, "name"), _NAMED),
     )
 
 
@@ -202,7 +204,16 @@ def _set(arguments: argparse.Namespace) -> int:
 def _list(arguments: argparse.Namespace) -> int:
     missions = ask(arguments.robot, requests.ListMissions())
     emit(json.dumps(to_data(missions)) if arguments.json else _table(missions))
+    for left in () if arguments.json else ask(arguments.robot, requests.ListSnapshots()):
+        if not left.waits:
+            emit(_unended(left))
     return 0
+
+
+def _unended(left: requests.ListedSnapshot) -> str:
+    again = "" if left.changed else f"'mission resume {left.mission} --from-snapshot' goes on with it, "
+    when = f"{local_time(left.at):%Y-%m-%d %H:%M}"
+    return f"a run of {left.mission} did not end ({when}): {again}'mission forget {left.mission}' drops it"
 
 
 def _table(missions: Sequence[requests.ListedMission]) -> str:
