@@ -11,7 +11,7 @@ from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.requests import Command
 from rbxcompose.missions.components.mission import Mission
 from rbxcompose.missions.execution.equipment import MissionConfig
-from rbxcompose.missions.execution.requests import PauseMission, ResumeMission
+from rbxcompose.missions.execution.requests import PauseMission, ResumeMission, RunMission
 from rbxcompose.sdk import Ended, Outcome, Refused
 from rbxcompose.sdk.component import MissionOver, MissionWaits
 from tests.executive.fake_robot import Robot
@@ -235,6 +235,14 @@ def test_a_robot_that_is_stopped_before_the_mission_begins_begins_it_at_the_resu
     robot.mission.handle(ResumeMission())
     robot.advance(0.0)
     assert len(robot.go_to.goals) == 1
+
+
+def test_whoever_runs_a_mission_of_a_stopped_robot_reads_what_it_waits_for() -> None:
+    robot = Robot(GO, start=None)
+    robot.start()
+    robot.is_stopped = True
+    answer = robot.mission.handle(RunMission("test"))
+    assert answer == "mission test is held: the robot is stopped; 'release' it, then 'mission resume'"
 
 
 def test_a_late_result_of_a_halted_goal_is_not_heard() -> None:

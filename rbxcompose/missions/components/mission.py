@@ -334,6 +334,8 @@ class Mission(Component[MissionConfig]):
         if not (request.is_repeated and self.recovered(request.mission)):
             self.begin(request.mission, request.inputs, request.start)
         self.keep(replace(request, is_repeated=True))
+        if self.context.is_stopped:
+            return f"mission {request.mission} is held: the robot is stopped; 'release' it, then 'mission resume'"
         return f"mission {request.mission} starts"
 
     @answers(requests.CancelMission)
