@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import stat
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,14 +14,19 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, TypedDict
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Severity, Span, kind
+from rbxcompose.base.findings import Finding, Severity, Span, kind, surely_meant
+from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import NotDoneError, ReportedError, write_report
-from rbxcompose.commands.options import is_manifest, is_system, kind_of, unsaved_of
+from rbxcompose.commands.options import is_manifest, is_system, unsaved_of
+from rbxcompose.commands.options import kind_of as written_kind_of
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.manifest.documents import KINDS, OTHER_KIND
 from rbxcompose.manifest.files import PREFIX, ROBOT_FILE, find, project_of, shown_name
+from rbxcompose.manifest.reader import Texts, read_file
 from rbxcompose.manifest.section import OVERLAY, ROBOT, SYSTEM, TEST
+from rbxcompose.manifest.tree import MappingNode, ScalarNode
 from rbxcompose.sdk.capabilities import NeedsExtra
 
 if TYPE_CHECKING:
@@ -31,6 +37,8 @@ UNUSED = kind("RBX9007", Severity.WARNING)
 _USE = "name it in a robot ('missions:', 'include:')"
 _MANIFESTS = ("*.yaml", "*.yml")
 _ROBOTS, _SYSTEMS = "robots", "systems"
+_TESTS = (".test.yaml", ".test.yml")
+_SUFFIXES = (".yaml", ".yml")
 UNNAMED = kind("RBX9031")
 _MOST = 5  # robots that are listed
 _ABOUT = "the robot's file, its folder, or rbx:robots/NAME of the library; without it, the only one"
@@ -51,11 +59,18 @@ class Targets:
     tests: list[str] = field(default_factory=list)
     systems: list[str] = field(default_factory=list)
 
-    def unused(self, read: Iterable[str]) -> Iterator[Finding]:
-        """Yield a finding for each of `files` that is not among the `read` names."""
-        known = set(read)
+    def unused(self, read: Collection[str], texts: Texts) -> Iterator[Finding]:
+        """Yield why each of `files` that is not among the `read` names is no manifest, or else that nothing uses it."""
         for file in self.files:
-            if file not in known:
+            if file not in read:
+                root, findings = read_file(Path(file).resolve(), file, texts)
+                written = root.get("kind") if isinstance(root, MappingNode) else None
+                if isinstance(written, ScalarNode) and written.text not in KINDS:
+                    message = f"there is no manifest of kind '{plain(written.text, 60)}'"
+                    findings = [OTHER_KIND.misspelt(written.span, message, written.text, KINDS, "kinds"), *findings]
+                yield from findings
+                if findings:
+                    continue
                 message, how = f"no robot of the project uses '{file}'", _USE
                 if kind_of(Path(file)) == OVERLAY:
                     message = f"'{file}' is an overlay, and does not say for which robot"
@@ -78,17 +93,17 @@ def targets(paths: Iterable[str]) -> Targets:
             out.robots.append(written)
         elif path.is_dir():
             robots = [written] if (path / ROBOT_FILE).exists() else robots_below(path)
-            tests = [] if robots else tests_below(path)
-            out.tests += tests
+            tests = [] if robots else tests_of([path])
+            out.tests += map(shown_name, tests)
             systems = systems_of(path)
             out.systems += systems
             out.robots += robots if robots or tests or systems else [written]
-        elif (written_kind := kind_of(path)) == ROBOT or (written_kind == "" and is_manifest(path)):
+        elif (written_kind := kind_of(path)) == TEST or path.name.endswith(_TESTS):
+            out.tests += map(shown_name, tests_of([path]))
+        elif written_kind == ROBOT or (written_kind == "" and is_manifest(path)):
             out.robots.append(written)
         elif written_kind == OVERLAY and (beside := path.parent / ROBOT_FILE).is_file():
             out.overlays.append((str(beside), written))
-        elif written_kind == TEST:
-            out.tests.append(written)
         elif written_kind == SYSTEM:
             out.systems.append(written)
         elif written_kind == "" and (robot := _robot_around(path)):
@@ -106,6 +121,12 @@ def _robot_around(path: Path) -> str:
     path = path.resolve()
     folders = (folder for folder in path.parents if folder.is_relative_to(project_of(path)))
     return next((shown_name(folder / ROBOT_FILE) for folder in folders if (folder / ROBOT_FILE).is_file()), "")
+
+
+def kind_of(path: Path) -> str:
+    """Return the kind that a manifest names, or surely means; empty if it names none or cannot be read."""
+    written = written_kind_of(path)
+    return written if written in KINDS else surely_meant(written, KINDS) or written
 
 
 def robots_below(folder: Path) -> list[str]:
@@ -127,10 +148,32 @@ def systems_here() -> list[str]:
     return systems_of(Path())
 
 
-def tests_below(folder: Path) -> list[str]:
-    """Return the tests of missions in a folder, at any depth."""
-    files = (path for pattern in _MANIFESTS for path in folder.rglob(pattern))
-    return sorted(shown_name(path.resolve()) for path in files if kind_of(path) == TEST)
+def tests_of(paths: Iterable[Path]) -> list[Path]:
+    """Return the tests that paths mean; a file that is named is one, whatever it contains.
+
+    So is what has the name of one, such as an empty file or a pipe: reading it gives the finding.
+    """
+    found: dict[Path, None] = {}
+    for path in paths:
+        below = sorted(filter(_may_be_test, path.rglob("*"))) if path.is_dir() else [path]
+        found.update((one.absolute() if _is_odd(one) else one.resolve(), None) for one in below)
+    return list(found)
+
+
+def _may_be_test(path: Path) -> bool:
+    """Return whether a file is a test, or is called one; hidden ones are left out: editors keep theirs there."""
+    is_one = path.suffix in _SUFFIXES and path.is_file() and kind_of(path) == TEST
+    is_called_one = path.name.endswith(_TESTS) and not path.name.startswith(".")
+    return is_one or (is_called_one and (path.is_file() or _is_odd(path)))
+
+
+def _is_odd(path: Path) -> bool:
+    """Return whether a path leads to a pipe, a device or nothing that can be read."""
+    try:
+        mode = path.stat().st_mode
+    except OSError:  # such as a link to itself
+        return path.is_symlink()
+    return not ((stat.S_ISREG(mode) and os.access(path, os.R_OK)) or stat.S_ISDIR(mode))
 
 
 def projects_of(paths: Iterable[str]) -> list[Path]:

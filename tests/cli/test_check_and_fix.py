@@ -97,6 +97,45 @@ def test_an_overlay_is_checked_on_the_robot_beside_it(project: Path, capsys: pyt
     assert "fixed" not in output(capsys, str(night), "--fix", code=0)
 
 
+NO_MANIFESTS = {
+    "missions/draft.yaml": (HEAD + "do: [\n", "error[RBX1102]: a value is missing"),
+    "parts/lamp.yaml": ("rbx: 1\nkind: Part\nname: lamp\ncomponents: [\n", "error[RBX1102]: a value is missing"),
+    "robots/bad.yaml": ("a: [\n", "error[RBX1102]: a value is missing"),
+    "missions/other.yaml": ("rbx: 1\nkind: Route\nname: other\n", "there is no manifest of kind 'Route'"),
+}
+
+
+@pytest.mark.parametrize("name", NO_MANIFESTS)
+def test_what_no_robot_uses_is_read_all_the_same(name: str, project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text, wrong = NO_MANIFESTS[name]
+    (project / name).parent.mkdir(exist_ok=True)
+    (project / name).write_text(text)
+    told = output(capsys, name, code=1)
+    assert wrong in told
+    assert f"--> {name}:" in told
+    assert "RBX9007" not in told
+
+
+MISSPELT = {
+    "robots/bot/night.yaml": "rbx: 1\nkind: Overlai\nname: night\nargs: {speed: 0.2 m/s}\n",
+    "robots/bot/robot.yaml": "rbx: 1\nkind: Robto\nname: bot\nplaces: {}\n",
+    "missions/draft.yaml": "rbx: 1\nkind: Missoin\nname: draft\ndo: recharge\n",
+    "missions/one.test.yaml": "rbx: 1\nkind: Tset\nname: one\nmission: patrol\nrobot: ../robots/bot/robot.yaml\n"
+    "expect: {outcome: success}\n",
+}
+
+
+@pytest.mark.parametrize("name", MISSPELT)
+def test_a_misspelt_kind_is_found_and_fixed(name: str, project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (project / name).write_text(MISSPELT[name])
+    folder = str(Path(name).parent)
+    for path in (name, folder) if "test" in name or "robot.yaml" in name else (name,):
+        told = output(capsys, path, code=1)
+        assert f"error[RBX1304]: {'there' if 'draft' in name else 'this'} is no" in told
+        assert f"--> {name}:2:7" in told
+    assert f"fixed {name}:2:7: " in output(capsys, "--fix", name, code=0)
+
+
 DATA = {
     "config/params.yaml": "/**:\n  ros__parameters: {start: 1}\n",
     "lab.yaml": "image: lab.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n",

@@ -21,10 +21,11 @@ from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, emit, good, has_colour, misused
 from rbxcompose.commands.formats import format_names, renderer
 from rbxcompose.commands.options import add_unsaved_option, unsaved_of
-from rbxcompose.commands.targets import Targets, add_layer_options, compiled, projects_of, targets
+from rbxcompose.commands.targets import add_layer_options, compiled, projects_of, targets
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.plan.model import Plan, extent
 from rbxcompose.manifest.documents import KINDS
+from rbxcompose.manifest.reader import Texts
 from rbxcompose.manifest.tree import FILE_BYTES
 
 GROUP = "write"
@@ -66,19 +67,18 @@ class CheckedRobots:
 
 def run(arguments: argparse.Namespace) -> int:
     """Compile the robots, apply fixes if requested, and write the findings to stdout."""
-    wanted = targets(arguments.paths)
     if arguments.fix and arguments.unsaved:
         return misused("check", "--fix changes files, and --unsaved is for texts that are in none: use one of them")
     if arguments.fix:
-        fix(lambda: _check(wanted, arguments), emit if arguments.format == TEXT else _whisper)
-    checked = _check(wanted, arguments)
+        fix(lambda: _check(arguments), emit if arguments.format == TEXT else _whisper)
+    checked = _check(arguments)
     emit(_written(checked, arguments.format).rstrip("\n"))
     is_wrong = checked.report.has_errors or (arguments.strict and any(checked.report))
     return FINDINGS if is_wrong else 0
 
 
-def _check(wanted: Targets, arguments: argparse.Namespace) -> CheckedRobots:
-    checked = CheckedRobots()
+def _check(arguments: argparse.Namespace) -> CheckedRobots:
+    checked, wanted = CheckedRobots(), targets(arguments.paths)
     for robot in wanted.robots:
         checked.add(compiled(robot, arguments, tries_profiles=True))
     for robot, overlay in wanted.overlays:
@@ -94,8 +94,11 @@ def _check(wanted: Targets, arguments: argparse.Namespace) -> CheckedRobots:
     for path in wanted.systems:
         _check_system(path, arguments, checked)
     on_robots = [robot for robot, _ in wanted.overlays]
-    projects = projects_of([*wanted.robots, *on_robots, *wanted.users, *wanted.tests, *wanted.systems])
-    checked.report = Report([*only_ours(checked.report, checked.sources, projects), *wanted.unused(checked.sources)])
+    projects = projects_of([*wanted.robots, *on_robots, *wanted.users, *wanted.tests, *wanted.systems, *wanted.files])
+    texts = Texts(unsaved_of(arguments))
+    checked.report.extend(wanted.unused(checked.sources.keys(), texts))
+    checked.sources.update(texts)
+    checked.report = Report([*only_ours(checked.report, checked.sources, projects)])
     return checked
 
 
@@ -110,7 +113,7 @@ def _check_tests(tests: list[str], arguments: argparse.Namespace, checked: Check
 
     reading, found = TrialReader(os.environ, unsaved_of(arguments)), Report()
     for path in tests:
-        trial, report = reading.read(Path(path).resolve())
+        trial, report = reading.read(Path(path).absolute())
         found.extend(report)
         if trial is not None:
             checked.tests.append(trial.name)

@@ -17,10 +17,10 @@ from rbxcompose.base.findings import Report
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, emit, has_colour, misused, write_report
 from rbxcompose.commands.options import add_unsaved_option, unsaved_of
+from rbxcompose.commands.targets import tests_of
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.missions.view.tested import keep_tested
 from rbxcompose.tools.mission_tests.coverage import Coverage
-from rbxcompose.tools.mission_tests.model import tests_of
 from rbxcompose.tools.mission_tests.reader import TrialReader, WrittenTrial
 from rbxcompose.tools.mission_tests.report import FileOutcome, TrialWriter, as_json, coverage_text, junit
 from rbxcompose.tools.mission_tests.runner import run_trial

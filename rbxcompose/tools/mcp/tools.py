@@ -21,14 +21,13 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.requests import Refused
 from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.lookup import answer_of, find_robot
-from rbxcompose.commands.targets import Targets, robot_path, robots_below, targets
+from rbxcompose.commands.targets import Targets, robot_path, robots_below, targets, tests_of
 from rbxcompose.domains.console.access import Role
 from rbxcompose.manifest.files import PREFIX, find
 from rbxcompose.manifest.tree import ALL_BYTES
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.requests import NoteInLog
 from rbxcompose.tools.mcp.verb_process import VerbOutput, run_verb
-from rbxcompose.tools.mission_tests.model import tests_of
 
 MOST_WAITING = 16  # in each lane
 _WORD = r"^[A-Za-z0-9_$][^\s/\\]*$"  # never an option, and never a path

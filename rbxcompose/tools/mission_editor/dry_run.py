@@ -20,6 +20,7 @@ from rbxcompose.base.findings import Severity
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Refused
 from rbxcompose.commands.new_files import write_new
+from rbxcompose.commands.targets import tests_of
 from rbxcompose.compiler.compile import Compilation, robot_for_mission
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.missions.engine.inputs import bind_texts
@@ -31,7 +32,7 @@ from rbxcompose.sdk.registry import declared
 from rbxcompose.tools.mission_editor.outline import MissionOutline
 from rbxcompose.tools.mission_editor.yaml_places import Path as TextPath
 from rbxcompose.tools.mission_tests.coverage import SeenWays
-from rbxcompose.tools.mission_tests.model import RUNS, Expectations, Trial, tests_of
+from rbxcompose.tools.mission_tests.model import RUNS, Expectations, Trial
 from rbxcompose.tools.mission_tests.record import Done, TrialRecord
 from rbxcompose.tools.mission_tests.runner import RobotRun
 
