@@ -83,6 +83,7 @@ def test_each_mistake_is_told_at_its_place(trying: Trying, golden: Golden) -> No
         ("events: {at: 3 s}\nexpect:\n  outcome: success\n", "'events'"),
         ("expect: success\n", "'expect'"),
         ("expect:\n", "needs 'expect'"),
+        ("expect: {}\n", "needs 'expect'"),
         ("mocks:\n  go_to:\n", "needs 'expect'"),
         ("expect:\n  outcome: running\n", "every test of a mission ends"),
         ("expect:\n  outcome: running\n  for: 1e14 s\n", "'for' must be at most"),

@@ -687,6 +687,8 @@ def _there(root: MappingNode) -> list[tuple[str, Any]]:
 
 
 def _is_empty(node: TreeNode) -> bool:
+    if isinstance(node, MappingNode):
+        return not node.entries
     return isinstance(node, ScalarNode) and node.plain and not node.text
 
 
