@@ -92,11 +92,25 @@ def good(text: str) -> str:
     return f"\x1b[32m{text}\x1b[0m" if has_colour(sys.stdout) else text
 
 
+class UnwritableError(OSError):
+    """Raised when stdout takes nothing any more, as on a full disk."""
+
+
 def emit(text: str) -> None:
-    """Write lines to stdout and flush."""
+    """Write lines to stdout and flush.
+
+    Raises:
+        BrokenPipeError: if nobody reads any more.
+        UnwritableError: if they cannot be written.
+    """
     output().has_begun = True
-    sys.stdout.write(f"{text}\n")
-    sys.stdout.flush()
+    try:
+        sys.stdout.write(f"{text}\n")
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise UnwritableError(*error.args) from error
 
 
 def write_report(report: Report, sources: Sources) -> None:

@@ -19,12 +19,17 @@ from rbxcompose.base.garbage_collection import collect_rarely
 from rbxcompose.commands.verbs import about, in_groups, load, module_of, parser_of, starts_robots, verbs
 
 USAGE, INTERRUPTED = 2, 130  # as in `console`, which takes longer to import
+NO_READER = 141  # exit code, as that of other programs whose reader has gone
 _ABOUT = "Docker Compose for robots: YAML in, a checked and running robot out."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command and return its exit code: 0 fine, 1 findings, 2 wrong usage, 3 and 4 of `up`, 130 interrupted."""
+    """Run the command and return its exit code: 0 fine, 1 findings, 2 wrong usage, 3 and 4 of `up`, 130 interrupted.
+
+    It is 141 if nobody reads what it writes, whatever that is.
+    """
     if arguments is None:
+        _ready_streams()
         signal.signal(signal.SIGINT, _interrupted)
         collect_rarely()
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -45,6 +50,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return _run(words[0], words[1:])
 
 
+def _ready_streams() -> None:
+    """Let all that is written be taken: nowhere if a stream is closed, escaped if its encoding lacks a character."""
+    for name in ("stdout", "stderr"):
+        if (stream := getattr(sys, name)) is None:
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115  # until the process ends
+        else:
+            stream.reconfigure(errors="backslashreplace")
+
+
 def _interrupted(number: int, frame: object) -> NoReturn:
     # Immediately and silently, even in the middle of an import; `up` itself notifies its robot.
     os._exit(INTERRUPTED)
@@ -56,7 +70,7 @@ def _run(name: str, words: Sequence[str]) -> int:
 
         mark_start()
     _import_pydantic()
-    from rbxcompose.commands.console import NotDoneError, ReportedError, answered, refuse
+    from rbxcompose.commands.console import NotDoneError, ReportedError, UnwritableError, answered, misused, refuse
 
     try:
         verb = load(name)
@@ -72,9 +86,11 @@ def _run(name: str, words: Sequence[str]) -> int:
                 return refuse(error.finding)
             except ReportedError as error:
                 return error.exit_code
-    except BrokenPipeError:
+    except (BrokenPipeError, UnwritableError) as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # so that the flush at exit has somewhere to go
-        return 1
+        if isinstance(error, BrokenPipeError):
+            return NO_READER
+        return misused(name, f"the output cannot be written: {error.strerror}")
 
 
 def _import_pydantic() -> None:

@@ -6,7 +6,7 @@ import argparse
 import json
 import os
 import stat
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from importlib.util import find_spec
 from pathlib import Path
@@ -59,11 +59,16 @@ class Targets:
     tests: list[str] = field(default_factory=list)
     systems: list[str] = field(default_factory=list)
 
-    def unused(self, read: Collection[str], texts: Texts) -> Iterator[Finding]:
-        """Yield why each of `files` that is not among the `read` names is no manifest, or else that nothing uses it."""
+    def unused(self, sources: dict[str, str], unsaved: Mapping[Path, str] = MappingProxyType({})) -> Iterator[Finding]:
+        """Yield why each of `files` that is not in `sources` is no manifest, or else that nothing uses it.
+
+        Their texts are added to `sources`.
+        """
+        known = set(sources)
         for file in self.files:
-            if file not in read:
-                root, findings = read_file(Path(file).resolve(), file, texts)
+            if file not in known:
+                root, findings = read_file(Path(file).resolve(), file, texts := Texts(unsaved))
+                sources.update(texts)
                 written = root.get("kind") if isinstance(root, MappingNode) else None
                 if isinstance(written, ScalarNode) and written.text not in KINDS:
                     message = f"there is no manifest of kind '{plain(written.text, 60)}'"

@@ -344,6 +344,40 @@ def test_a_reader_that_goes_away_is_no_error_of_ours() -> None:
         process.wait(5.0)
 
 
+def in_shell(line: str, **environment: str) -> tuple[int, bytes, bytes]:
+    """Run a line of a shell with `rbxcompose` in it; return its exit code, stdout and stderr."""
+    line = line.replace("rbxcompose", f"'{sys.executable}' -m rbxcompose", 1)
+    done = subprocess.run(line, shell=True, cwd=ROOT, capture_output=True, env={**os.environ, **environment})
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_output_that_cannot_be_written_is_said_in_a_line() -> None:
+    words = b"rbxcompose explain: the output cannot be written: No space left on device\n"
+    assert in_shell("rbxcompose explain RBX1304 > /dev/full") == (2, b"", words)
+
+
+def test_a_stream_that_is_closed_changes_no_exit_code() -> None:
+    assert in_shell("rbxcompose check robots/turtlebot >&- 2>&-") == (0, b"", b"")
+
+
+def test_a_reader_that_has_gone_is_no_finding() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        words = [sys.executable, "-m", "rbxcompose", "explain", "RBX1304"]
+        done = subprocess.run(words, cwd=ROOT, stdout=writing, stderr=subprocess.PIPE)
+    finally:
+        os.close(writing)
+    assert (done.returncode, done.stderr) == (141, b"")
+
+
+def test_what_an_encoding_lacks_is_escaped() -> None:
+    line = "rbxcompose expand robots/turtlebot --set about='\u00e9\U0001f916'"
+    code, out, err = in_shell(line, PYTHONIOENCODING="latin-1")
+    assert (code, err) == (0, b"")
+    assert b"about: \xe9\\U0001f916 " in out
+
+
 def test_a_command_to_a_running_robot_imports_nothing_heavy() -> None:
     verbs = ["ps", "stop", "down", "logs", "mission"]
     script = f"import sys; import rbxcompose.commands.verbs as m; [*map(m.load, {verbs})]; print(*sys.modules)"

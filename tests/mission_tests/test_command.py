@@ -176,6 +176,24 @@ def test_results_that_cannot_be_written_are_told_before_any_test_runs(
     assert (told.out, told.err) == ("", f"rbxcompose test: '{file}' cannot be written: No such file or directory\n")
 
 
+def test_results_for_a_full_disk_are_told(trying: Trying, capsys: pytest.CaptureFixture[str]) -> None:
+    trying.read("expect:\n  outcome: failure\n", "ending")
+    assert command(["test", str(trying.folder / "tried.test.yaml"), "--junit", "/dev/full"]) == 2
+    told = capsys.readouterr()
+    assert "1 passed" in told.out
+    assert told.err.endswith("rbxcompose test: '/dev/full' cannot be written: No space left on device\n")
+
+
+def test_a_test_has_the_same_names_in_junit_when_it_cannot_run(trying: Trying, tmp_path: Path) -> None:
+    file, found = tmp_path / "out.xml", []
+    for outcome in ("failure", "failur"):
+        trying.read(f"expect:\n  outcome: {outcome}\n", "ending")
+        command(["test", str(trying.folder / "tried.test.yaml"), "--junit", str(file)])
+        case = next(ElementTree.parse(file).iter("testcase"))
+        found.append((case.get("classname"), case.get("name"), [child.tag for child in case]))
+    assert found == [("ending", "tried", []), ("ending", "tried", ["error"])]
+
+
 def test_a_damaged_file_of_what_was_tested_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     assert read_tested("rover", "look") is None

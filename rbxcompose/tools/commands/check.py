@@ -25,7 +25,6 @@ from rbxcompose.commands.targets import add_layer_options, compiled, projects_of
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.plan.model import Plan, extent
 from rbxcompose.manifest.documents import KINDS
-from rbxcompose.manifest.reader import Texts
 from rbxcompose.manifest.tree import FILE_BYTES
 
 GROUP = "write"
@@ -95,9 +94,7 @@ def _check(arguments: argparse.Namespace) -> CheckedRobots:
         _check_system(path, arguments, checked)
     on_robots = [robot for robot, _ in wanted.overlays]
     projects = projects_of([*wanted.robots, *on_robots, *wanted.users, *wanted.tests, *wanted.systems, *wanted.files])
-    texts = Texts(unsaved_of(arguments))
-    checked.report.extend(wanted.unused(checked.sources.keys(), texts))
-    checked.sources.update(texts)
+    checked.report.extend(wanted.unused(checked.sources, unsaved_of(arguments)))
     checked.report = Report([*only_ours(checked.report, checked.sources, projects)])
     return checked
 

@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.base.findings import Report
@@ -19,6 +20,7 @@ from rbxcompose.commands.console import FINDINGS, emit, has_colour, misused, wri
 from rbxcompose.commands.options import add_unsaved_option, unsaved_of
 from rbxcompose.commands.targets import tests_of
 from rbxcompose.manifest.files import shown_name
+from rbxcompose.manifest.tree import text_at
 from rbxcompose.missions.view.tested import keep_tested
 from rbxcompose.tools.mission_tests.coverage import Coverage
 from rbxcompose.tools.mission_tests.reader import TrialReader, WrittenTrial
@@ -52,11 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
     files = tests_of(arguments.paths)
     if not files:
         return misused("test", f"no tests ('kind: Test') in {plain(', '.join(map(str, arguments.paths)))}")
-    if arguments.junit:
-        try:
-            arguments.junit.write_text("")  # now, and not after all tests have run
-        except OSError as error:
-            return misused("test", f"'{plain(str(arguments.junit))}' cannot be written: {error.strerror}")
+    if problem := _save(arguments, ""):  # now, and not after all tests have run
+        return problem
     reading = TrialReader(os.environ, unsaved_of(arguments))
     coverage, writer = Coverage(), TrialWriter(has_colour(sys.stdout))
     outcomes: list[FileOutcome] = []
@@ -73,20 +72,37 @@ def run(arguments: argparse.Namespace) -> int:
     write_report(_findings(reading, outcomes) if outcomes else unreadable, reading.sources)
     if not outcomes:
         return misused("test", f"no test has '{plain(arguments.filter)}' in its name")
+    problem = _save(arguments, junit(outcomes))
     _finish(outcomes, coverage, writer, arguments)
-    return 0 if all(file_outcome.passed for file_outcome in outcomes) else FINDINGS
+    return problem or (0 if all(file_outcome.passed for file_outcome in outcomes) else FINDINGS)
+
+
+def _save(arguments: argparse.Namespace, results: str) -> int:
+    """Write the results for `--junit`; return the exit code if they cannot be written, else 0."""
+    try:
+        if arguments.junit:
+            arguments.junit.write_text(results, encoding="utf-8")
+    except OSError as error:
+        return misused("test", f"'{plain(str(arguments.junit))}' cannot be written: {error.strerror}")
+    return 0
 
 
 def outcome_of(written: WrittenTrial, reading: TrialReader, coverage: Coverage, began: float) -> FileOutcome:
     """Run a test, add the ways that it took to what is covered, and return what came of it."""
     trial = reading.understand(written)
     compiled = time.perf_counter()
-    shown, findings = shown_name(written.path), tuple(written.report)
+    out = FileOutcome(
+        shown_name(written.path),
+        written.name,
+        tuple(written.report),
+        took=compiled - began,
+        mission=text_at(written.root, ("mission",)),
+    )
     if trial is None:
-        return FileOutcome(shown, written.name, findings, took=compiled - began)
+        return out
     verdict = run_trial(trial)
     coverage.add(verdict.trial.linked, verdict.trial.names, verdict.seen.keys, verdict.trial.plan.robot)
-    return FileOutcome(shown, written.name, findings, verdict, time.perf_counter() - compiled)
+    return replace(out, verdict=verdict, took=time.perf_counter() - compiled)
 
 
 def _tell(outcome: FileOutcome, writer: TrialWriter, verbose: bool) -> None:
@@ -104,8 +120,6 @@ def _findings(reading: TrialReader, outcomes: Sequence[FileOutcome]) -> Report:
 def _finish(
     outcomes: Sequence[FileOutcome], coverage: Coverage, writer: TrialWriter, arguments: argparse.Namespace
 ) -> None:
-    if arguments.junit:
-        arguments.junit.write_text(junit(outcomes), encoding="utf-8")
     if arguments.coverage and not unsaved_of(arguments):  # what is kept is of the files
         for robot, missions in coverage.by_robot(time.time()).items():
             with suppress(OSError):  # such as on a machine that is read only: it is shown here all the same

@@ -21,13 +21,17 @@ _RESET = "\x1b[0m"
 
 @dataclass(frozen=True, slots=True)
 class FileOutcome:
-    """The result of one file: a verdict, or the findings that kept it from running; `took` is real time [s]."""
+    """The result of one file: a verdict, or the findings that kept it from running; `took` is real time [s].
+
+    `mission` is the one that the file names; empty if the file cannot be read.
+    """
 
     file: str
     name: str
     findings: tuple[Finding, ...] = ()
     verdict: Verdict | None = None
     took: float = 0.0
+    mission: str = ""
 
     @property
     def passed(self) -> bool:
@@ -160,9 +164,13 @@ def junit(outcomes: Sequence[FileOutcome]) -> str:
     root = ElementTree.Element("testsuites", {"name": "rbxcompose test", "time": took, **numbers})
     suite = ElementTree.SubElement(root, "testsuite", {"name": "missions", "time": took, **numbers})
     for outcome in outcomes:
-        mission = outcome.verdict.trial.mission if outcome.verdict else outcome.file
         name, file = _fit(outcome.name or outcome.file), _fit(outcome.file)
-        about = {"name": name, "classname": _fit(mission), "time": f"{outcome.took:.3f}", "file": file}
+        about = {
+            "name": name,
+            "classname": _fit(outcome.mission or outcome.file),
+            "time": f"{outcome.took:.3f}",
+            "file": file,
+        }
         case = ElementTree.SubElement(suite, "testcase", about)
         if outcome.verdict and not outcome.passed:
             messages = [problem.message for problem in outcome.verdict.problems]
