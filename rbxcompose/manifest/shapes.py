@@ -193,9 +193,9 @@ def _read(text: str, dimension: Dimension) -> float:
 
 
 def as_written(config: BaseModel) -> dict[str, Any]:
-    """Return the fields of a configuration that are set, quantities as texts."""
-    types = field_types(type(config))
-    found = {name: _written(getattr(config, name), hint) for name, hint in types.items()}
+    """Return the fields of a configuration that are set, by key, quantities as texts."""
+    fields = zip(type(config).model_fields, field_types(type(config)).items(), strict=True)
+    found = {key: _written(getattr(config, name), hint) for name, (key, hint) in fields}
     return {name: value for name, value in found.items() if value is not None}
 
 

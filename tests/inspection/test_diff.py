@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.compiler.plan.diff import Difference, difference
-from rbxcompose.compiler.plan.dump import dump, load
+from rbxcompose.compiler.plan.dump import PlanTextError, dump, load
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.testing import Golden, check_file, check_text
 from rbxcompose.tools.inspection.plan_text import plan_text
@@ -46,6 +46,18 @@ def test_a_profile_that_changes_one_value_concerns_one_process() -> None:
     assert found.text() == "~ battery\n    runtime: 45 s -> 30 s\nprocesses that restart: world"
 
 
+def test_values_are_told_as_they_are_written() -> None:
+    patterns = "[battery, {contains: foreign}, {not: {startswith: b}}]"
+    text = between("base.max_speed=1.5 km/h", f"diagnostics.analyzers.power.match={patterns}").text()
+    assert "    max_speed: 0.5 m/s -> 1.5 km/h\n" in text
+    assert f" -> {patterns}\n" in text
+
+
+def test_a_file_that_is_no_json_is_told_so_with_its_place() -> None:
+    with pytest.raises(PlanTextError, match="this is not JSON: Expecting ':' delimiter: line 1 column 5"):
+        load('{"a"')
+
+
 def test_locks_that_come_or_go_are_told_by_what_is_in_them(tmp_path: Path) -> None:
     robot = "rbx: 1\nkind: Robot\nname: one\ncomponents: {base: {type: diff_drive_sim}}\nmuxes:\n  cmd_vel:\n"
     without = robot + "    inputs: {teleop: {priority: 1, timeout: 1 s}}\n"
@@ -80,7 +92,7 @@ def test_the_inputs_of_a_mission_concern_its_process() -> None:
 
 
 def test_a_change_too_small_for_the_text_is_told_all_the_same() -> None:
-    assert between("battery.runtime=45.0000000001 s").changed["battery"][0].after == "45.0000000001 in SI"
+    assert between("battery.runtime=45.0000000001 s").changed["battery"][0].after == "45.0000000001 s"
 
 
 def test_what_one_way_adds_the_other_way_removes() -> None:

@@ -13,7 +13,7 @@ from rbxcompose.base.levels import log_word
 from rbxcompose.base.requests import to_data
 from rbxcompose.base.units import Quantity, format_number, format_quantity, to_si
 from rbxcompose.compiler.plan.model import Instance, Plan
-from rbxcompose.manifest.shapes import dimension_at
+from rbxcompose.manifest.shapes import as_written, dimension_at, exact
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.missions.program.program import Program
 
@@ -201,11 +201,13 @@ def _text(value: Any) -> str:
             return "no limit"
         case Quantity():
             short = format_quantity(value.value, value.dimension)
-            return short if to_si(short, value.dimension) == value.value else f"{value.value!r} in SI"
+            return short if to_si(short, value.dimension) == value.value else exact(value.value, value.dimension)
         case Type():
             return value.phrase
+        case Config():
+            return _text(as_written(value))
         case Mapping():
-            return EMPTY
+            return f"{{{', '.join(f'{key}: {_text(inner)}' for key, inner in value.items())}}}"
         case list() | tuple():
             return f"[{', '.join(map(_text, value))}]"
         case set() | frozenset():

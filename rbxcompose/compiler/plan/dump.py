@@ -163,6 +163,8 @@ def load(text: str) -> Plan:
         raise
     except RecursionError:
         raise PlanTextError("this is not a plan: it is nested too deeply") from None
+    except json.JSONDecodeError as error:
+        raise PlanTextError(f"this is not JSON: {error}") from error
     except (AttributeError, IndexError, KeyError, TypeError, ValueError, OverflowError) as error:
         raise PlanTextError(f"this is not a plan: {error!r}"[:300]) from error
     if not isinstance(plan, Plan):
