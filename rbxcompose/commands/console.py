@@ -137,6 +137,7 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._negative_number_matcher = re.compile(r"-\.?\d")  # by itself, it knows only numbers without a unit
+        self._why = ""  # why the first word is no robot, if it is no action either
 
     def parse_known_args(self, args: Iterable[str] | None = None, namespace: Any = None) -> tuple[Any, list[str]]:
         """Parse words, with the usual action before them if they begin with none: a plain word is a misspelt one."""
@@ -148,15 +149,18 @@ class Parser(argparse.ArgumentParser):
                 words[0] = _OF_OTHERS[words[0]]
             if not words or _NO_ACTION.match(words[0]):
                 words.insert(0, usual)
-            elif words[0] not in actions and _is_robot(words[0]):
+            elif words[0] not in actions:
                 takes_name = _ROBOT in actions[usual]._option_string_actions
-                words[:0] = [usual, _ROBOT] if takes_name else [usual]
+                if _is_robot(words[0]):
+                    words[:0] = [usual, _ROBOT] if takes_name else [usual]
+                elif takes_name:
+                    self._why = f"; and no robot {words[0]!r} is up"
         return super().parse_known_args(words, namespace)
 
     def error(self, message: str) -> NoReturn:
         """Note the error, report it with the usage, and end the command."""
-        output().misuse = message
-        super().error(message)
+        output().misuse = f"{message}{self._why}"
+        super().error(output().misuse)
 
 
 def _is_robot(word: str) -> bool:

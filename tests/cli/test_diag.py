@@ -73,6 +73,18 @@ def test_the_exit_code_of_tree_is_the_level_of_the_robot(
     assert capsys.readouterr().out == f"turtlebot  {level.name}\n"
 
 
+def test_of_a_robot_that_is_not_up_nothing_is_known(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    assert [main(words.split()) for words in ("diag", "diag --robot lat --json", "diag history")] == [STALE, STALE, 1]
+    assert json.loads(capsys.readouterr().out)["error"] == "no robot 'lat' is up"
+    with pytest.raises(SystemExit):
+        main(["diag", "lat"])
+    assert "invalid choice: 'lat' (choose from 'tree', " in (told := capsys.readouterr().err)
+    assert told.endswith("; and no robot 'lat' is up\n")
+
+
 def test_the_history_of_a_group_that_is_not_there_is_refused_with_those_that_are(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,7 +1,7 @@
 """Show how a running robot is: its groups and their parts, live or as changes; acknowledge levels.
 
-Exit codes of `tree`: the level of the robot, 0 OK, 1 WARN, 2 ERROR, 3 STALE. The others: 0 fine, 1 refused, 2 wrong
-usage.
+Exit codes of `tree`: the level of the robot, 0 OK, 1 WARN, 2 ERROR, 3 STALE, also if it is not up or does not answer.
+The others: 0 fine, 1 refused, 2 wrong usage.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import fitted, plain
 from rbxcompose.base.requests import to_data
-from rbxcompose.commands.console import NotDoneError, emit, has_colour
+from rbxcompose.commands.console import NotDoneError, emit, has_colour, refuse
 from rbxcompose.commands.lookup import REFUSED, add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.commands.options import Subcommand, add_actions, argument, run_action
 from rbxcompose.commands.terminal import LiveScreen, is_terminal
@@ -56,6 +56,14 @@ run = run_action
 
 
 def _tree(arguments: argparse.Namespace) -> int:
+    try:
+        return _show_tree(arguments)
+    except NotDoneError as error:
+        refuse(error.finding)
+        return int(Level.STALE)  # nothing is known
+
+
+def _show_tree(arguments: argparse.Namespace) -> int:
     folder = find_robot(arguments.robot)
     tree = answer_of(folder, requests.ShowDiagnostics())
     if arguments.json:
@@ -76,7 +84,7 @@ def _watch(arguments: argparse.Namespace) -> int:
         if arguments.json:
             return _follow_tree(folder)
         if not is_terminal():
-            _tree(arguments)
+            _show_tree(arguments)
             return 0
         return _show_live(folder, values=arguments.values)
     except KeyboardInterrupt:
