@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import atexit
 import ctypes
-import io
 import json
 import os
 import runpy
@@ -127,8 +126,8 @@ def become(order: dict[str, Any], ends: list[int]) -> NoReturn:
     for number, end in enumerate(ends):
         os.dup2(end, number)
         os.close(end)
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(line_buffering=os.isatty(1))
+    sys.stdout = os.fdopen(1, "w", closefd=False)  # what is known of the former ends does not hold
+    sys.stderr = os.fdopen(2, "w", buffering=1, errors="backslashreplace", closefd=False)
     if order["leads"]:
         os.setsid()
     first, *words = order["words"]

