@@ -10,7 +10,10 @@ import pytest
 
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion import octree_files
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.motion.scene_messages import object_message
 from rbxcompose.domains.body.description import rooted_text
+from rbxcompose.domains.body.model import Geometry
 from rbxcompose.msgs.builtin_interfaces import Time
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
 from rbxcompose.msgs.moveit_msgs import (
@@ -36,6 +39,7 @@ from rbxcompose.msgs.std_msgs import ColorRGBA, Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.msgs.types import Message
 from rbxcompose.msgs.visualization_msgs import MarkerArray
+from rbxcompose.runtime.channel import Repeated
 from rbxcompose.sdk.bound import Reply
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
@@ -46,6 +50,7 @@ from tests.motion.toy_arm import urdf
 BOX = SolidPrimitive(type=SolidPrimitive.BOX, dimensions=np.array((0.1, 0.2, 0.3)))
 CYLINDER = SolidPrimitive(type=SolidPrimitive.CYLINDER, dimensions=np.array((0.3, 0.05)))
 BALL = {"link": "map", "shapes": [{"kind": "sphere", "size": [0.05]}], "position": [1.0, 0.0, 0.0]}
+CELLS = Geometry("octree", (0.02,), points=(0.0, 0.0, 0.0))
 THERE = pose_message(Transform3((0.3, 0.0, 0.2)))
 CHANGES: tuple[tuple[str, type[Message]], ...] = (
     ("/collision_object", CollisionObject),
@@ -284,3 +289,69 @@ def test_more_objects_than_there_may_be_are_refused() -> None:
     scene.send(PlanningScene(is_diff=True, world=world(*many)))
     assert "shapes, and may be 1,000" in scene.refusal()
     assert scene.names == []
+
+
+def restarted(scene: Scene, *, kept: bool) -> None:
+    """Start the scene again as in a new process, whose supervisor sends what was kept a little later."""
+    host = scene.bench.host
+    requests = [event for event in scene.bench.events if isinstance(event, Repeated)][-1].requests
+    host.is_restart = True
+    host.prepare(scene.bench.plan.instances)
+    host.activate(["scene"])
+    scene.bench.advance(0.05)
+    for request in requests if kept else ():
+        host.recall("scene", request)
+    scene.bench.advance(0.3)
+
+
+def test_after_a_restart_the_scene_is_as_it_was() -> None:
+    scene = Scene(objects={"ball": BALL, "pen": BALL | {"link": "ground"}}, frames=["map"])
+    place_base(scene.bench, 0.4)
+    scene.send(PlanningScene(is_diff=True, link_padding=(LinkPadding(link_name="fore", padding=0.02),)))
+    scene.box()
+    scene.box("pen", CollisionObject.REMOVE)
+    scene.send(AttachedCollisionObject(link_name="tip", object=CollisionObject(id="ball")))
+    before, count = scene.told[-1], len(scene.told)
+    restarted(scene, kept=True)
+    assert (scene.names, scene.told[-1]) == (["ball", "box"], before)
+    assert len(scene.told) == count + 1  # nothing else was published meanwhile
+    scene.send(AttachedCollisionObject(object=CollisionObject(id="ball", operation=CollisionObject.REMOVE)))
+    assert component(scene).things.objects["ball"].link == "map"
+    scene.bench.host.failed("scene", RuntimeError("planted"))
+    scene.bench.advance(2.0)
+    assert scene.names == ["ball", "box"]
+    assert component(scene).things.objects["ball"].link == "map"
+
+
+def test_a_scene_that_starts_again_without_one_from_before_has_what_is_there_from_the_start() -> None:
+    scene = Scene(objects={"pen": BALL | {"link": "ground"}})
+    scene.box()
+    restarted(scene, kept=False)
+    assert scene.names == ["pen"]
+
+
+def test_what_changes_before_the_scene_from_before_a_restart_has_come_stays_changed() -> None:
+    scene = Scene(objects={"pen": BALL | {"link": "ground"}})
+    scene.box()
+    restarted(scene, kept=False)
+    scene.box("can")
+    kept = [event for event in scene.bench.events if isinstance(event, Repeated)]
+    scene.bench.host.recall("scene", kept[1].requests[0])
+    scene.bench.advance(0.1)
+    assert scene.names == ["pen", "box", "can"]
+
+
+def test_a_scene_is_kept_when_it_changes_and_without_what_clouds_show() -> None:
+    scene = Scene(clouds=["cells"], objects={"ball": BALL}, frames=["map"])
+    place_base(scene.bench, 0.4)
+    place_base(scene.bench, 0.5)
+    seen = SceneObjects(objects=(object_message(PlacedObject("cells", CELLS, "ground", Transform3())),))
+    scene.bench.publish("/scene/cells", seen, Qos.LATCHED)
+    scene.bench.advance(0.1)
+    assert scene.names == ["ball", "cells"]
+    (kept,) = [event for event in scene.bench.events if isinstance(event, Repeated)]
+    assert [thing["name"] for thing in kept.requests[0]["objects"]] == ["ball"]
+
+
+def component(scene: Scene) -> Any:
+    return scene.bench.component("scene")

@@ -127,6 +127,19 @@ class DetachInScene(Command):
     object: str
 
 
+@dataclass(frozen=True, slots=True)
+class RecallScene(Command):
+    """What was in the scene before its component started again: objects and paddings of links [m].
+
+    `stood_in` has the frames outside of the body in which held objects stood, by name of the object.
+    """
+
+    about = SCENE
+    objects: tuple[PlacedObject, ...]
+    stood_in: Mapping[str, str]
+    paddings: Mapping[str, float]
+
+
 SCENE_WINDOW, ARM_WINDOW = "scene", "arms"  # paths; that of an arm has its name behind
 IDLE = "idle"
 _DIGITS = 4  # of a length

@@ -248,6 +248,11 @@ class Body:
         """Return the root of the URDF, without the frame of a virtual joint."""
         return self.joints_below[self.frame][0].child if self.frame else self.root
 
+    def carried(self, link: str) -> list[str]:
+        """Return all links that a link carries."""
+        children = [joint.child for joint in self.joints_below[link]]
+        return [name for child in children for name in (child, *self.carried(child))]
+
     @property
     def moving(self) -> list[BodyJoint]:
         """Return the joints that have a position of their own; one that mimics another has none."""

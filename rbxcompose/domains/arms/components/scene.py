@@ -17,6 +17,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.domains.arms import scene_view
 from rbxcompose.domains.arms.motion.moveit import MoveItScene
 from rbxcompose.domains.arms.motion.scene import (
+    OCTREE,
     SCENE_LIMITS,
     Colour,
     PlacedObject,
@@ -39,6 +40,7 @@ from rbxcompose.sdk.bound import KeyFeed, whole
 ROUNDING = 1e-6  # of a period
 PERIOD = 0.1  # [s] after which it is looked where frames outside of the body are
 PATIENCE = 2.0  # [s] in which frames become known after the start
+RECALLED_WITHIN = 0.2  # [s] after a restart in which what was there before comes again, if anything does
 MOMENT = 0.05  # [s] between messages of a scene that programs change
 MOVED, TURNED = 1e-3, 2e-3  # [m], [rad] by which a frame may be elsewhere than where it was published
 
@@ -146,6 +148,9 @@ class Scene(Component[SceneConfig]):
         objects = (_placed(name, object_) for name, object_ in self.config.objects.items())
         self.things = PlanningScene(body_of(self.config.urdf), objects, self.config.frames)
         self.moveit = MoveItScene(self.things, dict(self.config.paddings))
+        self.initial = dict(self.things.objects)
+        self.kept: scene_view.RecallScene | None = None  # what the supervisor keeps
+        self.knows_from = math.inf if self.context.is_again else -math.inf  # [s] when what was kept has come
 
     def activate(self) -> None:
         """Publish it, as soon as frames are known."""
@@ -155,6 +160,31 @@ class Scene(Component[SceneConfig]):
         self.published = -MOMENT
         self.publish()
         self.wake()
+
+    def start(self) -> None:
+        """Publish nothing until the scene from before a restart has come."""
+        if self.now < self.knows_from:
+            self.knows_from = self.now + RECALLED_WITHIN
+            self.context.wake_at(self.knows_from)
+
+    @answers(scene_view.RecallScene)
+    def recall(self, request: scene_view.RecallScene) -> str:
+        """Go on with the scene from before a restart, and with what has changed since."""
+        since = {name: thing for name, thing in self.things.objects.items() if self.initial.get(name) is not thing}
+        self.things.objects = {thing.name: thing for thing in request.objects} | since
+        self.things.stood_in, self.moveit.paddings = dict(request.stood_in), dict(request.paddings)
+        self.knows_from = -math.inf
+        self.publish()
+        return "the scene is as it was before the restart"
+
+    def keep(self) -> None:
+        """Let the supervisor keep the scene for a restart, if it has changed; cells that sensors see come again."""
+        things = self.things.objects.values()
+        kept = tuple(thing for thing in things if thing.shape.kind != OCTREE or thing.shape.file)
+        news = scene_view.RecallScene(kept, dict(self.things.stood_in), dict(self.moveit.paddings))
+        if news != self.kept:
+            self.kept = news
+            self.context.repeat([news])
 
     def on_joint_states(self, message: JointState) -> None:
         """Note where joints are."""
@@ -315,6 +345,9 @@ class Scene(Component[SceneConfig]):
 
     def publish(self) -> None:
         """Publish all objects where they are as seen from the body."""
+        if self.now < self.knows_from:
+            return
+        self.keep()
         self.outside, problem = self.looked(), ""
         found: tuple[PlacedObject, ...] = ()
         try:

@@ -202,7 +202,7 @@ class PlanningScene:
     def __init__(self, body: Body, objects: Iterable[PlacedObject] = (), frames: Collection[str] = ()) -> None:
         self.body, self.frames = body, frames
         self.objects: dict[str, PlacedObject] = {}
-        self._stood_in: dict[str, str] = {}  # frames outside of the body in which held objects were
+        self.stood_in: dict[str, str] = {}  # frames outside of the body in which held objects were
         for thing in objects:
             self.add(thing)
 
@@ -253,8 +253,8 @@ class PlanningScene:
             raise SceneError(mistake)
         pose = links[link].inverse().compose(self._pose(thing, links))
         if thing.link not in self.body.links:
-            self._stood_in[name] = thing.link
-        allowed = tuple(touches) or (link, *self._carried(link))
+            self.stood_in[name] = thing.link
+        allowed = tuple(touches) or (link, *self.body.carried(link))
         self.objects[name] = replace(thing, link=link, pose=pose, touches=allowed)
 
     def is_held(self, thing: PlacedObject) -> bool:
@@ -270,7 +270,7 @@ class PlanningScene:
         thing = self._there(name)
         if not (self.is_held(thing) or thing.touches):
             raise SceneError(f"no link holds '{name}'")
-        frame, pose = self._stood_in.pop(name, self.body.root), self._pose(thing, links)
+        frame, pose = self.stood_in.pop(name, self.body.root), self._pose(thing, links)
         if frame in links and frame != self.body.root:
             pose = links[frame].inverse().compose(pose)
         else:
@@ -300,7 +300,3 @@ class PlanningScene:
             there = ", ".join(self.objects) or "none"
             raise SceneError(f"there is no object '{name}' in the scene; there: {there}")
         return self.objects[name]
-
-    def _carried(self, link: str) -> list[str]:
-        children = [joint.child for joint in self.body.joints_below[link]]
-        return [name for child in children for name in (child, *self._carried(child))]
