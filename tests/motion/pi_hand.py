@@ -49,6 +49,7 @@ class HandBench:
         self.slips = 0.0  # [m] by which the gripper closes farther than it was told
         self.problems: dict[str, str] = {}  # by what fails: follow, grip, attach, detach
         self.during: Callable[[str], None] = lambda stage: None
+        self.after_step: Callable[[], None] = lambda: None
         self.pending: Callable[[], None] | None = None  # ends the motion that is under way
         self.works.place_objects(self.objects)
 
@@ -80,9 +81,9 @@ class HandBench:
     def stop_gripping(self) -> None:
         """The gripper ends by itself."""
 
-    def attach(self, name: str, link: str, ended: Callable[[str], None]) -> None:
+    def attach(self, name: str, links: tuple[str, ...], ended: Callable[[str], None]) -> None:
         if not (problem := self.problems.get("attach", "")):
-            self.scene.attach(name, link, (), self._links())
+            self.scene.attach(name, links[0], links, self._links())
             self.works.place_objects(self.objects)
         ended(problem)
 
@@ -109,6 +110,7 @@ class HandBench:
             if task.is_over:
                 return task
             task.advance()
+            self.after_step()
             if self.pending is not None:
                 self.during(self.stages[-1] if isinstance(task, ArmTask) else task.stage)
                 pending, self.pending = self.pending, None

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
+from rbxcompose.domains.arms.arm_config import ArmWorks
 from rbxcompose.domains.arms.motion import hand_task as contacts
 from rbxcompose.domains.arms.motion.collisions import MeshChecker
 from rbxcompose.domains.arms.motion.hand_task import HandTask, LineEnd, line_steps
@@ -17,7 +18,8 @@ from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.section_models import GraspModel
 from rbxcompose.domains.body.model import Geometry
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, PickObject, PlaceObject
-from tests.motion.pi_hand import HandBench
+from tests.loops import for_all
+from tests.motion.pi_hand import FINGER, HandBench
 from tests.soak import rare
 
 PICK, PLACE = PickObject.Goal(object="target"), PlaceObject.Goal(spot="table_right")
@@ -106,14 +108,19 @@ def test_a_blocked_table_tells_the_stage_and_the_reason(
     ("size", "at", "stage", "reason"),
     [
         ((0.02, 0.02, 0.12), (0.9, 0.0, 0.765), "grasp", "goal_out_of_reach"),
-        ((0.15, 0.15, 0.15), (0.24, 0.0, 0.78), "choose", "too_wide"),
+        ((0.15, 0.15, 0.08), (0.24, 0.0, 0.745), "choose", "too_wide"),
     ],
 )
 def test_an_object_that_cannot_be_grasped_says_why(
     size: tuple[float, float, float], at: tuple[float, float, float], stage: str, reason: str
 ) -> None:
     bench = HandBench(box("other", size, at), without=("target", "box1", "box2"))
-    assert failed(bench, PickObject.Goal(object="other"))[:2] == (stage, reason)
+    found = failed(bench, PickObject.Goal(object="other"))
+    assert found[:2] == (stage, reason)
+    assert (
+        reason != "too_wide"
+        or found[2] == "'other' is 15.0 cm wide where fingers hold it, and the gripper opens 11.0 cm"
+    )
 
 
 def test_the_scene_is_modelled_once_for_all_grasps(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -313,3 +320,32 @@ def test_an_object_that_never_rests_or_is_taken_away_is_given_up() -> None:
     assert (stage, reason) == ("choose", "unknown_object")
     assert "there is no object 'target' in the scene" in text
     assert not bench.scene.objects.get("target")
+
+
+@for_all("angle, is_held", [(-0.3, True), (0.1, False)])
+def test_a_cancelled_pick_holds_the_object_if_the_fingers_come_to_rest_at_it(angle: float, is_held: bool) -> None:
+    bench = HandBench()
+
+    def during(stage: str) -> None:
+        if stage == "close":
+            bench.task.cancel()
+            bench.measured[FINGER] = (0.2, -1.0)  # it brakes
+
+    def after_step() -> None:
+        if bench.measured[FINGER][1]:
+            bench.measured[FINGER] = (angle, 0.0)
+
+    bench.during, bench.after_step = during, after_step
+    assert failed(bench, PICK)[:2] == ("close", "interrupted")
+    assert (bench.scene.objects["target"].link == "right_arm_tip") is is_held
+    assert bench.carried_out(MoveArm.Goal(pose="resting")).failure is None
+
+
+def test_what_is_placed_may_touch_the_fingers_if_the_tip_is_a_frame_beside_them() -> None:
+    bench = HandBench()
+    bench.config = bench.config.model_copy(update={"tip": "right_gripper_grasp"})
+    bench.works = ArmWorks(bench.config, lambda: 0.0, bench.objects)
+    assert bench.carried_out(PICK).failure is None
+    assert "right_gripper_finger_link" in bench.scene.objects["target"].touches
+    assert bench.carried_out(PLACE).failure is None
+    assert math.dist(bench.place_of("target"), SPOT) < 0.02 + 3e-3

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from rbxcompose.domains.arms.motion.picture import ArmPicture, draw_arm
 from rbxcompose.domains.arms.reasons import GRASP_REASONS, MotionReason, StageFailure
 from rbxcompose.domains.arms.section_models import GraspModel, HandConfig
 from rbxcompose.domains.body.meshes import MissingLibraryError
+from rbxcompose.domains.body.model import Body
 from rbxcompose.msgs.control_msgs import GripperCommand, GripperCommandMessage
 from rbxcompose.msgs.rbxcompose_msgs import AttachObject, DetachObject, PickObject, PlaceObject
 from rbxcompose.sdk import Calls, CallsAction, Ended, Outcome, Port, SentGoal, ServesAction
@@ -125,9 +127,10 @@ class PicksAndPlaces:
         """Ask the gripper to end."""
         self.gripping.cancel()
 
-    def attach(self, name: str, link: str, ended: Callable[[str], None]) -> None:
-        """Let an object move with a link."""
-        self.bound[ATTACH](AttachObject.Request(object=name, link=link), lambda reply: ended(_problem(reply)))
+    def attach(self, name: str, links: tuple[str, ...], ended: Callable[[str], None]) -> None:
+        """Let an object move with the first of some links, all of which it may touch."""
+        request = AttachObject.Request(object=name, link=links[0], touches=links)
+        self.bound[ATTACH](request, lambda reply: ended(_problem(reply)))
 
     def detach(self, name: str, ended: Callable[[str], None]) -> None:
         """Let an object stay where it is."""
@@ -145,11 +148,21 @@ def hand_of(config: HandConfig, works: ArmWorks) -> hand_tasks.Hand:
     kinematics = works.kinematics
     poses = kinematics.body.poses({})
     tip = kinematics.group.tip
-    links = [tip]
-    for link in links:
-        links.extend(joint.child for joint in kinematics.body.joints_below[link])
     least, greatest = config.opening or (0.0, math.inf)
-    return hand_tasks.Hand(least, greatest, poses[tip].inverse().compose(poses[config.grasp]), tuple(links))
+    return hand_tasks.Hand(
+        least, greatest, poses[tip].inverse().compose(poses[config.grasp]), hand_links(kinematics.body, tip)
+    )
+
+
+def hand_links(body: Body, tip: str) -> tuple[str, ...]:
+    """Return the tip, and all other links of the hand: those below the first link from the tip up that has fingers.
+
+    Links from the tip up to there are fixed to each other. If nothing below them moves, the tip alone carries the hand.
+    """
+    links = (tip, *(joint.parent for joint in takewhile(lambda joint: not joint.moves, body.joints_above(tip))))
+    palms = (link for link in links if any(body.joint_above[each].moves for each in body.carried(link)))
+    palm = next(palms, tip)
+    return tip, *(link for link in (palm, *body.carried(palm)) if link != tip)
 
 
 def hand_task(

@@ -27,7 +27,7 @@ from rbxcompose.base.geometry import (
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.arm_task import SETTLING, ArmGoal, ArmSite, ArmTask, gone_on
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
-from rbxcompose.domains.arms.motion.grasps import Grasp, grasps_of, least_width, reach_of, solid_of
+from rbxcompose.domains.arms.motion.grasps import Grasp, grasps_of, reach_of, solid_of, widths_of
 from rbxcompose.domains.arms.motion.groups import JointSpace, interpolated
 from rbxcompose.domains.arms.motion.inverse_kinematics import TOLERANCE, PoseSearch, PoseTarget, descended, solved
 from rbxcompose.domains.arms.motion.planner import RESOLUTION, MotionPlan, MotionPlanner, MotionRequest, Planning
@@ -418,6 +418,7 @@ TRIES = 256  # slices of a search in one call, unless it takes long: each is a f
 SLACK = (
     0.005  # [m] by which an opening may be less than was commanded, or than the width of what is between the fingers
 )
+AT_REST = 1e-3  # [rad/s or m/s] of a finger
 GAP = 0.005  # [m] below an object within which it stands on something
 
 
@@ -437,7 +438,7 @@ class Hand:
     greatest: float
     grasp: Transform3
     links: tuple[str, ...]
-    """The tip, and all links that it carries."""
+    """The tip, and all other links that an object in the hand may touch."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -469,8 +470,11 @@ class HandSite(ArmSite, Protocol):
     def stop_gripping(self) -> None:
         """Ask the gripper to end; `ended` still follows."""
 
-    def attach(self, name: str, link: str, ended: Callable[[str], None]) -> None:
-        """Let an object move with a link; `ended` gets why that cannot be, or nothing."""
+    def attach(self, name: str, links: tuple[str, ...], ended: Callable[[str], None]) -> None:
+        """Let an object move with the first of some links, all of which it may touch.
+
+        `ended` gets why that cannot be, or nothing.
+        """
 
     def detach(self, name: str, ended: Callable[[str], None]) -> None:
         """Let an object stay where it is; `ended` gets why that cannot be, or nothing."""
@@ -744,15 +748,18 @@ class PickTask(HandTask):
         if self._goal.grasps:
             given = sorted(self._goal.grasps, key=lambda each: -each.quality)
             self._grasps = [replace(each, pose=self._at.compose(each.pose)) for each in given if each.width < widest]
-            width = min(each.width for each in given)
+            widths = [each.width for each in given]
         elif (solid := solid_of(thing)) is not None:
-            at, width = self._at.compose(solid.pose), least_width(solid.shape)
-            self._grasps = grasps_of(solid.shape, at, self._bearing(), widest)
+            at, bearing = self._at.compose(solid.pose), self._bearing()
+            self._grasps = grasps_of(solid.shape, at, bearing, widest)
+            widths = widths_of(solid.shape, at, bearing)
         else:
             words = f"'{thing.name}' is neither a box nor a cylinder nor a sphere"
             return self.fail(GraspReason.NO_GRASPS, f"{words}, and the arm has no 'grasps' for it")
+        if not widths:
+            return self.fail(GraspReason.NO_GRASPS, f"'{thing.name}' leans: fingers close across upright sides")
         if not self._grasps:
-            words = f"where '{thing.name}' is narrowest it is {width * 100:.1f} cm wide"
+            words = f"'{thing.name}' is {min(widths) * 100:.1f} cm wide where fingers hold it"
             return self.fail(GraspReason.TOO_WIDE, f"{words}, and the gripper opens {widest * 100:.1f} cm")
         return None
 
@@ -813,7 +820,8 @@ class PickTask(HandTask):
         width = self._way.contact.width
         self._closed = width - max(0.0, self._goal.squeeze)
         grip = yield from self.gripped(self._closed)
-        if grip.problem:
+        if grip.problem or self.is_canceled:
+            yield from self.keep()
             return self.fail(GraspReason.GRIPPER_FAILED, grip.problem)
         if grip.opening < width - SLACK:
             words = f"the gripper closed to {grip.opening * 1e3:.0f} mm"
@@ -822,12 +830,25 @@ class PickTask(HandTask):
             return self.fail(GraspReason.NOTHING_GRASPED, text)
         return None
 
+    def keep(self) -> Work:
+        """Attach the object if fingers that were stopped come to rest at it, or so near that it would be in the way."""
+        above, began = self.kinematics.body.joint_above, self.site.now
+        fingers = {above[link].name for link in self.hand.links if link in above} - {*self.space.names}
+        while self.site.now - began < SETTLING and any(
+            name in fingers and abs(speed) > AT_REST for name, (_, speed) in self.site.measured.items()
+        ):
+            yield
+        self.place_body()
+        near = replace(self._one, padding=self._one.padding + SLACK / 2)
+        pairs = self.works.checker([*self.without(near.name), near]).colliding(self.here)
+        return (yield from self.attach()) if any(near.name in pair for pair in pairs) else None
+
     def attach(self) -> Work:
         """Let the object move with the tip."""
         self.place_body()
-        name, tip = self._one.name, self.hand.links[0]
+        name = self._one.name
         self.site.picked[name] = PickedObject(self._at.rotation, self._closed, self._way.contact.width)
-        return self.changed(lambda ended: self.site.attach(name, tip, ended), lambda: self.held is not None)
+        return self.changed(lambda ended: self.site.attach(name, self.hand.links, ended), lambda: self.held is not None)
 
     def lift(self) -> Work:
         """Go straight up; near to where it stood, the object may touch what it stands on."""
