@@ -111,6 +111,23 @@ def test_limits_that_keep_a_joint_from_moving_are_told(name: str) -> None:
     assert found == ([f"RBX2011 {expected}"] if expected else [])
 
 
+@for_all(
+    "ends, is_said",
+    [
+        ('lower="-2" upper="2"', True),
+        ('upper="1.5"', True),
+        ('lower="-3.14159" upper="3.14159"', False),
+        ('lower="-1e16" upper="1e16"', False),
+        ('lower="0" upper="0"', False),
+    ],
+)
+def test_limits_of_a_joint_that_turns_on_and_on_do_not_count(ends: str, is_said: bool) -> None:
+    links = "".join(f'<link name="{link}">{HEAVY}</link>' for link in ("base", "arm"))
+    found = told(links + joint("arm", "continuous", limit=f'<limit {ends} effort="1" velocity="1"/>'))
+    words = "RBX2025 'lower' and 'upper' of joint 'to_arm' do not count: it is 'continuous', and turns on and on"
+    assert found == ([words] if is_said else [])
+
+
 @for_all("kind", ["planar", "floating"])
 def test_a_joint_of_more_than_one_position_is_taken_to_be_at_rest(kind: str) -> None:
     links = f'<link name="base"/><link name="arm"/>{joint("arm", kind)}'

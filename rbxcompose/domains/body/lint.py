@@ -31,11 +31,13 @@ NO_MESH = kind("RBX2012")
 MILLIMETRES = kind("RBX2013", Severity.WARNING)
 DEGREES = kind("RBX2021", Severity.WARNING)
 AT_REST = kind("RBX2024", Severity.WARNING)
+ENDLESS = kind("RBX2025", Severity.WARNING)
 TURNED_IN_DEGREES = kind("RBX2023", Severity.WARNING)
 LARGEST = 20.0  # [m]
 _WRITE = "write what the motor can do"
 _UNWRITTEN = "a limit that is not written is 0; joints without limits are 'continuous', those that never move 'fixed'"
 _LACKS_UNIT = "are these millimetres, or does a size lack its unit?"
+_SHORT_OF_A_TURN = 0.01  # [rad]: programs write a whole turn where no limits are meant
 TURN = math.tau + 0.01  # [rad] beyond which an angle may be one in degrees
 _WITH_ORIGINS = ("link", "joint", "visual", "collision", "inertial")
 
@@ -247,6 +249,11 @@ def orientations(root: XmlElement) -> Iterator[Finding]:
 
 def _limits(joint: BodyJoint, limits: JointLimits) -> Iterator[Finding]:
     name = plain(joint.name, _SHOWN)
+    lower, upper = limits.lower or 0.0, limits.upper or 0.0
+    if joint.kind == "continuous" and 0.0 < upper - lower < math.tau - _SHORT_OF_A_TURN:
+        message = f"'lower' and 'upper' of joint '{name}' do not count: it is 'continuous', and turns on and on"
+        help_text = "make it 'revolute'; if it may turn on and on, leave out 'lower' and 'upper'"
+        yield ENDLESS.at(limits.span, message, help=help_text)
     if missing := [text for text in ("effort", "velocity") if getattr(limits, text) is None]:
         message = f"the limits of joint '{name}' lack the {' and the '.join(missing)}"
         yield NO_MOTION.at(limits.span, message, help="write what the motor can do; ROS refuses a URDF without it")
