@@ -25,6 +25,7 @@ from tests.soak import rare
 PICK, PLACE = PickObject.Goal(object="target"), PlaceObject.Goal(spot="table_right")
 ROOT = "base_footprint"
 SPOT = (0.24, -0.20, 0.765)
+LEANING = quaternion_from_rpy(0.5, 0.5, 0.0)
 
 
 def box(name: str, size: tuple[float, float, float], at: tuple[float, float, float]) -> PlacedObject:
@@ -349,3 +350,10 @@ def test_what_is_placed_may_touch_the_fingers_if_the_tip_is_a_frame_beside_them(
     assert "right_gripper_finger_link" in bench.scene.objects["target"].touches
     assert bench.carried_out(PLACE).failure is None
     assert math.dist(bench.place_of("target"), SPOT) < 0.02 + 3e-3
+
+
+def test_a_box_without_upright_sides_is_not_called_too_wide() -> None:
+    leaning = replace(box("other", (0.02, 0.02, 0.12), (0.24, 0.0, 0.8)), pose=Transform3((0.24, 0.0, 0.8), LEANING))
+    bench = HandBench(leaning, without=("target",))
+    text = "'other' leans: fingers close across upright sides"
+    assert failed(bench, PickObject.Goal(object="other")) == ("choose", "no_grasps", text)
