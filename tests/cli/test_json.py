@@ -61,6 +61,7 @@ MISTAKES = {
     "mission cancel": "",
     "mission explore": "patrl robots/turtlebot",
     "mission force": "go_home success",
+    "mission forget": "",
     "mission jump": "home",
     "mission log": "",
     "mission ls": "",

@@ -37,9 +37,9 @@ ROOMS: dict[str, Cost] = {
     "commands": Cost(code=2697, files=24, small=3, imports=341),
     "compiler": Cost(code=7790, files=53, small=1, imports=878),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
-    "domains/arms": Cost(code=12784, files=64, small=1, imports=1106),
+    "domains/arms": Cost(code=12837, files=64, small=1, imports=1109),
     "domains/bases": Cost(code=2105, files=16, small=0, imports=193),
-    "domains/body": Cost(code=3584, files=27, small=2, imports=365),
+    "domains/body": Cost(code=3594, files=27, small=2, imports=365),
     "domains/console": Cost(code=3562, files=20, small=0, imports=249),
     "domains/devices": Cost(code=1890, files=15, small=0, imports=183),
     "domains/diagnostics": Cost(code=2410, files=23, small=4, imports=211),
@@ -62,10 +62,10 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 113506,
+    "lines of code": 113569,
     "files": 749,
     "files of 1 to 30 lines of code": 42,
-    "lines of imports": 10399,
+    "lines of imports": 10402,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 369,
