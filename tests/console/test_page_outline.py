@@ -52,12 +52,24 @@ def spot(page: Page, text: str, part: float) -> tuple[float, float]:
     return box["x"] + box["width"] / 2, box["y"] + box["height"] * part
 
 
+RESTS = """row => new Promise(done => {
+  let [y, frames] = [NaN, 0];
+  const look = () => {
+    const now = row.getBoundingClientRect().y;
+    [y, frames] = [now, now === y ? frames + 1 : 0];
+    if (frames > 2) done(null); else requestAnimationFrame(look);
+  };
+  look();
+})"""
+
+
 def drags(page: Page, text: str, to: str, part: float) -> None:
     """Press a row, and move it to a place of another one; it is not dropped yet."""
     row(page, text).scroll_into_view_if_needed()
     page.mouse.move(*spot(page, text, 0.5))
     page.mouse.down()
     page.mouse.move(*spot(page, to, 0.5), steps=4)
+    row(page, to).evaluate(RESTS)  # at an edge of the tree, the drag scrolls
     page.mouse.move(*spot(page, to, part))
 
 
