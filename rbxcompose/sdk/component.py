@@ -18,6 +18,8 @@ from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.ports import In, Port
 from rbxcompose.sdk.updater import DiagnosticTask
 
+RECALLED_WITHIN = 0.2  # [s] after the start of a component, in which requests that it has `repeat`ed come again
+
 
 @dataclass(frozen=True, slots=True)
 class MissionOver:
@@ -118,7 +120,7 @@ class Context(Protocol):
         """Report something that concerns the whole robot to the supervisor."""
 
     def repeat(self, requests: Sequence[Command]) -> None:
-        """Send these, instead of earlier ones, to the component again after it was restarted."""
+        """Send these, instead of earlier ones, to the component again, at most `RECALLED_WITHIN` after its restart."""
 
     def window(self, path: str, question: Query[Any]) -> Window:
         """Open a window for tools outside at `path`; queries there get the component's answer to `question`."""

@@ -36,11 +36,11 @@ from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.visualization_msgs import MarkerArray
 from rbxcompose.sdk import Component, Config, In, Looks, Out, Port, Refused, Serves, answers, component
 from rbxcompose.sdk.bound import KeyFeed, whole
+from rbxcompose.sdk.component import RECALLED_WITHIN
 
 ROUNDING = 1e-6  # of a period
 PERIOD = 0.1  # [s] after which it is looked where frames outside of the body are
 PATIENCE = 2.0  # [s] in which frames become known after the start
-RECALLED_WITHIN = 0.2  # [s] after a restart in which what was there before comes again, if anything does
 MOMENT = 0.05  # [s] between messages of a scene that programs change
 MOVED, TURNED = 1e-3, 2e-3  # [m], [rad] by which a frame may be elsewhere than where it was published
 

@@ -14,11 +14,11 @@ from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, K
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.sdk import Component, In, MessageLimits, Out, Refused, answers, component
+from rbxcompose.sdk.component import RECALLED_WITHIN
 
 if TYPE_CHECKING:
     from rbxcompose.domains.diagnostics.core import TreeRow
 
-PATIENCE = 0.2  # [s] after a restart, in which the supervisor repeats what was latched
 PAUSE = 0.05  # [s] between two reports at least, so that flapping levels cost little
 MOST_ARRAYS = 30.0  # [Hz] of one publisher: more takes too much of a core, as do larger ones
 ARRAY = MessageLimits(size=200_000)
@@ -69,7 +69,7 @@ class Diagnostics(Component[DiagnosticsConfig]):
 
     def start(self) -> None:
         """Keep what is latched only after what was kept before a restart has come again."""
-        self.keeps_from = min(self.keeps_from, self.now + PATIENCE)
+        self.keeps_from = min(self.keeps_from, self.now + RECALLED_WITHIN)
 
     def take_over(self, old: Diagnostics) -> None:
         """Keep what is known: statuses, levels of groups that stay, and the history."""

@@ -24,6 +24,7 @@ from rbxcompose.msgs.topic_tools_interfaces import MuxAdd, MuxDelete, MuxList, M
 from rbxcompose.msgs.types import Message
 from rbxcompose.sdk import Capability, Component, ComponentNoted, Forwards, In, Level, Out, Port, Serves, component
 from rbxcompose.sdk.capabilities import LocksInSilence, Setting
+from rbxcompose.sdk.component import RECALLED_WITHIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +99,6 @@ def noted(locked: Iterable[tuple[str, float]]) -> str:
 LOCK = "lock_"  # prefix of the ports of locks
 ANNOUNCED = "announced"  # the port at which it publishes who holds the output
 KEPT = 200  # changes that can be read later
-PATIENCE = 0.2  # [s] after a restart, in which orders from before it come again and nothing is let through
 _WORD = "lower-case letters, digits and '_', starting with a letter"
 NEEDED = {
     "name": f"it has {_WORD}, at most 60 of them",
@@ -177,7 +177,7 @@ class Mux(Component[MuxConfig]):
 
     def start(self) -> None:
         """Let nothing through until orders from before a restart have come again."""
-        self.knows_from = min(self.knows_from, self.now + PATIENCE)
+        self.knows_from = min(self.knows_from, self.now + RECALLED_WITHIN)
 
     def reconfigure(self, old: MuxConfig) -> None:
         """Follow other limits of a hand-over."""
