@@ -352,7 +352,7 @@ def ask_all(shares: Shares, words: Callable[[str], Sequence[str]], *, in_json: b
     left = {f"{host} {robot}": share.rbxcompose(words(robot)) for (host, robot), share in shares.items()}
     done = dict[str, Running]()
     for tries in count():
-        may_change = is_starting() and tolerates
+        may_change = tolerates and is_starting()
         done |= on_all(left)
         lacking = [label for label in left if may_change and any(tolerates in line for line in done[label].lines)]
         left = {label: left[label] for label in lacking}

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import math
 import os
 import sys
 import time
@@ -90,11 +91,13 @@ def find_robot(wanted: str | None) -> RobotFolder:
 
 def awaited_robot(wanted: str | None) -> RobotFolder:
     """Find a robot as `find_robot` does, or once its `up` has begun: who reads that none is up may come near."""
-    is_reported = False
+    is_reported, last = False, math.inf  # the last look [s, monotonic] for the state of a robot that is there
     while True:
         may_come = is_starting()
         try:
-            if known_state(folder := find_robot(wanted)) is not None or not may_come:
+            folder = find_robot(wanted)
+            last = min(last, time.monotonic() + ANSWER)
+            if known_state(folder) is not None or not may_come or time.monotonic() > last:
                 return folder
         except NotDoneError as error:
             if error.finding.code != NOT_UP.code or not may_come:

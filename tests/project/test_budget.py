@@ -34,7 +34,7 @@ ROOMS: dict[str, Cost] = {
     "__main__": Cost(code=4, files=1, small=1, imports=2),
     "base": Cost(code=3797, files=25, small=3, imports=215),
     "bus": Cost(code=2382, files=17, small=0, imports=160),
-    "commands": Cost(code=2697, files=24, small=3, imports=341),
+    "commands": Cost(code=2700, files=24, small=3, imports=342),
     "compiler": Cost(code=7790, files=53, small=1, imports=878),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
     "domains/arms": Cost(code=12837, files=64, small=1, imports=1110),
@@ -52,7 +52,7 @@ ROOMS: dict[str, Cost] = {
     "domains/vision": Cost(code=2543, files=24, small=1, imports=301),
     "domains/worlds": Cost(code=4446, files=36, small=3, imports=512),
     "manifest": Cost(code=3565, files=19, small=1, imports=272),
-    "missions": Cost(code=12024, files=78, small=3, imports=1030),
+    "missions": Cost(code=12026, files=78, small=3, imports=1030),
     "msgs": Cost(code=1559, files=14, small=3, imports=93),
     "runtime": Cost(code=7690, files=38, small=0, imports=678),
     "sdk": Cost(code=1400, files=8, small=0, imports=161),
@@ -62,10 +62,10 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 113570,
+    "lines of code": 113575,
     "files": 749,
     "files of 1 to 30 lines of code": 42,
-    "lines of imports": 10405,
+    "lines of imports": 10406,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 369,

@@ -485,7 +485,10 @@ class Mission(Component[MissionConfig]):
     def forget(self, request: requests.ForgetMission) -> str:
         """Drop the snapshot of a mission that a crash had cut short."""
         name, _ = self.cut_short(request.mission)
-        self.snapshots.forget(name, runs=name in self.missions.names)
+        try:
+            self.snapshots.forget(name, runs=name in self.missions.names)
+        except OSError as error:
+            raise Refused(f"the snapshot of mission {name} cannot be removed: {error.strerror}") from error
         return f"the run of mission {name} that did not end is forgotten"
 
     def cut_short(self, mission: str) -> tuple[str, Mapping[str, Any]]:

@@ -69,10 +69,13 @@ class SnapshotStore:
         return next(self._found(mission, _ENDED[runs]), None)
 
     def forget(self, mission: str, *, runs: bool) -> None:
-        """Drop what `left_over` returns, and what is older."""
+        """Drop what `left_over` returns, and what is older.
+
+        Raises:
+            OSError: if it cannot be removed.
+        """
         for aside in _ENDED[runs]:
-            with suppress(OSError):
-                self._path(mission, aside).unlink()
+            self._path(mission, aside).unlink(missing_ok=True)
 
     def _found(self, mission: str, asides: Iterable[str]) -> Iterator[tuple[float, Mapping[str, Any]]]:
         for path in (self._path(mission, aside) for aside in asides if self._folder):
