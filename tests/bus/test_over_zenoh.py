@@ -248,6 +248,7 @@ def test_an_action_is_carried_out_cancelled_and_left(network: Network, one: Conn
 
     send(Goal(), ends.append).cancel()
     network.until(lambda: server.current and server.current.cancel_requested)
+    assert server.current is not None
     server.current.canceled()
     network.until(lambda: len(ends) == 3)
 
