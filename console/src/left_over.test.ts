@@ -16,8 +16,8 @@ it("tells where a run was, and why it cannot go on", () => {
 
 it("offers what the robot will not refuse", () => {
   expect(ways({ ...left, waits: true }, true)).toEqual(["ResumeMission", "CancelMission, RunMission"]);
-  expect(ways(left, false)).toEqual(["RestoreMission", "RunMission"]);
-  expect(ways(left, true)).toEqual(["CancelMission, RestoreMission"]);
-  expect(ways({ ...left, changed: "x" }, false)).toEqual(["RunMission"]);
-  expect(ways({ ...left, changed: "x" }, true)).toEqual([]);
+  expect(ways(left, false)).toEqual(["RestoreMission", "RunMission", "ForgetMission"]);
+  expect(ways(left, true)).toEqual(["CancelMission, RestoreMission", "ForgetMission"]);
+  expect(ways({ ...left, changed: "x" }, false)).toEqual(["RunMission", "ForgetMission"]);
+  expect(ways({ ...left, changed: "x" }, true)).toEqual(["ForgetMission"]);
 });

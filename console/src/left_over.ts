@@ -34,9 +34,13 @@ export function waysOn(left: LeftOver, isActive: boolean): WayOn[] {
       { text: "Start again", requests: ["CancelMission", "RunMission"] },
     ];
   }
-  if (isActive) return left.changed ? [] : [{ text: "Cancel this run, go on with that one", requests: ["CancelMission", "RestoreMission"] }];
+  const drop = { text: "Forget that run", requests: ["ForgetMission"] };
   const again = { text: "Start again", requests: ["RunMission"] };
-  return left.changed ? [again] : [{ text: "Go on from where it was", requests: ["RestoreMission"] }, again];
+  if (isActive) {
+    const instead = { text: "Cancel this run, go on with that one", requests: ["CancelMission", "RestoreMission"] };
+    return left.changed ? [drop] : [instead, drop];
+  }
+  return left.changed ? [again, drop] : [{ text: "Go on from where it was", requests: ["RestoreMission"] }, again, drop];
 }
 
 /** Shows it, with buttons for who may operate the robot. */

@@ -141,7 +141,7 @@ def left_over(**more: Any) -> list[dict[str, Any]]:
 
 @pytest.mark.soak
 def test_a_run_that_did_not_end_goes_on_or_starts_again(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
-    for name in ("ResumeMission", "CancelMission", "RunMission", "RestoreMission"):
+    for name in ("ResumeMission", "CancelMission", "RunMission", "RestoreMission", "ForgetMission"):
         patrol.answers[f"mission.{name}"] = lambda given: f"{given['type']} is done"
     patrol.windows["mission/ListMissions"] = listed("paused")
     patrol.windows["mission/ListSnapshots"] = left_over(waits=True)
@@ -164,6 +164,8 @@ def test_a_run_that_did_not_end_goes_on_or_starts_again(open_page: Callable[...,
     ).to_be_visible()
     expect(page.get_by_role("button", name="Go on from where it was")).to_have_count(0)
     expect(page.get_by_role("button", name="Start again")).to_be_visible()
+    page.get_by_role("button", name="Forget that run").click()
+    expect(page.get_by_text("mission.ForgetMission is done")).to_be_visible()
 
 
 @pytest.mark.soak
