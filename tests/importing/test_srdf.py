@@ -70,18 +70,20 @@ def test_what_is_left_out_is_reported_where_it_is_written(tmp_path: Path) -> Non
     added = """
     <group name="Arm"><joint name="lift"/></group>
     <group_state name="low" group="Arn"><joint name="lift" value="0"/></group_state>
-    <group_state name="Low" group="torso"><joint name="lift" value="0"/></group_state>
+    <group_state name="Low" group="torso"><joint name="lift" value="0"/><joint name="grasp" value="0"/></group_state>
     <passive_joint name="grasp"/>
 </robot>"""
     (tmp_path / "lifter.srdf").write_text(LIFTER[0].read_text().replace("\n</robot>", added))
     before = import_files(LIFTER, "lifter", "srdf")
     after = import_files([tmp_path / "lifter.srdf", LIFTER[1]], "lifter", "srdf")
     line = LIFTER[0].read_text().count("\n")
-    new = [("RBX2230", line), ("RBX2311", line + 1), ("RBX2313", line + 2), ("RBX2230", line + 3)]
+    new = [("RBX2230", line), ("RBX2311", line + 1), *((code, line + 2) for code in ("RBX2230", "RBX2313"))]
+    new += [("RBX2230", line + 3)]
     assert [each for each in after.told if each not in before.told] == new
     assert after.data["arms"]["arm"] == before.data["arms"]["arm"]
     for words in ("a further group 'Arm' has", "did you mean 'Arm'?", "'Low' is called 'low'", "joint 'grasp' has no"):
         assert words in after.words
+    assert "in the pose 'Low' of 'torso': 'grasp', not moved by it" in after.words
 
 
 def test_limits_of_the_robot_are_exported_beside_those_of_its_urdf(tmp_path: Path) -> None:

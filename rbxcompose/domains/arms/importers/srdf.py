@@ -215,13 +215,14 @@ class _Drafts:
         return f"joints: {flow_list([key(joint) for joint in moved])}"
 
     def _poses(self, group: SemanticGroup, moved: tuple[str, ...]) -> Mapping[str, Mapping[str, float]]:
-        free = FreeNames()
-        return {
-            self._named(free, self.said.places["group_state", group.name, pose], pose, "pose"): {
-                joint: at for joint, at in positions.items() if joint in moved
-            }
-            for pose, positions in self.said.poses.get(group.name, {}).items()
-        }
+        free, found = FreeNames(), {}
+        for pose, positions in self.said.poses.get(group.name, {}).items():
+            span = self.said.places["group_state", group.name, pose]
+            found[self._named(free, span, pose, "pose")] = {name: at for name, at in positions.items() if name in moved}
+            if others := ", ".join(f"'{plain(name, 60)}'" for name in positions if name not in moved):
+                words = f"in the pose '{plain(pose, 60)}' of '{plain(group.name, 60)}': {others}, not moved by it"
+                self.report.add(NOT_CARRIED_OVER.at(span, words))
+        return found
 
     def _named(self, free: FreeNames, span: Span | None, name: str, otherwise: str) -> str:
         """Return the name of a group or one of its poses here, after a finding if it is another one."""
