@@ -73,16 +73,25 @@ function followConfig(robot: Robot, stop: Stop, open: () => void): void {
   let isOutdated = false;
   let behindDoor: Node[] | null = null;
   const isUnsaved = () => !window.dispatchEvent(new Event("beforeunload", { cancelable: true }));
+  const isAnswered = () => ["free", "stopped"].includes(stop.state.value.is);
   const renew = () => {
     if (!isOutdated || document.querySelector(BUSY)) return;
     if (isUnsaved()) open();
-    else if (["free", "stopped"].includes(stop.state.value.is)) location.reload(); // else somebody waits for its answer
+    else if (isAnswered()) location.reload(); // else somebody waits for its answer
+  };
+  const leave = (other: string) => {
+    link.close(); // what is done here was meant for this robot
+    isOutdated = true;
+    if (!isUnsaved() && isAnswered()) return location.reload();
+    const words = `Robot ${other} answers here now, not ${config.robot}: nothing that you do here reaches a robot. Reload the page for ${other}.`;
+    document.querySelector("header")!.after(h("div", { class: "banner lost" }, icon("unlink"), h("p", { role: "alert" }, words)));
   };
   const look = async () => {
     try {
       const now = await fetchConfig();
       if (behindDoor) document.body.replaceChildren(...behindDoor);
       behindDoor = null;
+      if (now.robot !== config.robot) return leave(now.robot);
       if (JSON.stringify(now) === JSON.stringify(config)) return;
       isOutdated = true;
       Object.assign(config, now);

@@ -12,7 +12,7 @@ from rbxcompose.commands.lookup import ALREADY_UP, UNSAFE, warn_of_lost_log
 from rbxcompose.commands.targets import missing_extras
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan, extent
-from rbxcompose.domains.console.commands.console import show_link
+from rbxcompose.domains.console.commands.console import show_link, why_no_page
 from rbxcompose.domains.devices.serial_ports import serial_ports
 from rbxcompose.domains.devices.udev import look_at, port_findings
 from rbxcompose.domains.programs.runnable import ask_for_real, program_findings
@@ -119,7 +119,10 @@ class _Watch:
                 if not self._options.is_stepped:
                     for instance in self._plan.instances:
                         for page in declared(instance.type, instance.config, ServesPage):
-                            show_link(name, page.port.value, is_lan=page.listen.value == "lan")
+                            if why := why_no_page(RobotFolder.of(name), instance.name):
+                                emit(f"{name} {why}")
+                            else:
+                                show_link(name, page.port.value, is_lan=page.listen.value == "lan")
                 if self._options.is_detached:
                     self._started.let_go()
                     return 0

@@ -60,7 +60,8 @@ def test_a_port_of_somebody_else_is_said_once(taken: socket.socket) -> None:
     server.start()
     server.close()
     assert server.status[0] is Level.ERROR
-    assert server.said.get_nowait() == f"the console is not served: port {port_of(taken)}: Address already in use"
+    wanted = f"has no page: port {port_of(taken)}: Address already in use; write another: 'console: {{port: N}}'"
+    assert server.said.get_nowait() == wanted
     assert server.said.empty()
 
 

@@ -132,6 +132,20 @@ def browse(what: Callable[[Browser], Awaitable[None]], path: str = "/rosbridge",
     asyncio.run(run())
 
 
+def test_no_link_leads_to_the_page_of_another_robot_at_the_same_port(robot: Robot) -> None:
+    second = robot.file.with_name("second.yaml")
+    console_of_second = f"bus: {{port: 7892}}\nconsole: {{port: {PORT}}}\n"
+    second.write_text(f"rbx: 1\nkind: Robot\nname: second\n{console_of_second}", encoding="utf-8")
+    up = robot.do("up", "-d", str(second))
+    link = robot.do("console", "--robot", "second")
+    noted = robot.told("ps", "--robot", "second")["components"]
+    assert robot.do("down", "second").returncode == 0
+    taken = f"has no page: port {PORT}: Address already in use by robot 'turtlebot'"
+    assert (up.returncode, f"second {taken}" in up.stdout, "http://" in up.stdout) == (0, True, False), up.stdout
+    assert (link.returncode, f"'second' {taken}" in link.stderr, link.stdout) == (1, True, ""), link.stderr
+    assert [taken in component.get("note", "") for component in noted if component["name"] == "gateway"] == [True]
+
+
 def test_messages_of_all_topics_are_counted_while_somebody_asks(robot: Robot) -> None:
     async def count(page: Browser) -> None:
         rates: dict[str, float] = {}

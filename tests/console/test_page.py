@@ -322,6 +322,25 @@ def test_an_open_page_follows_what_the_robot_says_about_itself(
     assert page.evaluate("window.isKept")
 
 
+def test_a_page_whose_port_another_robot_has_got_shows_that_one_or_says_so(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    page = open_page()
+    expect(page.locator(".connection")).to_have_text("Connected")
+    gateway.config = {**gateway.config, "robot": "digger"}
+    gateway.drop()
+    expect(page.get_by_role("heading", level=1)).to_have_text("digger")
+    expect(page.locator(".connection")).to_have_text("Connected")
+    page.evaluate("addEventListener('beforeunload', event => event.preventDefault())")  # as an unsaved text does
+    page.evaluate("window.isKept = true")
+    gateway.config = {**gateway.config, "robot": "porter"}
+    gateway.drop()
+    expect(page.get_by_role("alert").filter(has_text="Robot porter answers here now, not digger")).to_be_visible()
+    expect(page.locator(".connection")).to_have_text("Not connected")
+    expect(page.get_by_role("heading", level=1)).to_have_text("digger")
+    assert page.evaluate("window.isKept")
+
+
 def test_whoever_is_not_known_any_more_logs_in_and_loses_nothing(
     open_page: Callable[..., Page], gateway: FakeGateway
 ) -> None:

@@ -12,8 +12,9 @@ import socket
 import sys
 
 from rbxcompose.commands.console import NotDoneError, emit
-from rbxcompose.commands.lookup import REFUSED, add_robot_option, answer_of, find_robot
+from rbxcompose.commands.lookup import REFUSED, add_robot_option, answer_of, find_robot, known_state
 from rbxcompose.domains.console.access import LOCAL_NAMES, Role, own_secret, renew_secret, secret_path, token_of
+from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.requests import DescribeRobot
 
 GROUP = "look"
@@ -42,10 +43,18 @@ def run(arguments: argparse.Namespace) -> int:
     name = folder.path.name
     for component in answer_of(folder, DescribeRobot()):
         for page in component.capabilities.get("ServesPage", ()):
+            if why := why_no_page(folder, component.name):
+                raise NotDoneError(REFUSED.at(None, f"'{name}' {why}"))
             show_link(name, page["port"], is_lan=page["listen"] == "lan", role=Role[arguments.role.upper()])
             return 0
     help_text = "add 'console: {}' to its manifest"
     raise NotDoneError(REFUSED.at(None, f"'{name}' has no console", help=help_text))
+
+
+def why_no_page(folder: RobotFolder, component: str) -> str:
+    """Return why a component does not serve its page, such as a port that is in use; empty if it does."""
+    state = known_state(folder)
+    return next((each.note for each in state.components if each.name == component), "") if state else ""
 
 
 def show_link(robot: str, port: int, *, is_lan: bool, role: Role = Role.OPERATE) -> None:

@@ -49,7 +49,17 @@ from rbxcompose.runtime.control import NoAnswerError, ask_as_data
 from rbxcompose.runtime.folder import FINDINGS, BrokenStateError, RobotFolder, all_folders
 from rbxcompose.runtime.log import NAME as LOG
 from rbxcompose.runtime.process_group.group import stop_key
-from rbxcompose.sdk import Capability, Component, NeedsExtra, Qos, Replaceable, Setting, TaskStatus, component
+from rbxcompose.sdk import (
+    Capability,
+    Component,
+    ComponentNoted,
+    NeedsExtra,
+    Qos,
+    Replaceable,
+    Setting,
+    TaskStatus,
+    component,
+)
 from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal
 from rbxcompose.sdk.capabilities import ServesPage
 from rbxcompose.sdk.ports import BULK
@@ -71,6 +81,7 @@ _PAUSE = 0.1  # [s] between two looks for the robot's own state
 _LOOKS = 100
 _PATIENCE = 5.0  # [s] for the server of an action to be found
 _AGAIN = 2.0  # [s] between two tries to get the port
+_ASKED = 0.5  # [s] for another robot to say what it serves
 _PING = 5.0  # [s] until a client that does not read counts as gone
 _FAREWELL = 1  # [s] for clients to let go
 _GOODBYE = 3.0  # [s] to wait for the thread to end
@@ -180,6 +191,7 @@ class Gateway(Component[GatewayConfig]):
     def configure(self) -> None:
         """Serve nothing yet: the robot must be known from outside first."""
         self.server: GatewayThread | None = None
+        self.noted: str | None = None
         self.at_end.callback(self.close)
 
     def activate(self) -> None:
@@ -187,6 +199,7 @@ class Gateway(Component[GatewayConfig]):
         self.add_diagnostic("clients", self._report)
         if type(self.context.clock) is not SteppedClock:
             self.server = GatewayThread(self.config)
+            self.note(*self.server.status)
 
     def reconfigure(self, old: GatewayConfig) -> None:
         """Show other places, also to who has the page open."""
@@ -210,6 +223,15 @@ class Gateway(Component[GatewayConfig]):
             self.warn(self.server.said.get())
         while self.server is not None and not self.server.done.empty():
             self.info(self.server.done.get())
+        if self.server is not None:
+            self.note(*self.server.status)
+
+    def note(self, level: Level, words: str) -> None:
+        """Let people and their tools see why there is no page, or that there is again."""
+        text = words if level is Level.ERROR else ""
+        if text != self.noted:
+            self.noted = text
+            self.context.notify(ComponentNoted(self.name, text))
 
     def _report(self, now: float) -> TaskStatus:
         if self.server is None:
@@ -266,7 +288,7 @@ class GatewayThread:
         try:
             asyncio.run(self._serve())
         except Exception as error:  # whatever a library raises: the robot goes on without a console
-            self._complain(f"the console has ended: {type(error).__name__}: {error}")
+            self._complain(f"{type(error).__name__}: {error}")
 
     async def _serve(self) -> None:
         self._loop = asyncio.get_running_loop()
@@ -282,7 +304,7 @@ class GatewayThread:
             try:
                 session = GatewaySession(self._config, folder, guest, self.done.put, self.said.put)
             except OSError as error:
-                self._complain(f"the console is not served: {secret_path()}: {error.strerror}")
+                self._complain(f"{secret_path()}: {error.strerror}")
                 return
             whom = "the network" if self._config.listen == "lan" else "this machine"
             self.status = (Level.OK, f"serves {whom} at port {self._config.port}")
@@ -305,7 +327,7 @@ class GatewayThread:
                     continue  # it is just being written
             if await self._is_over(_PAUSE):
                 return None
-        self._complain("the console is not served: the robot's own state cannot be found")
+        self._complain("the robot's own state cannot be found")
         return None
 
     def _at_port(self) -> socket.socket | None:
@@ -318,7 +340,8 @@ class GatewayThread:
         except OSError as error:
             listener.close()
             if self.status[0] is not Level.ERROR:
-                self._complain(f"the console is not served: port {self._config.port}: {error.strerror}")
+                port = self._config.port
+                self._complain(f"port {port}: {error.strerror}{_holder(port)}; write another: 'console: {{port: N}}'")
             return None
         return listener
 
@@ -328,9 +351,24 @@ class GatewayThread:
         await asyncio.wait({self._over}, timeout=seconds)
         return self._over.done()
 
-    def _complain(self, text: str) -> None:
-        self.status = (Level.ERROR, text)
-        self.said.put(text)
+    def _complain(self, why: str) -> None:
+        self.status = (Level.ERROR, f"has no page: {why}")
+        self.said.put(self.status[1])
+
+
+def _holder(port: int) -> str:
+    """Return which robot of this user serves its page at a port, in words; empty if none does."""
+    for folder in all_folders():
+        with suppress(BrokenStateError, NoAnswerError, Refused):
+            state = folder.read_state()
+            serving = (
+                {each.name for each in state.components if each.state == "active" and not each.note} if state else ()
+            )
+            for each in ask_as_data(folder, _DESCRIBE, timeout=_ASKED) if serving else ():
+                pages = each["capabilities"].get("ServesPage", ())
+                if each["name"] in serving and any(page["port"] == port for page in pages):
+                    return f" by robot '{folder.path.name}'"
+    return ""
 
 
 class LiveGraph:
