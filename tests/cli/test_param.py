@@ -214,6 +214,21 @@ def test_live_values_are_saved_at_their_places_reset_and_compared(do: Do, base: 
     assert (do("param", "get", "battery", "runtime").stdout, do("param", "diff").returncode) == ("45 s\n", 0)
 
 
+def test_apply_lists_the_values_that_stay_as_they_were_set_live(do: Do, base: Path) -> None:
+    file = base / "robot.yaml"
+    before = file.read_text()
+    do("param", "set", "battery.runtime=30 s", "second.tolerance=4 cm")
+    line = "battery.runtime stays at 30 s as set live; the files have 45 s: 'rbxcompose param reset battery.runtime'"
+    assert line in do("apply", str(file), "--yes").stdout
+    assert "stays" not in do("apply", str(file), "--dry-run", "--json").stdout
+    file.write_text(before.replace("45 s", "50 s"))
+    shown = do("apply", str(file), "--dry-run").stdout  # which would change one of them
+    assert ("battery.runtime stays" in shown, "second.tolerance stays at 0.04 m" in shown) == (False, True), shown
+    file.write_text(before)
+    assert do("param", "reset").returncode == 0
+    assert "stays" not in do("apply", str(file), "--yes").stdout
+
+
 def test_only_what_a_dry_run_showed_is_saved_if_that_is_wanted(do: Do, base: Path) -> None:
     file = base / "robot.yaml"
     before = file.read_text()

@@ -60,6 +60,11 @@ def run(arguments: argparse.Namespace) -> int:
     robot, plan = without_errors(compiled(path, arguments))
     proposal = Proposal.of(plan, robot, chosen_layers(arguments))
     emit(json.dumps(proposal.data) if arguments.json else proposal.text())
+    if not arguments.json:
+        from rbxcompose.tools.parameters.files import staying  # and the bus, which only people wait for
+
+        for line in staying(robot, plan, proposal.found, proposal.folder):
+            emit(line)
     return carry_out(proposal, arguments)
 
 

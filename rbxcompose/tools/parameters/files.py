@@ -18,9 +18,9 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.units import Dimension
 from rbxcompose.bus.names import resolve
 from rbxcompose.commands.console import NotDoneError, emit
-from rbxcompose.commands.guest import NO_NAME
+from rbxcompose.commands.guest import NO_NAME, Guest
 from rbxcompose.commands.hosts import UNREACHED, Remote, on_all
-from rbxcompose.commands.lookup import NO_ANSWER, answer_of, find_robot, known_state
+from rbxcompose.commands.lookup import NO_ANSWER, answer_of, find_robot, known_state, place_of
 from rbxcompose.commands.messages import to_json
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.composition.value_edits import UnsavableError, edit_of, is_same, merged, value_text
@@ -34,7 +34,8 @@ from rbxcompose.manifest.tree import FILE_BYTES, at
 from rbxcompose.msgs.rbxcompose_parameters import ParameterChange
 from rbxcompose.msgs.rcl_interfaces import GetParameters, Parameter, ParameterValue
 from rbxcompose.runtime.folder import RobotFolder, RobotState
-from rbxcompose.runtime.plan_requests import AdoptSaved, ComparePlan
+from rbxcompose.runtime.plan_requests import AdoptSaved, ComparePlan, PlanComparison
+from rbxcompose.runtime.supervision.plan_change import Fate
 from rbxcompose.sdk.parameters import UnsettableError, changed, dimension_of, from_message, settings, to_message
 from rbxcompose.tools.inspection.origin import origin_of
 from rbxcompose.tools.live_rules import compiled_with
@@ -47,6 +48,7 @@ from rbxcompose.tools.system_runs import layers_of
 NOT_SAVED = kind("RBX9044")
 CHANGED_SINCE = kind("RBX9045")
 _COMPARE = 10.0  # [s] for the supervisor to read a plan
+_ANSWER = 2.0  # [s] for a component to say its values
 NO_FILES = kind("RBX9046")
 _LARGEST = 10_000_000  # [bytes] of a file of parameters
 
@@ -230,6 +232,23 @@ def changed_since_up(live: LiveSettings, folder: RobotFolder, history: Sequence[
         f"{change.component}.{change.name}" for change in history
     }
     return [change for change in found if change.path in kept]
+
+
+def staying(robot: Robot, plan: Plan, found: PlanComparison, folder: RobotFolder) -> Iterator[str]:
+    """Yield which values a change to this plan leaves as somebody has set them, beside those of the files."""
+    replaced = {
+        component.name: [reason.key for reason in component.reasons]
+        for component in found.components
+        if component.fate in (Fate.KEPT, Fate.LIVE)
+    }
+    with suppress(NotDoneError), Guest(place_of(folder)) as guest:  # what does not answer now has other troubles
+        live = LiveSettings(robot, plan, {}, live_configs(ParameterNodes(guest, _ANSWER), robot))
+        for change in live.changes:
+            keys = replaced.get(change.component)
+            if keys is not None and not any(f"{key}.".startswith(f"{change.name}.") for key in keys):
+                stays, written = shown(change, change.live), shown(change, change.written)
+                reset = f"'rbxcompose param reset {change.path}' takes that"
+                yield f"{change.path} stays at {stays} as set live; the files have {written}: {reset}"
 
 
 def _values(history: Iterable[ParameterChange], path: str) -> Iterator[object]:
