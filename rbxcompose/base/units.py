@@ -22,7 +22,7 @@ OTHER_NAMES: Mapping[str, str] = {
         "min": "minute minutes mins",
         "h": "hour hours hr hrs",
         "km/h": "kmh kph kmph",
-        "deg": "degree degrees °",
+        "deg": "degree degrees ° grad",
         "deg/s": "dps",
         "rad": "radian radians",
         "degC": "c °c celsius",

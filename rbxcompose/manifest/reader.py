@@ -225,7 +225,9 @@ class Walk:
                 continue
             entry: tree.Entry | None = tree.Entry(key, value)
             if node.flow_style and not is_cut and self._is_missing(value) and not self._has_colon(key_node):
-                entry = self._without_value(key, value, is_first=not own, is_alone=len(node.value) == 1)
+                entry = self._decimal(own, key) or self._without_value(
+                    key, value, is_first=not own, is_alone=len(node.value) == 1
+                )
             if entry is not None:
                 self._check_comment(entry.value)
                 if (first := own.setdefault(entry.key.text, entry)) is not entry:
@@ -233,6 +235,20 @@ class Walk:
                     message = f"the key '{plain(entry.key.text, 60)}' is written twice"
                     self.add(TWICE.at(entry.key.span, message, label="the second", related=related))
         return tree.MappingNode({**merged, **own}, span_of(node, self.file), tag), size + len(merged), height + 1
+
+    def _decimal(self, own: dict[str, tree.Entry], key: tree.ScalarNode) -> tree.Entry | None:
+        """Report a decimal comma, which ends the value before it; take that entry out, and return what was meant."""
+        last = own[next(reversed(own))] if own else None
+        if last is None or not isinstance(value := last.value, tree.ScalarNode) or not (value.plain and key.plain):
+            return None
+        is_next = (value.span.end_line, value.span.end_column + 1) == (key.span.line, key.span.column)
+        if not is_next or "." in value.text or not (value.text[-1:].isdigit() and key.text[:1].isdigit()):
+            return None
+        span = value.span._replace(end_line=key.span.end_line, end_column=key.span.end_column)
+        meant = replace(value, text=f"{value.text}.{key.text}", span=span)
+        self.add(QUOTES_NEEDED.at(span, "inside {} a comma ends a number", help=f"write '{plain(meant.text, 60)}'"))
+        own.popitem()
+        return tree.Entry(last.key, meant)
 
     def _without_value(
         self, key: tree.ScalarNode, value: tree.TreeNode, *, is_first: bool, is_alone: bool

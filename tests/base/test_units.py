@@ -80,6 +80,7 @@ def test_what_is_no_quantity_is_refused(text: str) -> None:
         ("3 seconds", "s"),
         ("30 percent", "%"),
         ("90 °", "deg"),
+        ("90 grad", "deg"),
         ("20 C", "degC"),
         ("1 mbit/s", "Mbit/s"),
         ("3 m / s", "m/s"),

@@ -136,6 +136,26 @@ def test_what_needs_quotes_is_marked_to_its_end() -> None:
     assert finding.label == "put quotes around this"
 
 
+def test_a_number_with_a_decimal_comma_inside_brackets_is_read_as_it_was_meant() -> None:
+    for cut, (column, meant), others in (
+        ("a: {b: 0,5 m/s, c: 1}", (8, "0.5 m/s"), {"c": "1"}),
+        ("a: {c: 1, b: -1,5}", (14, "-1.5"), {"c": "1"}),
+    ):
+        node, (finding,) = read_text(f"{cut}\n", "robot.yaml")
+        assert isinstance(node, MappingNode)
+        assert isinstance(inner := node.get("a"), MappingNode)
+        assert {key: value.text for key in inner.entries if isinstance(value := inner.get(key), ScalarNode)} == {
+            **others,
+            "b": meant,
+        }
+        assert (finding.code, finding.message) == ("RBX1101", "inside {} a comma ends a number")
+        assert (finding.help, finding.span) == (
+            f"write '{meant}'",
+            Span("robot.yaml", 1, column, 1, column + len(meant)),
+        )
+    assert only("a: {b: 1, 5 m}\n").help.startswith("inside {} and [] a comma ends a text")
+
+
 def test_a_comment_with_a_space_is_a_comment() -> None:
     read("a: 45 s   # so short that one patrol needs the dock\nb: {k: 1}  #fine\n")
 
