@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 from rbxcompose.manifest.registry import sections
 from rbxcompose.missions.program.registry import kinds, modifiers
-from tests.docs.examples import ROOT
+from tests.docs.examples import ROOT, checked, page_blocks
 
 PAGE = (ROOT / "docs/cheat_sheet.md").read_text(encoding="utf-8")
 SHOWN = "\n".join(re.findall(r"^```yaml.*?^```$", PAGE, re.MULTILINE | re.DOTALL))
@@ -26,3 +27,13 @@ def test_it_names_every_modifier() -> None:
 
 def test_it_takes_two_pages() -> None:
     assert len(PAGE.split()) < 1300, "make docs/cheat_sheet.md shorter, such as by shorter comments in its examples"
+
+
+def test_a_whole_robot_on_it_has_no_warnings(tmp_path: Path) -> None:
+    blocks = [
+        block for block in page_blocks("yaml") if (block.page, "robot" in block.words) == ("cheat_sheet.md", False)
+    ]
+    robots = [block for block in blocks if "\nkind: Robot\n" in block.text]
+    assert robots
+    for block in robots:
+        assert checked(block, tmp_path / str(block.line)).codes == [], str(block)
