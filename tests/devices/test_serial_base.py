@@ -56,8 +56,8 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 class Board:
     """The compiled core, stepped; what it sends is at most that of one step."""
 
-    def __init__(self, program: Path) -> None:
-        self._process = subprocess.Popen([program], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    def __init__(self, program: Path, fault: str = "") -> None:
+        self._process = subprocess.Popen([program, fault], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def step(self, milliseconds: int, data: bytes) -> bytes:
         """Give it bytes at a time, and return what it sends then."""
@@ -75,11 +75,11 @@ class Board:
 class Wired:
     """A base on the bench with a board; `cut` changes what passes from the board to the base."""
 
-    def __init__(self, device: PluggedDevice, program: Path, **config: object) -> None:
+    def __init__(self, device: PluggedDevice, program: Path, fault: str = "", **config: object) -> None:
         settings = {"port": str(device.path), "ticks_per_metre": 4000, "wheel_distance": "20 cm", **config}
         self.device, self.program = device, program
         self.bench = Bench(instance("base", "serial_base", settings))
-        self.board = Board(program)
+        self.board = Board(program, fault)
         self.odom = self.bench.collect("odom", Odometry)
         self.battery = self.bench.collect("battery", BatteryState)
         self.statuses: list[DiagnosticStatus] = self.bench.statuses("base")
@@ -125,9 +125,9 @@ class Wired:
 
 
 @contextmanager
-def wired(folder: Path, program: Path, **config: object) -> Iterator[Wired]:
+def wired(folder: Path, program: Path, fault: str = "", **config: object) -> Iterator[Wired]:
     with plugged_in(folder / "port") as device:
-        found = Wired(device, program, **config)
+        found = Wired(device, program, fault, **config)
         try:
             found.run(1.0)
             yield found
@@ -306,6 +306,55 @@ def test_the_board_as_a_process_at_a_terminal_answers_within_its_time(tmp_path: 
             line.close()
             process.kill()
             process.wait(timeout=10)
+
+
+@needs_compiler
+@pytest.mark.parametrize("is_mute", [False, True], ids=["our board", "a board without flags"])
+@pytest.mark.parametrize(("fault", "words"), [("swapped", "turns the wrong way"), ("dead", "stands")])
+def test_a_wheel_that_does_not_do_what_it_is_commanded_rests_the_base(
+    tmp_path: Path, program: Path, fault: str, words: str, *, is_mute: bool
+) -> None:
+    with wired(tmp_path, program, fault + " mute" * is_mute) as robot:
+        robot.speed = (0.1, 0.0)
+        robot.run(0.7 if fault == "swapped" else 1.2)
+        assert robot.base.is_at_rest
+        robot.run(2.0)
+        place = robot.place
+        robot.run(3.0)
+        assert robot.place == place
+        assert robot.status == (2, f"the left wheel {words}: the base rests")
+
+
+@needs_compiler
+def test_a_base_that_rests_for_a_wheel_tries_again_after_a_pause_of_commands(tmp_path: Path, program: Path) -> None:
+    with wired(tmp_path, program, "dead") as robot:
+        robot.speed = (0.3, 0.0)
+        robot.run(3.0)
+        assert robot.status[0] == 2
+        robot.speed = (0.0, 0.0)
+        robot.run(1.2)
+        assert robot.base.last is not None
+        assert not robot.base.last.has_failed
+        assert robot.status == (2, "the left wheel stands: the base rests")
+        robot.speed = (0.3, 0.0)
+        robot.run(0.2)
+        assert not robot.base.is_at_rest
+        robot.run(1.0)
+        assert robot.base.is_at_rest
+
+
+@needs_compiler
+def test_a_board_whose_wheel_is_swapped_turns_no_motor_until_it_starts_again(tmp_path: Path, program: Path) -> None:
+    with wired(tmp_path, program, "swapped") as robot:
+        robot.speed = (0.1, 0.0)
+        robot.run(3.0)
+        robot.speed = None
+        robot.run(1.2)
+        place = robot.place
+        robot.speed = (0.1, 0.0)
+        robot.run(2.0)
+        assert robot.place == place
+        assert robot.status == (2, "a motor has failed: the base rests")
 
 
 def test_a_board_of_another_version_is_not_driven() -> None:

@@ -14,6 +14,10 @@ Both ends repeat theirs, which is the heartbeat: the host `drive` 50 times a sec
 was greeted. So the host listens first and greets then: a board that has started meanwhile says that it was not greeted.
 The board drives only after a hello of its own version, and stops its motors when no `drive` has come for its silence.
 Flags: 1 it was greeted, 2 a motor has failed, 4 it stands because of silence.
+
+A board turns its motors off when one has failed. With the sketch that is so until the host wants both wheels to rest,
+if a wheel has stood at full power for 0.3 s, and until the board starts again, if one has turned the wrong way for
+0.3 s without slowing down.
 """
 
 from __future__ import annotations

@@ -90,6 +90,11 @@ class WheelGeometry:
         left, right = wheels.left * self.metres_per_unit, wheels.right * self.metres_per_unit
         return Velocity2((left + right) / 2.0, (right - left) / self.wheel_distance)
 
+    def turned(self, new: float, old: float) -> float:
+        """Return how far a wheel has turned from one position to another [units], the shorter way round."""
+        counts = self.counts
+        return new - old if counts is None else (new - old + counts / 2) % counts - counts / 2
+
 
 @dataclass(frozen=True, slots=True)
 class WheelSpeeds:
@@ -346,7 +351,8 @@ class WheelOdometry:
             self._past.append((now, *self._ways))
             return None
         dt = now - before[2]
-        wheels = WheelSpeeds(self._difference(left, before[0]) / dt, self._difference(right, before[1]) / dt)
+        turned = self.geometry.turned
+        wheels = WheelSpeeds(turned(left, before[0]) / dt, turned(right, before[1]) / dt)
         way = max(abs(wheels.left), abs(wheels.right)) * self.geometry.metres_per_unit * dt
         furthest, self._furthest = self._furthest, math.inf
         if way > furthest:
@@ -359,10 +365,6 @@ class WheelOdometry:
         self._move(wheels, dt)
         self._average(now)
         return None
-
-    def _difference(self, new: float, old: float) -> float:
-        counts = self.geometry.counts
-        return new - old if counts is None else (new - old + counts / 2) % counts - counts / 2
 
     def _move(self, wheels: WheelSpeeds, dt: float) -> None:
         velocity, scale = self.geometry.velocity(wheels), self.geometry.metres_per_unit * dt

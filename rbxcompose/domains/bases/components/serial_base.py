@@ -10,11 +10,12 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.config import BitRate
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import Velocity2
+from rbxcompose.base.geometry import AT_REST, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Command
 from rbxcompose.domains.bases import wheel_board
 from rbxcompose.domains.bases.driving import drives
+from rbxcompose.domains.bases.wheel_watch import WheelWatch
 from rbxcompose.domains.bases.wheels import (
     BaseLimits,
     OdometryKeeper,
@@ -39,6 +40,7 @@ from rbxcompose.msgs.tf2_msgs import TFMessage
 ODOM, BASE = "odom", "base_footprint"
 AVERAGED = 0.1  # [s], over which velocities are averaged
 JUMP = 2.0  # times the largest speed of a wheel
+PAUSE = 1.0  # [s] without a command to move, after which the next one is tried in spite of a failure
 
 
 class SerialBaseConfig(SerialConfig):
@@ -78,6 +80,7 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
 
     The board has the sketch `wheel_board`, or another one of its protocol. It stops its motors by itself when nothing
     comes from here for 0.2 s. While nothing comes from it for as long, the base rests, and begins again from rest.
+    It also rests when a motor has failed or a wheel does not do what it is commanded, until commands pause for 1 s.
     Odometry goes on over a restart of the process, by what the wheels have turned meanwhile, and over one of the board.
 
     Example:
@@ -124,7 +127,10 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
         self.has_begun = False  # the board has started since this component has
         self.last: wheel_board.BoardState | None = None
         self.was_alive = False
-        self.refused = ""
+        self.refused = self.failure = ""
+        self.moved_at = -math.inf  # the last command to move
+        self.said = WheelSpeeds()
+        self.watches = {"left": WheelWatch(), "right": WheelWatch()}
         self.at_end.callback(self.stand)
 
     def start(self) -> None:
@@ -151,7 +157,12 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
 
     def on_cmd_vel(self, message: Twist) -> None:
         """Take a command."""
-        self.refused = self.drive.command(Velocity2(message.linear.x, message.angular.z), self.now) or ""
+        velocity = Velocity2(message.linear.x, message.angular.z)
+        if velocity != AT_REST:
+            if self.now - self.moved_at > PAUSE:
+                self.failure = ""
+            self.moved_at = self.now
+        self.refused = self.drive.command(velocity, self.now) or ""
 
     def begin(self) -> None:
         """Greet the board: it was plugged in, or the port was opened."""
@@ -162,6 +173,7 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
         """Publish what the board says."""
         for state in self.link.feed(data, self.now):
             self.understood()
+            self.watch(state)
             self.last = state
             if state.begins:
                 if self.keeper.kept is not None:
@@ -174,6 +186,19 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
                 self.publish(state)
                 if news := self.keeper.news(is_at_rest=self.drive.at_rest):
                     self.context.repeat([RecallOdometry(news)])
+
+    def watch(self, state: wheel_board.BoardState) -> None:
+        """Notice a motor that has failed, and a wheel that does not do what it is commanded."""
+        before = state if self.last is None or state.begins else self.last
+        faults, tick = list[str](), self.geometry.metres_per_unit
+        for side, watch in self.watches.items():
+            speed, new, old = (getattr(each, side) for each in (self.said, state, before))
+            watch.update(speed * tick, self.geometry.turned(new, old) * tick, self.now)
+            if fault := watch.fault(is_urgent=state.has_failed):
+                faults.append(f"the {side} wheel {fault}")
+        if (faults or state.has_failed) and not self.failure:
+            self.failure = f"{faults[0] if faults else 'a motor has failed'}: the base rests"
+            self.warn(self.failure)
 
     def publish(self, state: wheel_board.BoardState) -> None:
         """Publish the odometry and the battery."""
@@ -193,7 +218,7 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
         if is_alive != self.was_alive:
             self.was_alive = is_alive
             self.changed(is_alive=is_alive)
-        if not is_alive or (self.last is not None and self.last.has_failed):
+        if not is_alive or self.failure:
             self.drive.rest()
         speeds = self.drive.step(self.now, dt)
         if self.line.is_open:
@@ -212,6 +237,7 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
 
     def say(self, speeds: WheelSpeeds) -> None:
         """Send the speeds of the wheels; a port that takes nothing is opened again."""
+        self.said = speeds
         try:
             if not self.line.write(self.link.speak(self.now, speeds)):
                 self.line.close()
@@ -233,8 +259,8 @@ class SerialBase(SerialSensor[SerialBaseConfig]):
 
     def state(self) -> tuple[Level, str]:
         """Return how the board is."""
-        if self.last is not None and self.last.has_failed:
-            return Level.ERROR, "a motor has failed: the base rests"
+        if self.failure:
+            return Level.ERROR, self.failure
         if self.refused:
             return Level.WARN, f"a command was refused: {self.refused}"
         return Level.OK, "drives" if not self.drive.at_rest else "rests"

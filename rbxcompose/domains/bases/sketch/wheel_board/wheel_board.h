@@ -13,6 +13,7 @@ constexpr uint8_t START = 0x7E;
 constexpr uint8_t LONGEST = 32;           // bytes of a payload
 constexpr size_t FRAME = LONGEST + 6;     // bytes of the longest frame
 constexpr uint16_t SILENCE = 200;         // [ms] without a `drive`, after which the motors stop
+constexpr float PATIENCE = 0.3f;          // [s] for which a wheel may turn the wrong way, or stand at full power
 constexpr uint16_t CRC_BEGIN = 0xFFFF;
 
 inline uint16_t crc16(uint16_t crc, uint8_t byte) {
@@ -98,11 +99,14 @@ class Board {
     if (is_driven_ && now - heard_ > SILENCE) {
       is_driven_ = false;  // and not again when the clock has gone round
     }
-    return is_driven_ && !has_failed_ ? speeds_ : Speeds();
+    return is_driven_ && !has_failed_ && !is_blocked_ ? speeds_ : Speeds();
   }
 
   // Stops the motors for good: one of them has failed. Only a restart of the board forgets that.
   void fail() { has_failed_ = true; }
+
+  // Stops the motors until the host wants both wheels to rest: one of them is blocked.
+  void block() { is_blocked_ = true; }
 
   // Writes a hello into `out`, if the host wants one; returns how many bytes it has.
   size_t hello(uint8_t* out) {
@@ -123,7 +127,8 @@ class Board {
     }
     payload[8] = static_cast<uint8_t>(millivolts & 0xFF);
     payload[9] = static_cast<uint8_t>(millivolts >> 8);
-    payload[10] = (is_greeted_ ? GREETED : 0) | (has_failed_ ? FAILED : 0) | (is_driven_ ? 0 : STANDS);
+    const bool is_failed = has_failed_ || is_blocked_;
+    payload[10] = (is_greeted_ ? GREETED : 0) | (is_failed ? FAILED : 0) | (is_driven_ ? 0 : STANDS);
     return frame(out, BOARD_STATE, payload, sizeof(payload));
   }
 
@@ -139,6 +144,7 @@ class Board {
       speeds_.right = number(payload + 2);
       heard_ = now;
       is_driven_ = true;
+      is_blocked_ = is_blocked_ && (speeds_.left != 0 || speeds_.right != 0);
     }
   }
 
@@ -167,7 +173,7 @@ class Board {
   Speeds speeds_;
   uint32_t heard_ = 0;
   uint8_t number_ = 0;
-  bool is_greeted_ = false, is_driven_ = false, has_failed_ = false, wants_hello_ = false;
+  bool is_greeted_ = false, is_driven_ = false, has_failed_ = false, is_blocked_ = false, wants_hello_ = false;
 };
 
 // A PI controller of one wheel, from speeds [ticks/s] to a PWM of -255 to 255; at 0 the motor is off.
@@ -176,24 +182,43 @@ class WheelControl {
   WheelControl(float feed, float proportional, float integral) : feed_(feed), p_(proportional), i_(integral) {}
 
   int16_t update(int16_t wanted, int32_t ticks, float dt) {
-    const float measured = is_known_ && dt > 0.0f ? static_cast<float>(ticks - ticks_) / dt : 0.0f;
+    const int32_t turned = is_known_ ? ticks - ticks_ : 0;
+    const float measured = dt > 0.0f ? static_cast<float>(turned) / dt : 0.0f;
     ticks_ = ticks;
     is_known_ = true;
     if (wanted == 0) {
-      sum_ = 0.0f;
+      sum_ = against_ = blocked_ = 0.0f;
       return 0;
     }
     const float error = static_cast<float>(wanted) - measured;
     sum_ = within(sum_ + i_ * error * dt);
-    return static_cast<int16_t>(within(feed_ * static_cast<float>(wanted) + p_ * error + sum_));
+    const int16_t power = static_cast<int16_t>(within(feed_ * static_cast<float>(wanted) + p_ * error + sum_));
+    watch(wanted > 0 ? turned : -turned, power == 255 || power == -255, dt);
+    return power;
   }
+
+  // Whether it turns the wrong way: its encoder or its motor is swapped.
+  bool is_swapped() const { return against_ > PATIENCE; }
+
+  // Whether it stands at full power: it is held, or its motor or its encoder is dead.
+  bool is_blocked() const { return blocked_ > PATIENCE; }
 
  private:
   static float within(float value) { return value > 255.0f ? 255.0f : value < -255.0f ? -255.0f : value; }
 
+  // Takes how far it has turned in the wanted direction; one that slows down was wanted to turn the other way before.
+  void watch(int32_t turned, bool is_full, float dt) {
+    blocked_ = turned == 0 && is_full ? blocked_ + dt : 0.0f;
+    if (turned > 0 || (turned < 0 && (against_ == 0.0f || turned > slowest_))) {
+      slowest_ = turned;
+      against_ = 0.0f;
+    }
+    against_ += turned < 0 ? dt : 0.0f;
+  }
+
   float feed_, p_, i_;
-  float sum_ = 0.0f;
-  int32_t ticks_ = 0;
+  float sum_ = 0.0f, against_ = 0.0f, blocked_ = 0.0f;  // the last two: for how long [s]
+  int32_t ticks_ = 0, slowest_ = 0;
   bool is_known_ = false;
 };
 

@@ -60,6 +60,12 @@ void loop() {
   const wheel_board::Speeds wanted = board.wanted(now);
   turn(LEFT, left_control.update(wanted.left, left, dt));
   turn(RIGHT, right_control.update(wanted.right, right, dt));
+  if (left_control.is_swapped() || right_control.is_swapped()) {
+    board.fail();
+  }
+  if (left_control.is_blocked() || right_control.is_blocked()) {
+    board.block();
+  }
   uint8_t out[wheel_board::FRAME];
   Serial.write(out, board.hello(out));
   const float steps = analogRead(BATTERY);
