@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 
 from rbxcompose.base.findings import Report
@@ -20,7 +20,7 @@ from rbxcompose.runtime.folder import RobotFolder, RunOptions, mark_start
 from rbxcompose.runtime.log import NAME, Follower, Record, StoryWriter, summary
 from rbxcompose.runtime.supervision import launch
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED
-from rbxcompose.sdk.capabilities import RunsContainer, RunsProgram, RunsRosNode, ServesPage
+from rbxcompose.sdk.capabilities import OpensPort, RunsContainer, RunsProgram, RunsRosNode, ServesPage
 from rbxcompose.sdk.registry import declared
 from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import LiveReload
@@ -42,6 +42,8 @@ def run_plan(
     Its live settings keep `rules`. Meanwhile, `reload` follows its files. `findings` of `check` [JSON] are kept for its
     page. If `others_follow`, this process is about to start other robots after it.
     """
+    if not options.layers.real and (devices := ", ".join(_devices(plan))):
+        sys.stderr.write(f"note: without --real, too, these use real devices: {devices}\n")
     plan = plan.in_one_process() if options.is_stepped else plan
     started = launch.start_supervisor(plan, options, rules)
     return _Watch(plan, options, started, reload, findings, others_follow=others_follow).run()
@@ -148,8 +150,19 @@ def machine_findings(robot: Robot) -> Report:
     return report
 
 
-def real_time_only(robot: Robot) -> list[str]:
-    """Return the components that run programs of others, for which robot time cannot be stepped."""
-    return [
-        component.name for what in (RunsProgram, RunsContainer, RunsRosNode) for component, _ in robot.declared(what)
-    ]
+def _devices(plan: Plan) -> Iterator[str]:
+    """Yield the components that open serial ports, each with its port."""
+    for instance in plan.instances:
+        for opens in declared(instance.type, instance.config, OpensPort):
+            yield f"'{instance.name}' ({opens.name})"
+
+
+def real_time_only(robot: Robot) -> str:
+    """Return which components keep real time and why, so that robot time cannot be stepped; empty if none does."""
+    for kinds, does, do in (
+        ((RunsProgram, RunsContainer, RunsRosNode), "runs a program, which keeps", "run programs, which keep"),
+        ((OpensPort,), "uses a real device, which keeps", "use real devices, which keep"),
+    ):
+        if names := [f"'{component.name}'" for what in kinds for component, _ in robot.declared(what)]:
+            return f"{', '.join(names)} {does if len(names) == 1 else do} real time"
+    return ""

@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.compiler.plan.model import Plan
-from rbxcompose.runtime.folder import RunOptions
+from rbxcompose.runtime.folder import ChosenLayers, RunOptions
 from rbxcompose.runtime.supervision import launch
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED
+from rbxcompose.testing import instance
 from rbxcompose.tools.commands import up
 from rbxcompose.tools.run_view import run_plan
 from tests.conftest import ROOT
@@ -103,16 +104,49 @@ def test_files_are_watched_in_the_foreground_and_in_real_time_only(
     assert named in capsys.readouterr().err
 
 
+class Ended:
+    """A robot that went down before it was up."""
+
+    def wait_for_report(self, seconds: float) -> launch.LaunchReport:
+        return launch.RunEnded(0, "asked to go down", 0.2)
+
+    def wait(self) -> int:
+        return 0
+
+
+WIRED = """\
+rbx: 1
+kind: Robot
+name: wired
+components:
+  base: {type: serial_base, port: /dev/board, ticks_per_metre: 4000, wheel_distance: 20 cm}
+"""
+
+
+def test_a_type_that_is_a_real_device_keeps_its_own_time_without_real_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(WIRED, encoding="utf-8")
+    assert up.run(parse_robot(str(robot), "--rate", "max", "--for", "1s")) == 2
+    assert "'base' uses a real device, which keeps real time, so --rate" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("real", [False, True])
+def test_real_devices_without_real_are_named_before_the_start(
+    *, real: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(launch, "start_supervisor", lambda *given: Ended())
+    settings = {"port": "/dev/board", "ticks_per_metre": 4000, "wheel_distance": "20 cm"}
+    plan = Plan("one", "one.yaml", (instance("base", "serial_base", settings),))
+    assert run_plan(plan, RunOptions(layers=ChosenLayers(real=real))) == 0
+    words = "note: without --real, too, these use real devices: 'base' (/dev/board)\n"
+    assert capsys.readouterr().err == ("" if real else words)
+
+
 @pytest.mark.parametrize(("is_detached", "exit_code"), [(True, INTERRUPTED), (False, 0)])
 def test_who_waits_for_a_robot_to_be_up_learns_that_it_went_down_instead(
     is_detached: bool, exit_code: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    class Ended:
-        def wait_for_report(self, seconds: float) -> launch.LaunchReport:
-            return launch.RunEnded(0, "asked to go down", 0.2)
-
-        def wait(self) -> int:
-            return 0
-
     monkeypatch.setattr(launch, "start_supervisor", lambda *given: Ended())
     assert run_plan(Plan("one", "one.yaml", ()), RunOptions(is_detached=is_detached)) == exit_code

@@ -63,10 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
     robot, plan = targets.without_errors(compilation)
     if plan.follows_clock and arguments.rate.is_stepped:
         return misused("up", "the robot follows /clock ('bus.clock'), so --rate cannot be given with it")
-    if arguments.rate.is_stepped and (names := real_time_only(robot)):
-        runs = "runs a program, which keeps" if len(names) == 1 else "run programs, which keep"
-        words = ", ".join(f"'{name}'" for name in names)
-        return misused("up", f"{words} {runs} real time, so --rate cannot be given")
+    if arguments.rate.is_stepped and (reason := real_time_only(robot)):
+        return misused("up", f"{reason}, so --rate cannot be given")
     options = _options(arguments)
     if options.record is not None and (problem := _write_problem(options.record)):
         return refuse(UNWRITABLE.at(None, problem))
