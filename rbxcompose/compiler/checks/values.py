@@ -345,20 +345,26 @@ def _compared_with_distance(asked: Asked) -> Iterator[Number]:
                     yield side
 
 
-_GREATEST = {SPEED: (30.0, "m/s", "cm/s"), ANGULAR_SPEED: (15.0, "rad/s", "deg/s")}
+_GREATEST = {
+    SPEED: (30.0, "m/s", ("cm/s",)),
+    ANGULAR_SPEED: (15.0, "rad/s", ("deg/s",)),
+    LENGTH: (3.0, "m", ("mm", "cm")),
+}
 
 
 @check("RBX3513", Severity.WARNING, closed=())
 def plain_number(robot: Robot) -> Iterator[Finding]:
-    """A speed without a unit is faster than robots are."""
+    """A number without a unit is larger than robots have it."""
     for component in robot.components.values():
         speeds: list[Drives | CommandsMotion] = [*component.declared(Drives), *component.declared(CommandsMotion)]
         for speed in speeds if component.is_sound else ():
-            yield from _speed_limits(robot, component, speed.max_speed, SPEED)
-            yield from _speed_limits(robot, component, speed.max_turn_rate, ANGULAR_SPEED)
+            yield from _too_large(robot, component, speed.max_speed, SPEED)
+            yield from _too_large(robot, component, speed.max_turn_rate, ANGULAR_SPEED)
+        for base in component.declared(Drives) if component.is_sound else ():
+            yield from _too_large(robot, component, base.wheel_distance, LENGTH)
 
 
-def _speed_limits(
+def _too_large(
     robot: Robot, component: RobotComponent, setting: Setting[float] | None, dimension: Dimension
 ) -> Iterator[Finding]:
     most, unit, likely = _GREATEST[dimension]
@@ -369,7 +375,7 @@ def _speed_limits(
         yield plain_number.at(
             node.span,
             f"'{setting.field}' of '{component.name}' has no unit, so it is {setting.value:g} {unit}",
-            help=f"write its unit: '{setting.value:g} {likely}'",
+            help="write its unit: " + " or ".join(f"'{setting.value:g} {word}'" for word in likely),
         )
 
 
