@@ -16,7 +16,7 @@ from rbxcompose.domains.devices.components.gamepad import ABS_X, ABS_Y, PadLayou
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.sensor_msgs import Joy
-from rbxcompose.testing import Bench, instance
+from rbxcompose.testing import Bench, check_text, instance
 from tests.devices.made_gamepad import EVENT, LB, XBOX_KEYS, MadeGamepad, let_be_made
 
 MOUSE: dict[str, Any] = {"name": "Logitech Mouse", "axes": {}, "keys": (0x110, 0x111)}
@@ -114,6 +114,18 @@ def test_a_device_that_is_no_gamepad_is_refused_with_what_it_lacks(plug: Plug, t
     assert robot.during(1.0) == []
 
 
+def test_a_pad_without_the_button_cannot_drive_but_publishes_joy(plug: Plug, tmp_path: Path) -> None:
+    plug(2, name="SNES Pad", axes={0: (0, 255), 1: (0, 255)}, keys=(0x130, 0x131))
+    robot = Driven()
+    cannot = f"{tmp_path}/event2 (SNES Pad) cannot drive: it has no button l1; it waits for a gamepad"
+    assert robot.status == cannot
+    helps = [value.value for value in robot.statuses[-1].values if value.key == "help"]
+    assert helps == ["set 'hold', 'forwards' and 'turn' to what it has: a, b, left_x, left_y"]
+    read = Driven(drive=False)
+    assert read.status == "SNES Pad is read"
+    assert read.joy
+
+
 @pytest.mark.parametrize(
     ("device", "level", "words"),
     [
@@ -145,12 +157,25 @@ def test_a_held_button_without_any_event_ends(plug: Plug) -> None:
     pad.press(LB)
     pad.move(ABS_Y, -32768)
     assert robot.during(3.0)[-1] == (0.0, 0.0)
-    assert robot.status == "Microsoft Xbox 360 pad has been silent: release 'l1' and hold it again"
+    assert robot.status == "Microsoft Xbox 360 pad has sent nothing for 1 s ('silence'): release 'l1' and hold it again"
     pad.move(ABS_Y, -32000)
     assert robot.during(1.0) == []
     pad.let_go(LB)
     pad.press(LB)
     assert robot.during(0.2)
+
+
+def test_the_part_says_how_long_a_stick_may_be_steady(tmp_path: Path) -> None:
+    text = """
+rbx: 1
+kind: Robot
+name: cart
+include:
+  base: rbx:parts/base.yaml
+  hand: {part: rbx:parts/gamepad.yaml, with: {silence: 10 s}}
+"""
+    pads = [each.config for each in check_text(text, tmp_path).plan.instances if each.type == "gamepad"]
+    assert [getattr(config, "silence", None) for config in pads] == [10.0]
 
 
 def test_after_a_stop_of_the_robot_the_button_must_be_released(plug: Plug) -> None:

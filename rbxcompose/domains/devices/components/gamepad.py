@@ -22,6 +22,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import AT_REST, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import plain
+from rbxcompose.base.units import TIME, format_quantity
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.sensor_msgs import Joy
 from rbxcompose.msgs.stamps import to_time
@@ -99,9 +100,15 @@ class PadLayout:
         code = usual if ABS_RX in self.axes else other
         return code if code in self.axes else None
 
-    def lacks(self, button: ButtonName, axes: Iterable[AxisName]) -> list[str]:
+    @property
+    def named(self) -> list[str]:
+        """Return the names of what it has."""
+        buttons = [name for name in _BUTTONS if self.button(name) is not None]
+        return [*buttons, *(name for name in _AXES if self.axis(name) is not None)]
+
+    def lacks(self, buttons: Iterable[ButtonName], axes: Iterable[AxisName]) -> list[str]:
         """Return which of these it does not have."""
-        missing = [f"button {button}"] if self.button(button) is None else []
+        missing = [f"button {name}" for name in buttons if self.button(name) is None]
         return missing + [f"axis {name}" for name in dict.fromkeys(axes) if self.axis(name) is None]
 
 
@@ -271,16 +278,16 @@ def listing() -> tuple[tuple[str, int], ...]:
     return tuple(sorted(found, key=lambda item: (len(item[0]), item[0])))
 
 
-def open_gamepad(wanted: str, hold: ButtonName, axes: tuple[AxisName, ...]) -> EventPad:
+def open_gamepad(wanted: str, buttons: tuple[ButtonName, ...], axes: tuple[AxisName, ...]) -> EventPad:
     """Open the gamepad with this path, or part of a name; without either, the first one.
 
     Raises:
-        NoGamepadError: if there is none, or it lacks the button or an axis.
+        NoGamepadError: if there is none, or it lacks a button or an axis.
     """
     is_path = wanted.startswith("/")
     paths = [wanted] if is_path else [path for path, _ in listing()]
     forbidden: list[str] = []
-    others: list[str] = []
+    others: list[tuple[str, str]] = []  # what is wrong with them, and what helps
     for path in paths:
         try:
             device = _opened(path)
@@ -298,16 +305,17 @@ def open_gamepad(wanted: str, hold: ButtonName, axes: tuple[AxisName, ...]) -> E
             layout = _layout(device)
             name = plain(device.name)
             if is_path or wanted.casefold() in name.casefold():
-                if not (missing := layout.lacks(hold, axes)) and layout.is_gamepad:
+                if not (missing := layout.lacks(buttons, axes)) and layout.is_gamepad:
                     return EventPad(device, layout)
-                if wanted:
+                if wanted or layout.is_gamepad:
                     lacking = f"it has no {' and no '.join(missing)}" if missing else "it has no stick and buttons"
-                    others.append(f"{path} ({name}) cannot drive: {lacking}")
+                    has = f"set 'hold', 'forwards' and 'turn' to what it has: {', '.join(layout.named)}"
+                    others.append((f"{path} ({name}) cannot drive: {lacking}", has if layout.is_gamepad else ""))
         except OSError:
-            others.append(f"{path} went while it was opened")
+            others.append((f"{path} went while it was opened", ""))
         device.close()
     if others:
-        raise NoGamepadError(others[0], is_wrong=True)
+        raise NoGamepadError(*others[0], is_wrong=bool(wanted))
     if is_path and forbidden:
         raise NoGamepadError(f"{wanted} may not be read by this user", JOIN_GROUP, is_wrong=True)
     named = f" with '{wanted}' in its name" if wanted and not is_path else ""
@@ -359,7 +367,8 @@ class GamepadConfig(sdk.Config):
     dead_zone: Annotated[sdk.Ratio, sdk.Live()] = Field(0.1, ge=0, le=0.9)
     """The share of an axis around its middle that counts as the middle."""
     silence: Annotated[sdk.Time, sdk.Live()] = Field(3.0, gt=0)
-    """A held button without any event for this long counts as released: a radio may be out of reach."""
+    """A held button without any event for this long counts as released: a radio may be out of reach. A stick that is
+    held quite still sends none, either."""
 
 
 @sdk.component("gamepad")
@@ -440,9 +449,9 @@ class Gamepad(sdk.Component[GamepadConfig]):
         config, there = self.config, listing()
         if there == self.there and not config.device.startswith("/"):  # a link may come later than its device
             return
-        axes = (config.forwards, config.turn) if config.drive else ()
+        buttons, axes = ((config.hold,), (config.forwards, config.turn)) if config.drive else ((), ())
         try:
-            self.pad = open_gamepad(config.device, config.hold, axes)
+            self.pad = open_gamepad(config.device, buttons, axes)
         except NoGamepadError as error:
             self.there = there
             level = Level.ERROR if error.is_wrong else Level.WARN
@@ -494,7 +503,8 @@ class Gamepad(sdk.Component[GamepadConfig]):
         if self.held.is_driving:
             return Level.OK, "drives"
         if self.held.is_silent:
-            return Level.WARN, f"has been silent: release '{hold}' and hold it again"
+            silence = format_quantity(self.config.silence, TIME)
+            return Level.WARN, f"has sent nothing for {silence} ('silence'): release '{hold}' and hold it again"
         if self.held.must_be_released:
             return Level.WARN, f"moves nothing until '{hold}' is released and held again"
         return Level.OK, f"is ready: hold '{hold}' to drive"
