@@ -54,6 +54,13 @@ def test_a_push_by_hand_at_rest_is_fine() -> None:
     _is_fine(lambda now: 0.0, lambda now: 1.5 * math.sin(now))
 
 
+def test_a_wheel_that_still_slows_down_from_its_last_direction_is_fine() -> None:
+    _is_fine(
+        lambda now: -0.5 if now < 2.0 else 0.02,
+        lambda now: -0.5 if now < 2.0 else 0.02 - 0.52 * math.exp((2.0 - now) / 0.4),
+    )
+
+
 def test_a_wheel_that_is_held_at_a_crawl_is_fine() -> None:
     _is_fine(lambda now: 0.04, lambda now: 0.0)
 

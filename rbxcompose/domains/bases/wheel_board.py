@@ -16,7 +16,7 @@ The board drives only after a hello of its own version, and stops its motors whe
 Flags: 1 it was greeted, 2 a motor has failed, 4 it stands because of silence.
 
 A board turns its motors off when one has failed. With the sketch that is so until the host wants both wheels to rest,
-if a wheel has stood at full power for 0.3 s, and until the board starts again, if one has turned the wrong way for
+if a wheel has stood at full power for 0.3 s, and until the board starts again, if one has turned against its power for
 0.3 s without slowing down.
 """
 

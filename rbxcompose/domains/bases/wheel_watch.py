@@ -7,6 +7,7 @@ from collections import deque
 
 SOON, LATER = 0.5, 1.0  # [s] of commands in one direction, after which its speed counts, and that it stands
 BACKWARDS = 0.25, 0.01  # of the commanded way, and [m] besides: further back is the wrong way
+SLOWING = 0.4  # of the way, in the last half of its time: less is a wheel that slows down
 TOO_FAR = 2.0, 0.05  # of the commanded way, and [m] besides: further is too fast
 STANDS = 0.1, 0.05  # of the commanded way, if that is at least so long [m]: less is none
 
@@ -37,7 +38,9 @@ class WheelWatch:
     def fault(self, *, is_urgent: bool) -> str:
         """Return what the wheel does wrong, else an empty text; if it is urgent, by what is known so far."""
         commanded, turned = self._over(SOON, is_urgent=is_urgent)
-        if turned < -BACKWARDS[0] * commanded - BACKWARDS[1]:
+        _, lately = self._over(SOON / 2, is_urgent=is_urgent)
+        slack = 0.0 if is_urgent else BACKWARDS[1]
+        if turned < -BACKWARDS[0] * commanded - slack and lately < SLOWING * turned:
             return "turns the wrong way"
         if turned > TOO_FAR[0] * commanded + TOO_FAR[1]:
             return "is far faster than commanded"

@@ -193,7 +193,7 @@ class WheelControl {
     const float error = static_cast<float>(wanted) - measured;
     sum_ = within(sum_ + i_ * error * dt);
     const int16_t power = static_cast<int16_t>(within(feed_ * static_cast<float>(wanted) + p_ * error + sum_));
-    watch(wanted > 0 ? turned : -turned, power == 255 || power == -255, dt);
+    watch(wanted > 0 ? turned : -turned, wanted > 0 ? power : -power, dt);
     return power;
   }
 
@@ -206,14 +206,14 @@ class WheelControl {
  private:
   static float within(float value) { return value > 255.0f ? 255.0f : value < -255.0f ? -255.0f : value; }
 
-  // Takes how far it has turned in the wanted direction; one that slows down was wanted to turn the other way before.
-  void watch(int32_t turned, bool is_full, float dt) {
-    blocked_ = turned == 0 && is_full ? blocked_ + dt : 0.0f;
-    if (turned > 0 || (turned < 0 && (against_ == 0.0f || turned > slowest_))) {
+  // Takes how far it has turned, and its power, in the wanted direction. One that slows down turned that way before.
+  void watch(int32_t turned, int power, float dt) {
+    blocked_ = turned == 0 && power == 255 ? blocked_ + dt : 0.0f;
+    if (turned > 0 || power <= 0 || (turned < 0 && (against_ == 0.0f || turned > slowest_))) {
       slowest_ = turned;
       against_ = 0.0f;
     }
-    against_ += turned < 0 ? dt : 0.0f;
+    against_ += turned < 0 && power > 0 ? dt : 0.0f;
   }
 
   float feed_, p_, i_;
