@@ -65,8 +65,12 @@ export class LiveChanges {
       words.push(h("span", {}, icon("warning"), ` ${what}: ${found.message}`));
     } else if (!found.is_empty) {
       words.push(h("span", {}, icon("warning"), ` The robot runs without what is saved: ${fates(found)}.`));
-      if (found.why_not) words.push(h("span", { class: "label" }, `Not now: ${found.why_not}.`));
-      words.push(this.#button("play", "Change the running robot\u2026", () => this.#offer(found)));
+      const change = this.#button("play", "Change the running robot\u2026", () => this.#offer(found));
+      if (found.why_not) {
+        disable(found.why_not, change);
+        words.push(h("span", { class: "label" }, `Not now: ${found.why_not}.`), this.#button("undo", "Look again", () => this.look()));
+      }
+      words.push(change);
     }
     this.element.replaceChildren(...words);
   }
@@ -82,7 +86,6 @@ export class LiveChanges {
   }
 
   async #offer(found: LiveDifference): Promise<void> {
-    if (found.why_not) return this.look(); // it may be possible by now
     if ((await askInDialog(this.element, dialogOf(found))) !== "yes") return this.look();
     await this.#do("apply", found.generation, "The robot is changed.", found.generation);
   }

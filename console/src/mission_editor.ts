@@ -50,7 +50,8 @@ export class MissionEditor {
   readonly #robot: Robot;
   readonly #mission: string;
   readonly #done: () => void;
-  readonly #says = h("p", { class: "editor-says", role: "status" });
+  readonly #says = h("p", { class: "editor-says", role: "status" }); // of a save: it stays until something else is done
+  readonly #unchecked = h("p", { class: "editor-says", role: "status" });
   readonly #verdict = h("span", { class: "chip", role: "status" });
   readonly #list = h("ul", { class: "findings", "aria-label": "Mistakes" });
   readonly #tools = h("div", { class: "editor-tools" });
@@ -173,7 +174,7 @@ export class MissionEditor {
   #draw(): void {
     const close = button("cross", "Close", this.#done);
     const bar = h("div", { class: "editor-bar" }, this.#undo, this.#redo, this.#save, this.#try, this.#test, this.#verdict, close);
-    this.element.replaceChildren(bar, this.#file, this.#says, this.#live.element, this.#panes, this.#list, this.#trial, this.#tools);
+    this.element.replaceChildren(bar, this.#file, this.#says, this.#unchecked, this.#live.element, this.#panes, this.#list, this.#trial, this.#tools);
     this.#tools.replaceChildren(this.#palette.element, this.#form.element);
     const views = (Object.keys(VIEWS) as View[]).map((view) => {
       const choose = h("button", { type: "button" }, VIEWS[view]);
@@ -257,6 +258,7 @@ export class MissionEditor {
     this.#version += 1;
     this.#keepDraft();
     this.#mayUndo();
+    if (!this.#isLost && !this.#says.querySelector("button")) setText(this.#says, ""); // an offer stays until it is taken
     clearTimeout(this.#timer);
     this.#timer = setTimeout(() => void this.#ask("look"), PAUSE);
   }
@@ -269,11 +271,12 @@ export class MissionEditor {
     try {
       const looked = await askEditor<Looked>(this.#robot.link, what, this.#mission, { text: this.#text!.text });
       this.#isUnchecked = false;
+      setText(this.#unchecked, "");
       if (version === this.#version && !this.#isClosed) this.#show(looked);
     } catch (error) {
       this.#isUnchecked = true;
       setText(this.#verdict, "Not checked");
-      setText(this.#says, `It could not be checked: ${(error as Error).message}`);
+      setText(this.#unchecked, `It could not be checked: ${(error as Error).message}`);
     }
     this.#isAsking = false;
     clearTimeout(this.#timer);
@@ -302,7 +305,6 @@ export class MissionEditor {
       ...looked.elsewhere.map((found) => rowElsewhere(found)),
     );
     this.#list.hidden = this.#list.childElementCount === 0;
-    if (!this.#isLost && !this.#says.querySelector("button")) setText(this.#says, ""); // an offer stays until it is taken
   }
 
   #row(found: Found): HTMLElement {
@@ -446,6 +448,7 @@ export class MissionEditor {
       const given = { text, hash: this.#hash, dry_run: true };
       const trial = await askEditor<Looked & { diff: string[] }>(this.#robot.link, "save", this.#mission, given);
       if (this.#isClosed) return;
+      setText(this.#says, "");
       if (text === this.#text!.text) this.#show(trial);
       if (await confirmed(this.element, trial, this.#file.textContent ?? "")) await this.#keep(text);
       else setText(this.#says, "Not saved.");

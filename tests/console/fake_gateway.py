@@ -109,6 +109,12 @@ class FakeGateway:
         self.windows[window] = answer
         self.say(f"{WINDOWS}{window}", {"answer": answer})
 
+    def refuse(self, window: str, reason: str) -> None:
+        """Let a query be refused until it is shown."""
+        self.windows.pop(window, None)
+        self.latched[f"{WINDOWS}{window}"] = refused = {"answer": None, "refused": reason}
+        self.say(f"{WINDOWS}{window}", refused)
+
     def say(self, topic: str, message: dict[str, Any]) -> None:
         """Send a message to who subscribed to its topic."""
         for connection, topics in list(self.subscribed.items()):
@@ -239,7 +245,7 @@ class FakeGateway:
                 return {"success": False, "message": str(refusal), "answer": None}
         if service in self.answers:
             values: dict[str, Any] = self.answers[service](args)
-            if values.get("success") and service.endswith(("/save", "/apply", "/revert")) and not args.get("dry_run"):
+            if values.get("success") and service.endswith(("/save", "/new", "/apply", "/revert")) and not args.get("dry_run"):
                 self.show("changes", self.windows.get("changes", 0) + 1)
             return values
         if service in ("/console/stop", "/console/release"):

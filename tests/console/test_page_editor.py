@@ -160,6 +160,38 @@ def test_save_shows_what_changes_writes_it_and_brings_it_to_the_robot_while_it_r
     assert project.live.runs_with == project.text()
 
 
+def test_an_editor_stays_while_the_missions_do_not_answer(
+    open_page: Callable[..., Page], project: Project, gateway: FakeGateway
+) -> None:
+    page = edits(open_page(page_name="mission"))
+    types(page, "2 s", "3")
+    gateway.refuse("mission/ListMissions", "'mission' is not active")
+    expect(page.get_by_text("The missions do not answer now: 'mission' is not active.")).to_be_visible()
+    page.keyboard.type(" s")
+    expect(page.locator(".cm-content")).to_contain_text("wait: 3 s")
+    gateway.show("mission/ListMissions", [])  # the robot has been changed to one without missions
+    expect(page.get_by_text("The running robot does not have this mission.")).to_be_visible()
+    expect(page.get_by_role("textbox", name=TEXT)).to_be_focused()
+    assert gateway.calls("/console/stop") == []
+
+
+def test_what_became_of_a_save_stays_until_the_next_action(
+    open_page: Callable[..., Page], project: Project, gateway: FakeGateway
+) -> None:
+    page = edits(open_page(page_name="mission"))
+    expect(page.get_by_text("No mistakes")).to_be_visible()
+    checks = len(gateway.calls("/console/mission/check"))
+    project.file.rename(project.file.with_suffix(".gone"))
+    types(page, "wait: 2 s", "wait: 3 s")
+    page.get_by_role("button", name="Save").click()
+    expect(page.get_by_text("Not saved: ")).to_be_visible()
+    gateway.calls("/console/mission/check", checks + 1)
+    expect(page.get_by_text("No mistakes")).to_be_visible()
+    expect(page.get_by_text("Not saved: ")).to_be_visible()
+    types(page, "wait: 3 s", "wait: 4 s")
+    expect(page.get_by_text("Not saved: ")).to_be_hidden()
+
+
 @pytest.mark.soak
 def test_a_file_that_others_changed_is_not_overwritten(open_page: Callable[..., Page], project: Project) -> None:
     page = edits(open_page(page_name="mission"))

@@ -197,6 +197,28 @@ def test_a_robot_without_missions_says_where_they_are_written(
     expect(open_page(page_name="mission").get_by_text("This robot has no missions.")).to_be_visible()
 
 
+def test_missions_that_do_not_answer_are_said_to_be_silent_and_what_was_shown_stays(
+    open_page: Callable[..., Page], patrol: FakeGateway
+) -> None:
+    patrol.refuse("mission/ListMissions", "timed out")
+    page = open_page(page_name="mission")
+    silent = page.get_by_text("The missions do not answer now: ")
+    expect(silent).to_contain_text("timed out.")
+    expect(page.get_by_text("in its manifest")).to_have_count(0)
+    patrol.windows["mission/ListTriggers"] = [trigger("nightly", "at 22:00")]
+    patrol.show("mission/ListMissions", listed("running"))
+    step = page.get_by_role("treeitem").filter(has_text="go_to $corner").last
+    expect(step).to_contain_text("running")
+    expect(silent).to_be_hidden()
+    expect(page.get_by_label("Triggers")).to_contain_text("Nightly")
+    for window in ("mission/ListMissions", "mission/ListTriggers", LOOK_AT):
+        patrol.refuse(window, "'mission' is not active")
+    expect(silent).to_contain_text("'mission' is not active.")
+    expect(step).to_contain_text("running")
+    expect(page.get_by_label("Triggers")).to_contain_text("Nightly")
+    assert violations(page) == []
+
+
 def line(path: str, level: int, message: str, *, is_group: bool = False) -> dict[str, Any]:
     plain = {"depth": path.count("/") - 1, "hardware_id": "", "values": [["temperature", "71 °C"]]}
     return {

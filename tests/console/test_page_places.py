@@ -122,9 +122,11 @@ def test_why_the_robot_cannot_be_changed_now_is_told(open_page: Callable[..., Pa
     drag(page, at(page, 0.0, 0.0), at(page, 0.5, 0.0))
     saves(page)
     expect(page.get_by_text("Not now: 'base' moves.")).to_be_visible()
+    expect(page.get_by_role("button", name="Change the running robot")).to_be_disabled()
     project.live.why_not = ""
-    page.get_by_role("button", name="Change the running robot").click()  # it looks again
+    page.get_by_role("button", name="Look again").click()
     expect(page.get_by_text("Not now")).to_be_hidden()
+    expect(page.get_by_role("button", name="Change the running robot")).to_be_enabled()
 
 
 @pytest.mark.soak

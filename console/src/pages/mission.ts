@@ -31,20 +31,21 @@ export const page: Page = {
   open(host, robot) {
     const box = h("div", { class: "mission" }, emptyCard("wait", "Asking for the missions\u2026"));
     host.append(box);
+    const says = h("p", { class: "mission-silent", role: "status" });
     let view: MissionView | null = null;
     const close = robot.link.watch(
       "mission/ListMissions",
       (answer, refused) => {
         const missions = Array.isArray(answer) ? (answer as unknown as Listed[]) : [];
-        if (refused || missions.length === 0) {
-          view?.close();
-          view = null;
-          const why = refused && !/no component/.test(refused) ? refused : "This robot has no missions.";
-          box.replaceChildren(emptyCard("warning", why, h("p", {}, "Missions are written under `missions:` in its manifest.")));
+        const silent = refused && !/no component/.test(refused) ? `The missions do not answer now: ${refused}.` : "";
+        if (!view && missions.length === 0) {
+          const hint = silent ? [] : [h("p", {}, "Missions are written under `missions:` in its manifest.")];
+          box.replaceChildren(emptyCard("warning", silent || "This robot has no missions.", ...hint));
           return;
         }
-        if (!view) box.replaceChildren((view = new MissionView(robot)).element);
-        view.list(missions);
+        if (!view) box.replaceChildren(says, (view = new MissionView(robot)).element);
+        setText(says, silent);
+        if (!silent) view.list(missions); // else what was shown stays, as does an editor
       },
       500,
     );
@@ -106,20 +107,22 @@ class MissionView {
       robot.link.watch(
         "mission/ListBreakpoints",
         (answer) => {
-          this.#breakpoints = Array.isArray(answer) ? (answer as unknown as Breakpoint[]) : [];
+          if (!Array.isArray(answer)) return;
+          this.#breakpoints = answer as unknown as Breakpoint[];
           this.#tree?.mark(this.#breakpoints);
         },
         LOOK,
       ),
       robot.link.watch(
         "mission/ListTriggers",
-        (answer) => this.#triggers.show(Array.isArray(answer) ? (answer as unknown as Trigger[]) : []),
+        (answer) => Array.isArray(answer) && this.#triggers.show(answer as unknown as Trigger[]),
         SELDOM,
       ),
       robot.link.watch(
         "mission/ListSnapshots",
         (answer) => {
-          this.#leftOver = Array.isArray(answer) ? (answer as unknown as LeftOver[]) : [];
+          if (!Array.isArray(answer)) return;
+          this.#leftOver = answer as unknown as LeftOver[];
           this.#headOf = "";
           this.#showHead();
         },
