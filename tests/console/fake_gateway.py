@@ -245,7 +245,11 @@ class FakeGateway:
                 return {"success": False, "message": str(refusal), "answer": None}
         if service in self.answers:
             values: dict[str, Any] = self.answers[service](args)
-            if values.get("success") and service.endswith(("/save", "/new", "/apply", "/revert")) and not args.get("dry_run"):
+            if (
+                values.get("success")
+                and service.endswith(("/save", "/new", "/apply", "/revert"))
+                and not args.get("dry_run")
+            ):
                 self.show("changes", self.windows.get("changes", 0) + 1)
             return values
         if service in ("/console/stop", "/console/release"):

@@ -320,6 +320,25 @@ def test_states_and_interrupts_have_names_and_move_among_themselves() -> None:
     assert "\ninterrupts:\n  low:\n    when: $battery < 20 %\n    do: recharge\n\ndo:\n" in low
 
 
+def test_a_copy_has_no_name_of_another_step() -> None:
+    text = f"{HEAD}do:\n  # first\n  - wait: 1 s\n    name: rest  # a name\n  - publish: {{topic: x, name: rest}}\n"
+    copied = after(text, op="duplicate", path=["do", 0])
+    assert "name: rest  # a name\n  # first\n  - wait: 1 s\n    name: rest_2  # a name\n  - publish" in copied
+    assert "rest  # a name\n  # first\n  - wait: 1 s\n    name: rest_3" in after(copied, op="duplicate", path=["do", 0])
+    assert "x, name: rest}\n  - publish: {topic: x, name: rest}\n" in after(text, op="duplicate", path=["do", 1])
+    body = "do:\n      - {wait: 1 s, name: 'a'}\n      - [{log: x, name: b}, dock]\n    name: whole\n"
+    inside = f"{HEAD}do:\n  - repeat: 2\n    {body}"
+    body = body.replace("'a'", "a_2").replace("name: b", "name: b_2").replace("whole", "whole_2")
+    assert after(inside, op="duplicate", path=["do", 0]) == f"{inside}  - repeat: 2\n    {body}"
+    assert "name: b}, {log: x, name: b_2}, dock]" in after(inside, op="duplicate", path=["do", 0, "do", 1, 0])
+    states = "    a:\n      do:\n        wait: 1 s\n        name: rest\n      next: finished\n"
+    machine = f"{HEAD}machine:\n  start: a\n  states:\n{states}"
+    copied = states.replace("a:", "a_2:", 1).replace("rest", "rest_2")
+    assert after(machine, op="duplicate", path=["machine", "states", "a"]) == machine + copied
+    flow = f"{HEAD}machine:\n  start: a\n  states: {{a: {{do: {{wait: 1 s, name: rest}}, next: finished}}}}\n"
+    assert "a_2: {do: {wait: 1 s, name: rest_2}, next" in after(flow, op="duplicate", path=["machine", "states", "a"])
+
+
 @for_all(
     "operation",
     [

@@ -372,29 +372,45 @@ class _Patch(YamlPatch):
         return self.done(place[:-1] or next(others, ()))
 
     def duplicate(self, operation: Mapping[str, Any]) -> TextPatch:
-        """Write a block once more below itself; a named one gets another name."""
+        """Write a block once more below itself; it and the steps in it get other names where they have one."""
         path = path_of(operation["path"])
         region = None if self.is_block_in_brackets(path) else self.movable(path)
         above, at, container = self.node(path[:-1]), self.index(path), tree_at(self.tree, path[:-1])
         copied = deepcopy(container[1][at])
+        start, end = (self.lines.starts[region[0]], self.lines.starts[region[1]] - 1) if region is not None else (0, 0)
         if isinstance(path[-1], int):
             if region is None:
                 item = above.items[at]
-                self.insert_in_brackets(path[:-1], at + 1, self.lines.text[item.start : item.end], copied)
+                text = self.copied(path, item.start, item.end, copied)
+                self.insert_in_brackets(path[:-1], at + 1, text, copied)
             else:
-                self.paste(region[1], self.text_of(*region[:2]))
+                self.paste(region[1], self.copied(path, start, end, copied))
                 container[1].insert(at + 1, copied)
             return self.done((*path[:-1], at + 1))
         name, (key, value) = _free(str(path[-1]), _keys(above)), above.pairs[at]
         copied[0] = ("scalar", name, SCALAR_MARK)
         if region is None:
-            text = f"{name}{self.lines.text[key.end : max(value.end, key.end)]}"
+            text = f"{name}{self.copied(path, key.end, max(value.end, key.end), copied[1])}"
             self.insert_in_brackets(path[:-1], at + 1, text, copied)
         else:
-            block, start = self.text_of(*region[:2]), self.lines.starts[region[0]]
-            self.paste(region[1], f"{block[: key.start - start]}{name}{block[key.end - start :]}")
+            text = f"{self.lines.text[start : key.start]}{name}{self.copied(path, key.end, end, copied[1])}"
+            self.paste(region[1], text)
             container[1].insert(at + 1, copied)
         return self.done((*path[:-1], name))
+
+    def copied(self, path: Path, start: int, end: int, copy: PlainTree) -> str:
+        """Return a part of the text that holds a block, with other names for its steps, in the tree `copy` as well."""
+        steps = [block for top in self.outline.blocks for block in top.all() if block.kind not in (STATE, INTERRUPT)]
+        names, inside = [step.name for step in steps if step.name], []
+        for step in steps:
+            if step.name and step.path[: len(path)] == path:
+                names.append(_free(step.name, names))
+                inside.append((self.node((*step.path, "name")), names[-1]))
+                put_into(tree_at(copy, step.path[len(path) :]), "name", ("scalar", names[-1], SCALAR_MARK))
+        text = ""
+        for node, name in sorted(inside, key=lambda one: one[0].start):
+            text, start = f"{text}{self.lines.text[start : node.start]}{name}", node.end
+        return f"{text}{self.lines.text[start:end]}"
 
     def order_in_brackets(self, path: Path, index: int) -> TextPatch:
         """Move an entry before the one with `index`."""
