@@ -83,6 +83,31 @@ def test_a_step_has_the_options_of_its_kind_with_values_units_and_names(editor: 
     assert found["save"]["shape"] == "line"
 
 
+def test_a_field_offers_data_of_its_type_and_a_transition_states_and_ends(editor: MissionEditor, project: Path) -> None:
+    text = """rbx: 1
+kind: Mission
+name: fetch
+inputs:
+  pause: {type: time, default: 2 s}
+machine:
+  start: a
+  ends: {lost: failure}
+  states:
+    a:
+      do: {wait: 1 s}
+      next: {success: b, failure: lost}
+    b: {do: {repeat: 2, do: {wait: 1 s}}, next: a}
+"""
+    (project / "missions/fetch.yaml").write_text(text, encoding="utf-8")
+    state = fields(editor, "machine", "states", "b", text=text)
+    assert state["next"]["choices"] == ["a", "b", "lost", "finished", "failed"]
+    assert "$pause" in state["cooldown"]["choices"]
+    assert "$pose" not in state["cooldown"]["choices"]
+    assert {"$pause", "$pose"} <= set(state["only_if"]["choices"])  # where a comparison is written
+    repeat = fields(editor, "machine", "states", "b", "do", text=text)
+    assert not {"$pause", "$pose"} & set(repeat["repeat"]["choices"])
+
+
 def test_an_interrupt_has_a_form(editor: MissionEditor) -> None:
     assert list(fields(editor, "interrupts", "low")) == ["when", "afterwards"]
 

@@ -20,7 +20,7 @@ from rbxcompose.missions.language.grammar import HISTORIES, Takes
 from rbxcompose.missions.language.reader import INTERRUPT_KEYS, KEYS
 from rbxcompose.missions.modifiers.starts import ON_ENTER
 from rbxcompose.missions.program.goals import skill_of, topic_skill
-from rbxcompose.missions.program.parts import DEEDS, MACHINE_KEYS
+from rbxcompose.missions.program.parts import DEEDS, MACHINE_KEYS, STATE
 from rbxcompose.missions.program.program import AFTERWARDS, RESTART, Skill
 from rbxcompose.missions.program.registry import kinds, modifiers
 from rbxcompose.missions.sources import SkillSource, SkillWay
@@ -238,7 +238,14 @@ def _machine() -> Schema:
 
 def _state(anywhere: dict[str, Schema]) -> Schema:
     """Return the schema of a state: its body, its transitions, and the keys that any node may have."""
-    to = {"type": ["string", "object"], "minLength": 1, "minProperties": 1, "additionalProperties": ITEM_NAME}
+    leading = {**ITEM_NAME, NAMES: STATE}
+    to = {
+        "type": ["string", "object"],
+        NAMES: STATE,
+        "minLength": 1,
+        "minProperties": 1,
+        "additionalProperties": leading,
+    }
     own: dict[str, Schema] = {"do": NODE, "machine": MACHINE, "next": to}
     found = {key: {**schema, "description": _STATE[key]} for key, schema in own.items()}
     hooks = schemas_of_keys(modifiers()[ON_ENTER])

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from rbxcompose.base.config import ARGUMENT, COMPONENT, FILE, PLACE, PORT, PREFIXED, RUNNING
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.types import UNKNOWN
+from rbxcompose.base.expressions.types import POSE, TYPES, UNKNOWN, Type
 from rbxcompose.base.findings import Span
 from rbxcompose.base.units import Quantity, format_quantity
 from rbxcompose.compiler.model.robot import Robot
@@ -17,7 +17,7 @@ from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.registry import naming
 from rbxcompose.missions.analysis.examined import base_names, views
-from rbxcompose.missions.engine.world import POSE
+from rbxcompose.missions.engine.world import POSE as POSE_NAME
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.program.program import Program
 from rbxcompose.missions.program.registry import keys_taking, kinds, modifier_keys
@@ -41,15 +41,20 @@ def fills(spot: Spot) -> dict[str, str]:
 
 
 def variables(spot: Spot) -> dict[str, str]:
-    """Return the `$names` readable at a place of a mission, each with its type and origin."""
+    """Return the `$names` readable at a place of a mission, each with its type and origin in words."""
+    return {name: f"{type_.phrase}, {origin}" for name, (type_, origin) in typed_variables(spot).items()}
+
+
+def typed_variables(spot: Spot) -> dict[str, tuple[Type, str]]:
+    """Return the `$names` readable at a place of a mission, each with its type, as last read, and its origin."""
     root, robot = spot.cursor.root, spot.known.robot
-    found = {POSE: "a pose, in `map`"}
+    found = {POSE_NAME: (POSE, "in `map`")}
     if robot is not None:
         for name, source in robot.values.items():
-            found[name] = f"{source.type.phrase}, a value of the robot from {source.topic}"
+            found[name] = source.type, f"a value of the robot from {source.topic}"
     for section, text in (("inputs", "an input"), ("data", "a datum")):
-        found |= {name: f"{phrase}, {text}" for name, phrase in _declared(spot, root, section)}
-    return {**found, **{name: f"{phrase}, the item of a loop" for name, phrase in _items(spot)}}
+        found |= {name: (type_, text) for name, type_ in _declared(spot, root, section)}
+    return {**found, **{name: (type_, "the item of a loop") for name, type_ in _items(spot)}}
 
 
 def variable_span(spot: Spot, name: str) -> Span | None:
@@ -74,26 +79,26 @@ def _program(spot: Spot) -> Program | None:
     return next((mission.program for mission in missions if entries[mission.name].path == path), None)
 
 
-def _declared(spot: Spot, root: tree.MappingNode, section: str) -> Iterator[tuple[str, str]]:
+def _declared(spot: Spot, root: tree.MappingNode, section: str) -> Iterator[tuple[str, Type]]:
     program = _program(spot)
     for name, entry in tree.entries_of(root.get(section)).items():
         known = base_names(program, spot.known.robot.names).get(name) if program and spot.known.robot else None
         word = tree.at(entry.value, ("type",))
-        yield name, known.phrase if known else word.text if isinstance(word, tree.ScalarNode) else UNKNOWN.phrase
+        yield name, known or TYPES.get(word.text if isinstance(word, tree.ScalarNode) else "", UNKNOWN)
 
 
-def _items(spot: Spot) -> Iterator[tuple[str, str]]:
+def _items(spot: Spot) -> Iterator[tuple[str, Type]]:
     """Yield the items of the loops around a place, with their types if the mission could be read."""
     program, robot = _program(spot), spot.known.robot
     types = {}
     if program is not None and robot is not None:
         for view in views(program, robot.names):
             if view.node.parent is not None and (item := program.nodes[view.node.parent].item):
-                types[item] = view.scope.names[item].phrase
+                types[item] = view.scope.names[item]
     for length in range(len(spot.cursor.path) + 1):
         word = tree.at(spot.cursor.root, (*spot.cursor.path[:length], "for"))
         if isinstance(word, tree.ScalarNode):
-            yield word.text, types.get(word.text, UNKNOWN.phrase)
+            yield word.text, types.get(word.text, UNKNOWN)
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,6 +38,7 @@ from rbxcompose.manifest.tree import (
     with_children,
 )
 from rbxcompose.manifest.yaml_nodes import compose
+from rbxcompose.missions.program.parts import ENDS, STATE
 from rbxcompose.missions.program.program import Skill
 from rbxcompose.tools.lsp.project import MISSION, OVERLAY, kind_of
 
@@ -301,6 +302,7 @@ class KnownNames:
             SKILL: self._skills,
             PUBLISHED: lambda: dict(self.robot.names.topics) if self.robot else {},
             SERVICE: lambda: dict(self.robot.services) if self.robot else {},
+            STATE: lambda: self._states(path[: -3 if path[-1] == "next" else -4]),
             INPUT: lambda: self._inputs(str(below_profile(path)[1])),
             PART_ARGUMENT: lambda: self._part_arguments(str(below_profile(path)[1])),
         }
@@ -349,6 +351,11 @@ class KnownNames:
     def _skills(self) -> dict[str, str]:
         found = usable_skills(self.robot) if self.robot else {}
         return {name: f"skill: {source.action or 'in Python'}" for name, source in found.items()}
+
+    def _states(self, machine: KeyPath) -> dict[str, str]:
+        """Return what a transition of a machine can lead to."""
+        found = {section: entries_of(at(self.root, (*machine, section))) for section in ("states", "ends")}
+        return dict.fromkeys(found["states"], "a state") | dict.fromkeys((*found["ends"], *ENDS), "an end")
 
     def _inputs(self, mission: str) -> dict[str, str]:
         found = self.robot.missions.get(mission) if self.robot else None

@@ -14,7 +14,7 @@ from typing import Any
 
 from rbxcompose.base.config import PLACE
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.types import PLACED, STRUCTURED, Type, TypeKind
+from rbxcompose.base.expressions.types import COUNT, PLACED, STRUCTURED, Type, TypeKind, accepts, quantity_of
 from rbxcompose.base.requests import Refused
 from rbxcompose.base.units import Dimension, units_of
 from rbxcompose.compiler.model.robot import Robot
@@ -24,7 +24,7 @@ from rbxcompose.compiler.schema.mission import ITEM_NAME
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions.language.fields import first_line
 from rbxcompose.missions.program.registry import anywhere, kinds
-from rbxcompose.tools.lsp.answers import variables
+from rbxcompose.tools.lsp.answers import typed_variables
 from rbxcompose.tools.lsp.document import SKILL, Cursor, Document, KnownNames, Spot, quick_tree
 from rbxcompose.tools.lsp.project import MISSION
 from rbxcompose.tools.mission_editor.outline import INTERRUPT, STATE, MissionOutline, kind_of, slots_of
@@ -35,6 +35,7 @@ from rbxcompose.tools.mission_files import example_step
 _VALUES = frozenset(("string", "number", "integer", "boolean", "null"))
 _MOST = 200  # names to choose from
 _UNKNOWN = Type(TypeKind.UNKNOWN)
+_OF_ANYTHING = (TypeKind.FLAG, TypeKind.TEXT)  # a comparison, or a text that has values in it
 
 
 def guide_of(robot: Robot, file: FilePath, root: MappingNode) -> tuple[Guide, KnownNames]:
@@ -141,10 +142,14 @@ def _choices(value: GuidedValue, spot: Spot, schema: Mapping[str, Any], of: Type
     of_skill = of.choices if of is not None else ()
     flags = ("true", "false") if of is not None and of.kind is TypeKind.FLAG else ()
     is_name = schema.get("pattern") == ITEM_NAME["pattern"]
-    values = () if only or kind or is_name else (f"${name}" for name in variables(spot))
+    dimension: Dimension | None = of.dimension if of is not None else value.dimension
+    wanted = of or (quantity_of(dimension) if dimension else COUNT if "integer" in schema.get("type", ()) else _UNKNOWN)
+    if wanted.kind in _OF_ANYTHING:
+        wanted = _UNKNOWN
+    known = {} if only or kind or is_name else typed_variables(spot)
+    values = (f"${name}" for name, (given, _) in known.items() if accepts(wanted, given))
     examples = (one for one in value.examples if one.lower() not in value.words)
     found = [*only, *names, *of_skill, *flags, *value.words, *examples, *values]
-    dimension: Dimension | None = of.dimension if of is not None else value.dimension
     default = "" if value.default is None else str(value.default)
     return {
         "choices": list(dict.fromkeys(found))[:_MOST],
