@@ -50,6 +50,16 @@ def test_a_new_mission_gets_its_file_and_its_entry(editor: MissionEditor, projec
     assert robot == ROBOT.replace("missions:\n", "missions:\n  rounds: ../../missions/rounds.yaml\n")
 
 
+def test_a_room_that_cannot_be_reached_is_in_the_log_at_the_end(editor: MissionEditor) -> None:
+    editor.answer({"do": "new", "mission": "rounds", "template": "clean_house"})
+    text = editor.answer({"do": "read", "mission": "rounds"})["text"].replace("5 min", "0.5 s")
+    ran = editor.answer({"do": "try", "mission": "rounds", "text": text})
+    assert ran["outcome"] == "success"
+    story = [line["text"] for line in ran["story"]]
+    assert any("dock is clean" in line for line in story)
+    assert any("Not done are table" in line for line in story)
+
+
 @pytest.mark.parametrize(
     ("name", "template", "why"),
     [
