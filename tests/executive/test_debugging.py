@@ -293,12 +293,22 @@ def test_what_is_listed_of_the_data_can_be_written_back() -> None:
         assert (shown["left"], shown["seen"]) == ("25 %", "hall: 2 m, kitchen: 0.3 m")
 
 
+@pytest.mark.parametrize("text", ["1e30", "99999999999999999999", "1e15"])
+def test_a_count_cannot_be_set_to_what_expressions_refuse(text: str) -> None:
+    robot = Robot(PATROL)
+    robot.start()
+    with pytest.raises(Refused, match="'rounds' must be below 1e15"):
+        robot.mission.handle(SetMissionData({"rounds": text}))
+
+
 def test_data_keep_their_types_within_lists_and_maps_and_places_stay_places() -> None:
     robot = Robot(
         "data: {seen: {hall: 2 m}, stops: [dock], goal: corner, said: [a]}\n"
         "do: [{for: stop, in: $stops, do: {go_to: $stop}}, {go_to: $goal}]"
     )
     robot.start()
+    abouts = {one.name: one.about for one in robot.mission.handle(ListData("test"))}
+    assert (abouts["goal"], abouts["said"]) == ("a place", "a list, each a text")
     for name, text, reason in (
         ("seen", "{hall: 5 s}", "'seen' must be a map, each a length; this is a map, each a time"),
         ("stops", "[3]", "'stops' must be a list, each a text; this is a list, each a count"),

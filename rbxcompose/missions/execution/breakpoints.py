@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
-from rbxcompose.base.expressions.types import FLAG, UNKNOWN, Type
+from rbxcompose.base.expressions.types import FLAG, PLACE, TEXT, UNKNOWN, Type
 from rbxcompose.base.expressions.values import Value, is_named_pose
 from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.requests import Refused
@@ -239,8 +239,7 @@ def changed(run: MissionRun, given: Mapping[str, str]) -> list[ChangeData]:
     Raises:
         NotPossible: if there is no such data, or a value does not have its type.
     """
-    data, places = run.engine.program.data, run.engine.robot.places
-    placed = {source for *_, source in places_taken(run.engine.program, run.engine.robot.skills)}
+    data, places, placed = run.engine.program.data, run.engine.robot.places, _placed(run)
     made = []
     for name, text in given.items():
         if name not in data:
@@ -255,6 +254,11 @@ def changed(run: MissionRun, given: Mapping[str, str]) -> list[ChangeData]:
                 raise NotPossible(clauses(f"there is no place '{word}'", suggest(word, places, "places of this robot")))
         made.append(ChangeData(name, found.value))
     return made
+
+
+def _placed(run: MissionRun) -> set[str]:
+    """Return the data and inputs whose values skills take as places."""
+    return {source for *_, source in places_taken(run.engine.program, run.engine.robot.skills)}
 
 
 def _node(name: str, text: str) -> TreeNode:
@@ -274,10 +278,11 @@ def outcomes_of(program: Program, robot: RobotNames) -> OutcomesByNode:
 
 def data_of(run: MissionRun) -> Iterator[ListedDatum]:
     """Yield the data of a mission, as they would be written to set them to what they are."""
-    values = run.engine.data
+    values, placed = run.engine.data, _placed(run)
     for name, datum in run.engine.program.data.items():
         choices = ("false", "true") if datum.type == FLAG else datum.type.choices
-        yield ListedDatum(name, datum.type.detail, choices, written(values[name], datum.type))
+        shown = PLACE if datum.type == TEXT and name in placed else datum.type
+        yield ListedDatum(name, shown.detail, choices, written(values[name], datum.type))
 
 
 def written(value: Value, wanted: Type, *, within: bool = False) -> str | None:

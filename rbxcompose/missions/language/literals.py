@@ -9,7 +9,7 @@ from rbxcompose.base.expressions.tree import Expression, ExpressionNode, FieldAc
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import DID_YOU_MEAN, Finding, FindingKind, Span, surely_meant
 from rbxcompose.base.printable import plain
-from rbxcompose.base.units import NUMBER, Quantity, UnitError, number_and_unit, parse_quantity, to_si
+from rbxcompose.base.units import MOST, NUMBER, Quantity, UnitError, number_and_unit, parse_quantity, to_si
 from rbxcompose.manifest.tree import (
     Key,
     MappingNode,
@@ -93,6 +93,8 @@ def _scalar(scalar: ScalarNode, wanted: types.Type) -> Value:
         count = value.value if isinstance(value, Quantity) else value
         if isinstance(count, bool) or not isinstance(count, int | float) or count < 0 or count != int(count):
             raise WrongValue("must be a whole number, at least 0", label=label)
+        if count >= MOST:
+            raise WrongValue("must be below 1e15", label=label)
         return float(count)
     if wanted.kind is types.TypeKind.FLAG:
         if not isinstance(value, bool):
