@@ -49,7 +49,8 @@ class FakeGateway:
         self.holder = ""
         self.windows: dict[str, Any] = {"drive": {"holder": ""}, RUNNING: {"stop": None}}
         """What queries answer, by name and fields: `mission/ListMissions`; change them by `show`."""
-        self.answers: dict[str, Callable[[dict[str, Any]], Any]] = {}
+        listed = {"success": True, "message": "", "answer": []}
+        self.answers: dict[str, Callable[[dict[str, Any]], Any]] = {"/console/mission/list": lambda _: listed}
         """What requests answer, by name: `mission.PauseMission`; and services and actions, by name: `/arm/home`."""
         self.latched: dict[str, dict[str, Any]] = {}
         """What a new subscriber of a topic gets at once."""

@@ -488,6 +488,13 @@ def test_a_new_mission_is_made_from_a_template_and_opened(
     expect(control.get_by_role("heading", name="Bring")).to_be_visible()
     expect(control).to_contain_text("The running robot does not have this mission.")
     expect(page.get_by_role("button", name="Start")).to_be_hidden()
+    page.reload()
+    waiting = page.get_by_label("Missions").get_by_role("button", name="Bring")
+    expect(waiting).to_contain_text("saved, not running yet")
+    expect(page.get_by_role("heading", name="Fetch")).to_be_visible()
+    waiting.click()
+    edits(page)
+    expect(control).to_contain_text("The running robot does not have this mission.")
     (listed,) = gateway.windows["mission/ListMissions"]
     gateway.show("mission/ListMissions", [listed, {**listed, "name": "bring"}])
     expect(page.get_by_role("button", name="Start")).to_be_visible()

@@ -1,6 +1,7 @@
 /** Mission: what the robot is doing and why, live; start, pause, resume, cancel and debug. */
 import { byHandText, stoppedText, type Breakpoint, type Datum } from "../debugging";
 import { h, emptyCard, icon, setText, type Icon } from "../dom";
+import { askEditor } from "../edited";
 import { formatName } from "../format";
 import { showLeftOver, type LeftOver } from "../left_over";
 import { LogTail, type LogNews } from "../log_tail";
@@ -72,6 +73,7 @@ class MissionView {
   readonly #noLines = h("p", { role: "status" }, "Reading the log\u2026");
   readonly #closers: (() => void)[] = [];
   #missions: Listed[] = [];
+  #saved: string[] = []; // the names of those in the robot's files
   #chosen = "";
   #look: () => void = () => undefined;
   #seen: Seen | null = null;
@@ -129,6 +131,16 @@ class MissionView {
         SELDOM,
       ),
     );
+    if (robot.config.role === "configure") {
+      this.#closers.push(robot.link.watch("changes", () => void this.#learnSaved()));
+      void this.#learnSaved();
+    }
+  }
+
+  /** Learns which missions are in the robot's files: a new one may wait to be brought to the robot. */
+  async #learnSaved(): Promise<void> {
+    this.#saved = await askEditor<string[]>(this.#robot.link, "list", "").catch(() => this.#saved);
+    if (this.element.isConnected) this.list(this.#missions);
   }
 
   close(): void {
@@ -141,8 +153,9 @@ class MissionView {
     this.#missions = missions;
     const active = missions.find(({ state }) => ACTIVE.has(state));
     const wanted = chosenByHand || (active?.name ?? (this.#chosen || missions[0]?.name));
+    const waiting = this.#saved.filter((saved) => missions.every(({ name }) => name !== saved));
     this.#list.replaceChildren(
-      ...missions.map(({ name, state }) => {
+      ...[...missions, ...waiting.map((name) => ({ name, state: "saved, not running yet" }))].map(({ name, state }) => {
         const button = h("button", { type: "button", "data-state": state }, h("span", {}, formatName(name)), h("small", {}, state));
         button.setAttribute("aria-pressed", String(name === wanted));
         button.onclick = () => {

@@ -56,6 +56,7 @@ EDITS: Mapping[str, tuple[Role, tuple[str, ...]]] = {
     "mission/check": (Role.VIEW, ("mission", "text")),
     "mission/edit": (Role.VIEW, ("mission", "text", "operation")),
     "mission/form": (Role.VIEW, ("mission", "text", "path")),
+    "mission/list": (Role.VIEW, ()),
     "mission/look": (Role.VIEW, ("mission", "text")),
     "mission/new": (Role.CONFIGURE, ("mission", "template")),
     "mission/palette": (Role.VIEW, ("mission",)),

@@ -56,6 +56,11 @@ class MissionEditor:
 
     # What a page asks
 
+    def _list(self, request: Mapping[str, Any]) -> list[str]:
+        """Return the names of the missions that the robot has on disk; not all need be in the one that runs."""
+        self._compile({})
+        return [*self._known.manifest.missions]
+
     def _read(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Return the text of a mission with what is wrong with it."""
         name = request["mission"]
@@ -212,6 +217,7 @@ REQUESTS: Mapping[str, Callable[[MissionEditor, Mapping[str, Any]], Any]] = Mapp
         "check": MissionEditor._check,
         "edit": MissionEditor._edit,
         "form": MissionEditor._form,
+        "list": MissionEditor._list,
         "look": MissionEditor._look,
         "new": MissionEditor._new,
         "palette": MissionEditor._palette,
