@@ -7,6 +7,7 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -21,10 +22,12 @@ from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.bundle import NOT_EXPORTED, Bundle, bundle_of
 from rbxcompose.compiler.systems.certificates import NO_SECURITY, common_name, folder_of, tls_of
 from rbxcompose.compiler.systems.model import PlacedRobot, System
+from rbxcompose.compiler.systems.neighbours import outlines_of
 from rbxcompose.compiler.systems.share import exchange_of, robots_on, share_of
-from rbxcompose.runtime.folder import ChosenLayers, RobotFolder, RunOptions, mark_start
+from rbxcompose.runtime.folder import NO_LAYERS, ChosenLayers, RobotFolder, RunOptions, mark_start
 from rbxcompose.runtime.supervision.plan_change import Fate
 from rbxcompose.runtime.supervision.supervisor import SERVICE_MANAGER
+from rbxcompose.sdk.capabilities import SharesWorld
 from rbxcompose.tools.commands.security import certificate_findings
 from rbxcompose.tools.inspection.plan_text import changes_text
 from rbxcompose.tools.live_rules import LiveRules
@@ -35,6 +38,7 @@ WHICH_HOST = kind("RBX6110")
 OTHER_MACHINE = kind("RBX6111")
 WHICH_ROBOT = kind("RBX6112")
 REFUSED_THERE = kind("RBX6128")
+OTHER_WORLD = kind("RBX6155")
 Key = tuple[str, str]  # host and robot
 _LOOK = 1.0  # [s] between two examinations of a machine that lacks something
 
@@ -118,6 +122,8 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
             f"add --robot {' or --robot '.join(down)}, to start what is down" if down else f"rbxcompose down {path}"
         )
         return refuse(ALREADY_UP.at(None, f"already up: {up}", help=help_text))
+    if (finding := _other_world_beside(path, system, chosen, arguments.host)) is not None:
+        return refuse(finding)
     for robot in chosen:
         plan = planned(system, robot, arguments.host)
         if not _is_ready(partial(_machine_findings, plan, system, robot, arguments.host, path), system.sources):
@@ -183,6 +189,36 @@ def planned(system: System, robot: PlacedRobot, host: str) -> Plan:
         tls = tls_of(folder_of(system.name, os.environ), host, system.security)
     share = replace(plan.share, tls=tls) if plan.share else None
     return replace(plan, share=share, exchange=replace(exchange, tls=tls) if exchange else None)
+
+
+def _other_world_beside(path: str, system: System, chosen: Sequence[PlacedRobot], host: str) -> Finding | None:
+    """Return the finding if the world of a robot that is up on this host has other robots than the system's.
+
+    A robot that has only begun does not answer yet, and is not examined.
+    """
+    together = outlines_of(system.robots)
+    if any(robot.name in together for robot in chosen):
+        for robot in robots_on(system, host):
+            if robot.name in together and robot not in chosen and RobotFolder.of(robot.name).is_held:
+                with suppress(NotDoneError):
+                    answer = Proposal.of(planned(system, robot, host), robot.robot, NO_LAYERS).data
+                    if (finding := _other_world(path, system, robot.name, answer)) is not None:
+                        return finding
+    return None
+
+
+def _other_world(path: str, system: System, robot: str, answer: Any) -> Finding | None:
+    """Return the finding if robots enter or leave the world of a robot by a change, as its answer says."""
+    components = answer.get("components", ()) if isinstance(answer, dict) else ()
+    for name, reason in ((component["name"], reason) for component in components for reason in component["reasons"]):
+        field, _, other = reason["key"].partition(".")
+        if other and None in (reason["before"], reason["after"]):
+            declared_there = system.robots[robot].robot.declared(SharesWorld)
+            if any(one.name == name and shares.others.field == field for one, shares in declared_there):
+                how = "new in" if reason["before"] is None else "no longer in"
+                message = f"'{other}' is {how} the world of '{robot}', which is up and does not know that"
+                return OTHER_WORLD.at(None, message, help=f"'rbxcompose down {path}', then 'up', for all in this world")
+    return None
 
 
 def _is_ready(examine: Callable[[], Report], sources: Mapping[str, str]) -> bool:
@@ -274,7 +310,12 @@ class _SystemChange:
         asked = hosts.on_all({" ".join(key): self._command(key, "--dry-run") for key in usable})
         found = {key: _answer(asked[" ".join(key)]) for key in usable}
         lacks = any(key not in usable and not share.model.optional for key, share in self._shares.items())
-        problems = [_refusal(key, entry) for key, entry in found.items() if isinstance(entry, str)]
+        refused = {key: entry for key, entry in found.items() if isinstance(entry, str)}
+        worlds = [_other_world(self._path, self._system, key[1], asked[" ".join(key)].answer) for key in refused]
+        if problems := [finding for finding in worlds if finding]:
+            together = outlines_of(self._system.robots)
+            refused = {key: entry for key, entry in refused.items() if key[1] not in together}
+        problems = [*problems[:1], *(_refusal(key, entry) for key, entry in refused.items())]
         is_refused = bool(problems) and not arguments.partial
         if arguments.json:
             answers = [{"host": host, "robot": robot, "answer": entry} for (host, robot), entry in found.items()]

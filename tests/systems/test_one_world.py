@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
+import os
 from argparse import Namespace
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,16 +14,27 @@ import pytest
 
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import to_data
+from rbxcompose.commands.hosts import Remote
+from rbxcompose.commands.main import main
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.domains.bases.components.diff_drive_sim import DiffDriveSim
 from rbxcompose.domains.worlds.commands.world import world_named
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
-from rbxcompose.msgs.rbxcompose_msgs import Switches
+from rbxcompose.msgs.rbxcompose_msgs import Switches, WorldRobots
 from rbxcompose.msgs.sensor_msgs import LaserScan
-from rbxcompose.msgs.std_msgs import String
+from rbxcompose.msgs.std_msgs import Header, String
+from rbxcompose.runtime.folder import NO_LAYERS, ChosenLayers, RobotFolder
+from rbxcompose.runtime.plan_requests import PlanComparison
+from rbxcompose.runtime.supervision.plan_change import changes
 from rbxcompose.testing import Bench
 from rbxcompose.testing.bench import SystemBench
+from rbxcompose.tools import system_runs
+from rbxcompose.tools.inspection.plan_text import with_places
+from rbxcompose.tools.robot_changes import Proposal
 
 ROBOT = """rbx: 1
 kind: Robot
@@ -145,6 +159,18 @@ def test_a_robot_that_says_nothing_stands_where_it_was_and_is_reported(tmp_path:
     assert a.x < 1.0
 
 
+def test_a_robot_that_the_first_one_does_not_know_reports_that(tmp_path: Path) -> None:
+    bench = Bench(plan=compiled(tmp_path, SYSTEM + THIRD).robots["c"].plan)
+    statuses = bench.statuses("world: other robots")
+    for names in (("a", "b", "c"), ("a", "b")):
+        xs = np.zeros(len(names))
+        message = WorldRobots(Header(frame_id="map"), names, xs, xs, xs, xs, xs, (False,) * len(names))
+        bench.publish("/a/world/robots", message)
+        bench.advance(1.2)
+    assert [status.level for status in statuses] == [Level.OK, Level.ERROR]
+    assert statuses[-1].message == "the world of a has a, b: all need 'down' and 'up'"
+
+
 @pytest.mark.soak  # as those of one robot are
 def test_two_runs_are_alike(tmp_path: Path) -> None:
     def driven() -> tuple[list[Pose2], list[str]]:
@@ -184,6 +210,42 @@ def test_in_physics_robots_stop_at_each_other_too(tmp_path: Path) -> None:
     assert hall.drive(3.0, a=0.5, b=0.3) > -0.02
     assert abs(hall.apart("a", "b")) < 0.02
     assert hall.touched["a"][0] == String(data="b")
+
+
+def test_a_robot_is_not_brought_into_a_world_that_runs_without_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "run"))
+    before = compiled(tmp_path).robots
+
+    def compared(plan: Plan, robot: Robot, layers: ChosenLayers) -> Namespace:
+        found = changes(before[plan.robot].plan, plan)
+        return Namespace(data=with_places(to_data(PlanComparison.of(found, 1, "; ".join(found.impossible))), robot))
+
+    def asked(self: Remote, words: Sequence[str], *, folder: str = "", has_terminal: bool = False) -> list[str]:
+        if (name := words[words.index("--robot") + 1]) in before:
+            return ["sh", "-c", 'echo "$0"; exit 1', json.dumps(compared(*ours[name], NO_LAYERS).data)]
+        return ["sh", "-c", f"echo \"error[RBX9002]: no robot '{name}' is up\"; exit 1"]
+
+    monkeypatch.setattr(Proposal, "of", compared)
+    monkeypatch.setattr(Remote, "rbxcompose", asked)
+    monkeypatch.setattr(system_runs, "run_plan", lambda *_, **__: 0)
+    folders = [RobotFolder.of(name) for name in before]
+    for folder in folders:
+        folder.make()
+    locks = [folder.lock() for folder in folders]
+    file = str(tmp_path / "system.yaml")
+    ours = {name: (robot.plan, robot.robot) for name, robot in compiled(tmp_path, SYSTEM + THIRD).robots.items()}
+    try:
+        for verb in (["up", "-d", file, "--robot", "c"], ["apply", file, "--dry-run"]):
+            assert main(verb) == 1
+            lines = [line for line in capfd.readouterr().err.splitlines() if line.startswith("error")]
+            expected = "error[RBX6155]: 'c' is new in the world of 'a', which is up and does not know that"
+            assert lines == [expected], "and nothing that only follows from it"
+    finally:
+        for lock in locks:
+            assert lock is not None
+            os.close(lock)
 
 
 def test_the_listing_of_a_systems_world_has_its_robots(tmp_path: Path) -> None:

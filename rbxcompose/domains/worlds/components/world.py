@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -112,6 +113,7 @@ class WorldSim(sdk.Component[WorldConfig]):
         self.sent: tuple[tuple[str, ...], tuple[Motion, ...], tuple[bool, ...]] | None = None
         self.sent_at = -math.inf
         self.silent: tuple[str, ...] = ()
+        self.known: Sequence[str] = config.robots  # by the first one
         self.whole = SimulatedWorld(
             config.name,
             read_map(Path(config.map)) if config.map else no_walls(),
@@ -136,8 +138,11 @@ class WorldSim(sdk.Component[WorldConfig]):
             self.add_diagnostic("other robots", self.hearing)
 
     def hearing(self, now: float) -> sdk.TaskStatus:
-        """Report which robots are silent."""
+        """Report which robots are silent, and whether the first one knows others than this robot does."""
         first = self.config.robots[0]
+        if {*self.known} != {*self.config.robots}:
+            words = f"the world of {first} has {', '.join(self.known)}: all need 'down' and 'up'"
+            return sdk.TaskStatus(Level.ERROR, words)
         deaf = self.config.robot != first and self.bound["all"].age > SILENT
         silent = (first,) if deaf else self.silent
         if not silent:
@@ -147,7 +152,7 @@ class WorldSim(sdk.Component[WorldConfig]):
 
     def on_all(self, message: WorldRobots) -> None:
         """Tell the robot's base and sensors where others are."""
-        own = self.config.robot
+        own, self.known = self.config.robot, message.names
         self.silent = tuple(name for name, is_silent in zip(message.names, message.silent, strict=True) if is_silent)
         self.silent = tuple(name for name in self.silent if name != own)
         self.bound["told"](message)
