@@ -30,7 +30,7 @@ class ChosenLayers:
     overlays: tuple[str, ...] = ()
     sets: tuple[str, ...] = ()
     real: bool = False
-    system: str = ""  # the file of a system whose other robots its missions use, with the profiles of that
+    system: str = ""  # the file of the system that it belongs to, with the profiles of that
     system_profiles: tuple[str, ...] = ()
     member: str = ""  # its name there
 

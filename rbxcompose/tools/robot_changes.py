@@ -47,11 +47,16 @@ class Proposal:
         """Ask the running robot of this name what the plan, compiled with these layers, would change.
 
         Raises:
-            NotDoneError: if none is up, it does not answer, or it runs another version of rbxcompose.
+            NotDoneError: if none is up, it does not answer, it runs another version of rbxcompose, or it belongs to a
+                system, and the layers to none.
         """
         folder, text = find_robot(plan.robot), dump(plan, reveals_secrets=True)  # the socket is this user's alone
         if (state := known_state(folder)) and (problem := version_problem(state.robot, state.package_version)):
             raise NotDoneError(REFUSED.at(None, problem))
+        if state and state.layers.system and not layers.system:
+            message = f"'{state.robot}' belongs to a system, which decides what the robot is given"
+            help_text = f"rbxcompose apply {state.layers.system} --robot {state.layers.member}"
+            raise NotDoneError(REFUSED.at(None, message, help=help_text))
         found = answer_of(folder, ComparePlan(text), timeout=_COMPARE)
         return cls(folder, text, found, layers, with_places(to_data(found), robot))
 

@@ -24,7 +24,7 @@ from rbxcompose.compiler.systems.certificates import NO_SECURITY, common_name, f
 from rbxcompose.compiler.systems.model import PlacedRobot, System
 from rbxcompose.compiler.systems.neighbours import outlines_of
 from rbxcompose.compiler.systems.share import exchange_of, robots_on, share_of
-from rbxcompose.runtime.folder import NO_LAYERS, ChosenLayers, RobotFolder, RunOptions, mark_start
+from rbxcompose.runtime.folder import ChosenLayers, RobotFolder, RunOptions, mark_start
 from rbxcompose.runtime.supervision.plan_change import Fate
 from rbxcompose.runtime.supervision.supervisor import SERVICE_MANAGER
 from rbxcompose.sdk.capabilities import SharesWorld
@@ -122,7 +122,7 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
             f"add --robot {' or --robot '.join(down)}, to start what is down" if down else f"rbxcompose down {path}"
         )
         return refuse(ALREADY_UP.at(None, f"already up: {up}", help=help_text))
-    if (finding := _other_world_beside(path, system, chosen, arguments.host)) is not None:
+    if (finding := _other_world_beside(path, system, chosen, arguments)) is not None:
         return refuse(finding)
     for robot in chosen:
         plan = planned(system, robot, arguments.host)
@@ -150,7 +150,7 @@ def compiled_for(path: str, arguments: argparse.Namespace, verb: str) -> System:
 def layers_of(system: System, robot: PlacedRobot, *, real: bool) -> ChosenLayers:
     """Return the layers that a robot of a system is compiled with, for its supervisor to remember."""
     layers = ChosenLayers(profiles=(robot.model.profile,) if robot.model.profile else (), real=real)
-    if system.path is None or not (robot.robot.outside.skills or robot.model.spawn):
+    if system.path is None:
         return layers
     return replace(layers, system=str(system.path.resolve()), system_profiles=system.profiles, member=robot.name)
 
@@ -191,17 +191,19 @@ def planned(system: System, robot: PlacedRobot, host: str) -> Plan:
     return replace(plan, share=share, exchange=replace(exchange, tls=tls) if exchange else None)
 
 
-def _other_world_beside(path: str, system: System, chosen: Sequence[PlacedRobot], host: str) -> Finding | None:
+def _other_world_beside(
+    path: str, system: System, chosen: Sequence[PlacedRobot], arguments: argparse.Namespace
+) -> Finding | None:
     """Return the finding if the world of a robot that is up on this host has other robots than the system's.
 
     A robot that has only begun does not answer yet, and is not examined.
     """
     together = outlines_of(system.robots)
     if any(robot.name in together for robot in chosen):
-        for robot in robots_on(system, host):
+        for robot in robots_on(system, arguments.host):
             if robot.name in together and robot not in chosen and RobotFolder.of(robot.name).is_held:
                 with suppress(NotDoneError):
-                    answer = Proposal.of(planned(system, robot, host), robot.robot, NO_LAYERS).data
+                    answer = _proposal(system, robot, arguments).data
                     if (finding := _other_world(path, system, robot.name, answer)) is not None:
                         return finding
     return None
@@ -219,6 +221,11 @@ def _other_world(path: str, system: System, robot: str, answer: Any) -> Finding 
                 message = f"'{other}' is {how} the world of '{robot}', which is up and does not know that"
                 return OTHER_WORLD.at(None, message, help=f"'rbxcompose down {path}', then 'up', for all in this world")
     return None
+
+
+def _proposal(system: System, robot: PlacedRobot, arguments: argparse.Namespace) -> Proposal:
+    layers = layers_of(system, robot, real=arguments.real)
+    return Proposal.of(planned(system, robot, arguments.host), robot.robot, layers)
 
 
 def _is_ready(examine: Callable[[], Report], sources: Mapping[str, str]) -> bool:
@@ -287,8 +294,7 @@ def _warn_of_former(path: str, system: System, arguments: argparse.Namespace) ->
 def _apply_here(system: System, arguments: argparse.Namespace) -> int:
     """Change what this machine runs as a host of the system."""
     for robot in chosen_robots(system, arguments):
-        plan, layers = planned(system, robot, arguments.host), layers_of(system, robot, real=arguments.real)
-        proposal = Proposal.of(plan, robot.robot, layers)
+        proposal = _proposal(system, robot, arguments)
         emit(json.dumps(proposal.data) if arguments.json else proposal.text())
         if exit_code := carry_out(proposal, arguments):
             return exit_code

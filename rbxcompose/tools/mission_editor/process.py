@@ -24,9 +24,11 @@ from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.model.robot import NOTHING
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.compiler.systems.reader import compile_system
+from rbxcompose.compiler.systems.share import hosts_of
 from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.tools.mission_editor.editor import Compile, MissionEditor
-from rbxcompose.tools.robot_editor.editor import LIVE_REQUESTS, PREFIX, LiveRobot, RobotEditor
+from rbxcompose.tools.robot_editor.editor import LIVE_REQUESTS, PREFIX, LiveRobot, RobotEditor, applied
+from rbxcompose.tools.system_runs import planned
 
 _NAMED = re.compile(r"\benv\.(\w+)")
 _OF_PROGRAMS = re.compile(
@@ -83,6 +85,23 @@ def compile_with(
     return compiled, partial(compiled, real=False), others
 
 
+def compiled_member(layers: ChosenLayers, environment: Mapping[str, str]) -> Compilation:
+    """Compile a robot as a member of its system.
+
+    Raises:
+        Refused: if that does not run it on one host alone.
+    """
+    system = compile_system(layers.system, environment=environment, real=layers.real, profiles=layers.system_profiles)
+    if system.report.has_errors:
+        return Compilation(report=system.report)
+    placed = system.robots.get(layers.member)
+    hosts = hosts_of(system, placed) if placed else []
+    if placed is None or len(hosts) != 1:
+        where = "several hosts, which change together" if hosts else "no host of its system any more"
+        raise Refused(f"this robot runs on {where}: {applied(layers)}")
+    return Compilation(placed.robot, planned(system, placed, hosts[0]))
+
+
 def _sharing(file: Path, member: str, system: System) -> tuple[str, ...]:
     """Return the other robots of a system that are made of the same file."""
     robots = {name: placed.robot.manifest.files.values() for name, placed in system.robots.items() if name != member}
@@ -135,7 +154,9 @@ def main(robot: str) -> int:
             compiled, simulated, others = compile_with(newest.file, newest.layers, variables)
             file = Path(newest.file)
             missions = MissionEditor(compiled, file, simulated)
-            live = LiveRobot(folder, compiled, newest.layers)
+            alone = partial(compiled, {})
+            member = partial(compiled_member, newest.layers, variables.all)
+            live = LiveRobot(folder, member if newest.layers.system else alone, newest.layers)
             state, editor = newest, RobotEditors(missions, RobotEditor(compiled, file, others), live)
         told = _NOT_UP if editor is None else answer_line(editor, line)
         answers.write(f"{json.dumps(told)}\n")

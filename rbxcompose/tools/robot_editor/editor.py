@@ -310,9 +310,12 @@ def _is_change(change: Any, section: str) -> bool:
 
 
 class LiveRobot:
-    """Answers what a page asks about the robot that runs; `compiled` compiles it with the `layers` that it has."""
+    """Answers what a page asks about the robot that runs.
 
-    def __init__(self, folder: RobotFolder, compiled: Compile, layers: ChosenLayers) -> None:
+    `compiled` compiles it with the `layers` that it has, and as a member of its system.
+    """
+
+    def __init__(self, folder: RobotFolder, compiled: Callable[[], Compilation], layers: ChosenLayers) -> None:
         self._folder, self._compiled, self._layers = folder, compiled, layers
 
     def answer(self, request: Mapping[str, Any]) -> Any:
@@ -352,14 +355,20 @@ class LiveRobot:
         return {"text": answer_of(self._folder, RevertPlan(request["generation"]), timeout=LONGEST_CHANGE)}
 
     def _proposal(self) -> Proposal:
-        if self._layers.system:
-            raise Refused("this robot belongs to a system, which is changed as a whole by 'rbxcompose apply'")
-        made = self._compiled({})
+        made = self._compiled()
         if made.plan is None or made.robot is None:
             found = [one for one in made.report if one.severity is Severity.ERROR]
             errors = "1 error" if len(found) == 1 else f"{len(found)} errors, the first"
             raise Refused(f"its files have {errors}: {found[0].message}")
-        return Proposal.of(made.plan, made.robot, self._layers)
+        proposal = Proposal.of(made.plan, made.robot, self._layers)
+        if self._layers.system and proposal.found.shares_change:
+            raise Refused(f"what robots share would change, so all change together: {applied(self._layers)}")
+        return proposal
+
+
+def applied(layers: ChosenLayers) -> str:
+    """Return the command that changes the system of a robot."""
+    return f"'rbxcompose apply {layers.system}'"
 
 
 LIVE_REQUESTS: Mapping[str, Callable[[LiveRobot, Mapping[str, Any]], Any]] = MappingProxyType(
