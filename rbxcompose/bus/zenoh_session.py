@@ -6,6 +6,7 @@ import errno
 import itertools
 import json
 import os
+import re
 import socket
 from collections.abc import Iterable, Mapping
 from dataclasses import field
@@ -42,6 +43,7 @@ _DIALS_FOREVER = {  # in the background: who is dialled may come later
 }
 _LISTENS_OR_FAILS = {"listen/timeout_ms": 0, "listen/exit_on_failure": True}
 _TAKEN = ("os error 98", "Unable to acquire lock")  # what Zenoh says of an endpoint in use
+_WHERE = re.compile(r" at \S+\.rs:\d+\.")  # in the sources of Zenoh
 _session_numbers = itertools.count()
 _routers: list[zenoh.Session] = []
 """Every router that this process has opened, also when it is closed.
@@ -256,7 +258,7 @@ def open_router(endpoint: str, link: RouterLink = NO_LINK) -> zenoh.Session:
         _routers.append(session := _opened(router_settings(endpoint, link), threads))
         return session
     except zenoh.ZError as error:
-        if not any(cause in str(error) for cause in _TAKEN):
+        if not _is_taken(error):
             raise
         raise OSError(errno.EADDRINUSE, f"{endpoint} is taken") from error
 
@@ -270,7 +272,12 @@ def open_exchange(link: RouterLink) -> zenoh.Session:
     try:
         return _opened(exchange_settings(link))
     except zenoh.ZError as error:
-        raise OSError(errno.EADDRINUSE, f"{' and '.join(link.listen)} cannot be opened: {error}") from error
+        why = "is taken" if _is_taken(error) else f"cannot be opened: {_WHERE.sub('', str(error))}"
+        raise OSError(errno.EADDRINUSE, f"{' and '.join(link.listen)} {why}") from error
+
+
+def _is_taken(error: zenoh.ZError) -> bool:
+    return any(cause in str(error) for cause in _TAKEN)
 
 
 def open_beside(endpoint: str) -> zenoh.Session:

@@ -156,6 +156,16 @@ def test_the_first_finding_about_a_mistake_tells_the_cure(right: str, wrong: str
 
 
 @pytest.mark.parametrize(
+    ("value", "meant"), [("/amr_1/level", "{topic: /amr_1/level}"), ("{port: /a/b/c}", "topic: /a/b/c")]
+)
+def test_a_topic_in_place_of_a_port_is_not_changed_to_a_component(value: str, meant: str, tmp_path: Path) -> None:
+    checked = check_text(ROBOT.replace("places:", f"values: {{x: {value}}}\nplaces:"), tmp_path)
+    (finding,) = (finding for finding in checked.compilation.report if finding.code == "RBX1006")
+    assert finding.help == f"a name that begins with '/' is a topic: write '{meant}'"
+    assert finding.fix is None
+
+
+@pytest.mark.parametrize(
     ("text", "cure"),
     [
         (

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
 import zenoh
 
 from rbxcompose.base.clock import MonotonicClock
@@ -137,6 +139,21 @@ def test_whoever_dials_a_robot_can_take_what_it_shares_and_put_nothing() -> None
 
 def _open_to_all(endpoint: str) -> zenoh.Session:
     return open_exchange(RouterLink((), (endpoint,), access={"enabled": False}))
+
+
+def test_a_port_that_is_taken_is_named_without_the_sources_of_zenoh() -> None:
+    link = RouterLink(listen=(endpoint := tcp_endpoint(free_port()),))
+    session = open_exchange(link)
+    try:
+        for taken, why in (
+            (link, f"{endpoint} is taken"),
+            (RouterLink(listen=("tls/127.0.0.1:1",)), "TLS private key"),
+        ):
+            with pytest.raises(OSError, match=re.escape(why)) as caught:
+                open_exchange(taken)
+            assert ".rs:" not in str(caught.value)
+    finally:
+        session.close()
 
 
 def test_a_session_of_an_exchange_looks_for_nobody() -> None:

@@ -233,6 +233,16 @@ def slash_for_a_dot(place: RefusedValue, node: TreeNode) -> Repair[TreeNode] | N
     return Repair(replace(node, text=meant), (finding,))
 
 
+@value_slip("string_pattern_mismatch", before=[slash_for_a_dot])
+def topic_for_a_port(place: RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
+    """Recognise it in the section `values`: it begins with a slash."""
+    if place.path[0] != "values" or not isinstance(node, ScalarNode) or not node.text.startswith("/"):
+        return None
+    meant = f"topic: {node.text}" if place.path[-1] == "port" else f"{{topic: {node.text}}}"
+    finding = replace(place.finding, help=f"a name that begins with '/' is a topic: write '{meant}'")
+    return Repair(replace(node, text=f"{node.text[1:].replace('/', '_')}.data"), (finding,))
+
+
 @value_slip("model_type", "model_attributes_type")
 def word_for_a_map(place: RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise a word; it counts only if the map accepts it there."""

@@ -305,7 +305,7 @@ class Router:
         try:
             self._exchange = RobotExchange(exchange, self._plan.bus, transport, loop, self._warn)
         except OSError as error:
-            return f"what is shared cannot be offered: {error.strerror}"
+            return f"what is shared cannot be offered: {error.strerror}: give it another 'share_port' in its system"
         return ""
 
     def _warn(self, owner: str, text: str) -> None:
