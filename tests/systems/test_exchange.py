@@ -153,7 +153,7 @@ def test_a_port_that_is_taken_is_named_without_the_sources_of_zenoh() -> None:
                 open_exchange(taken)
             assert ".rs:" not in str(caught.value)
     finally:
-        session.close()
+        session.close()  # type: ignore[no-untyped-call]
 
 
 def test_a_session_of_an_exchange_looks_for_nobody() -> None:

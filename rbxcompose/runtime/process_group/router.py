@@ -305,7 +305,8 @@ class Router:
         try:
             self._exchange = RobotExchange(exchange, self._plan.bus, transport, loop, self._warn)
         except OSError as error:
-            return f"what is shared cannot be offered: {error.strerror}: give it another 'share_port' in its system"
+            why = f"{error.strerror}; 'share_port' in the system chooses another port"
+            return f"what is shared cannot be offered: {why}"
         return ""
 
     def _warn(self, owner: str, text: str) -> None:
