@@ -199,6 +199,13 @@ class Subscription(Generic[M]):
         """Queue a message from this process; it is handled at the same instant."""
         self._inbox.put((self._process.clock.now(), delivery, None), self._post)
 
+    def refuse(self, reason: RefusalReason, detail: str) -> None:
+        """Count a message that is of no use; the log has the first one."""
+        self.refusals.add(reason)
+        if not self._has_complained:
+            self._has_complained = True
+            self._process.log(self.owner, f"dropped a message on {self.route[0]}: {detail}")
+
     def close(self) -> None:
         """Withdraw the subscription and drop its waiting messages."""
         self._topics.subscriptions.remove(self.route, self)
@@ -253,15 +260,9 @@ class Subscription(Generic[M]):
             if self._qos is Qos.COMMAND:
                 require_finite(message)
         except (AttachmentError, CdrError, NotFiniteError) as error:
-            self._refuse(_REASONS[type(error)], str(error))
+            self.refuse(_REASONS[type(error)], str(error))
             return None
         return Delivery(message, source)
-
-    def _refuse(self, reason: RefusalReason, detail: str) -> None:
-        self.refusals.add(reason)
-        if not self._has_complained:
-            self._has_complained = True
-            self._process.log(self.owner, f"dropped a message on {self.route[0]}: {detail}")
 
 
 _REASONS: dict[type[ValueError], RefusalReason] = {

@@ -166,7 +166,10 @@ class Out(Port[Sender[M]]):
 
 
 class In(Port[Latest[M]]):
-    """Subscribes to messages: each one goes to the method `on_<port>`; the newest can be read."""
+    """Subscribes to messages: each one goes to the method `on_<port>`; the newest can be read.
+
+    The method raises `Refused` for a message that cannot be used: diagnostics count it, and the component runs on.
+    """
 
     kind = "in"
 

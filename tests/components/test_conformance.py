@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 from unittest.mock import Mock
 
+import numpy as np
 import pytest
 
 from docs.generating.components import entry_shown
@@ -19,9 +20,12 @@ from rbxcompose.base.config import field_docs
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.plan.model import Instance
+from rbxcompose.msgs.nav_msgs import MapMetaData, OccupancyGrid
+from rbxcompose.msgs.rbxcompose_msgs import Switches
+from rbxcompose.msgs.types import Message
 from rbxcompose.sdk.capabilities import require_declared, settings_of
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import In, Serves
+from rbxcompose.sdk.ports import In, Qos, Serves
 from rbxcompose.sdk.registry import component_names, component_type
 from rbxcompose.testing import Bench, clock_uses
 
@@ -34,6 +38,10 @@ places:
 components:
 {example}
 """
+UNFIT: dict[type[Any] | None, Message] = {
+    OccupancyGrid: OccupancyGrid(info=MapMetaData(resolution=0.1, width=2, height=2), data=np.zeros(3, np.int8)),
+    Switches: Switches(name=("front", "back"), angle=np.zeros(1), is_on=(True, True)),
+}
 HEAVY = {"pin", "ompl", "yourdfpy", "mujoco", "cv2", "scipy"}
 TYPES = [name for name in component_names() if not name.startswith("toy_")]
 all_types = pytest.mark.parametrize("name", TYPES)
@@ -116,6 +124,20 @@ def test_it_does_the_same_for_the_same_input(name: str) -> None:
         return [record.to_json() for record in robot.records]
 
     assert run() == run()
+
+
+@all_types
+def test_a_message_whose_arrays_do_not_fit_leaves_it_running(name: str) -> None:
+    instance = instance_of(name)
+    inputs = [end for end in component_type(name).ports(instance.config).values() if isinstance(end, In)]
+    wrong = {end.name: message for end in inputs if (message := UNFIT.get(end.interface)) is not None}
+    if not wrong:
+        return
+    robot = Bench(instance)
+    for port, message in wrong.items():
+        robot.publish(instance.topic(port), message, Qos.LATCHED)
+    robot.advance(1.0)
+    assert robot.host.states()[instance.name] == ("active", 0), robot.texts()
 
 
 @pytest.mark.soak  # `tests/testing/test_clocks.py` looks into all files that import a clock

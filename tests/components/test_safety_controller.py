@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -47,6 +49,26 @@ def test_it_reacts_to_a_message_at_once_and_says_nothing_while_nothing_is_felt()
     assert commands == []
     bench.publish("/front/ring", ring(True))
     assert [command.linear.x for command in commands] == [-0.1]
+
+
+@pytest.mark.parametrize("angle", [(), (0.0, 1.0), (math.nan,), (math.inf,)])
+def test_a_message_that_it_cannot_read_counts_as_a_broken_sensor(angle: tuple[float, ...]) -> None:
+    bench = Bench(instance("guard", "safety_controller", {"evades": ["ring"], "holds": []}))
+    statuses, commands = bench.statuses("guard"), bench.collect("/cmd_vel", Twist)
+    bench.publish("/ring", ring(False))
+    bench.advance(0.1)
+    commands.clear()
+    bench.publish("/ring", Switches(Header(), ("ring",), np.array(angle), (True,)))
+    assert commands == [AT_REST]
+    bench.advance(0.1)
+    assert (statuses[-1].level, statuses[-1].message) == (Level.ERROR, "holds the base: ring is silent")
+    assert commands
+    assert all(command == AT_REST for command in commands)
+    bench.publish("/ring", ring(False))
+    bench.advance(0.1)
+    assert statuses[-1].level == Level.OK
+    assert sum("dropped a message on /ring" in text for text in bench.texts()) == 1
+    assert bench.host.states()["guard"] == ("active", 0)
 
 
 def test_it_tells_that_it_works_as_long_as_it_does() -> None:

@@ -87,7 +87,7 @@ class Toy(Component[ToyConfig]):
     def break_in(self, method: str) -> None:
         if method == self.config.breaks_in and BROKEN.get(self.name, 0) < self.config.times:
             BROKEN[self.name] = BROKEN.get(self.name, 0) + 1
-            raise {"ValueError": ValueError, "SystemExit": SystemExit}[self.config.error]("planted")
+            raise {"ValueError": ValueError, "SystemExit": SystemExit, "Refused": Refused}[self.config.error]("planted")
 
 
 @pytest.fixture(autouse=True)
@@ -221,6 +221,17 @@ def test_a_message_that_breaks_its_handler_restarts_only_that_component() -> Non
     robot.advance(1.0)
     assert robot.host.states() == {"broken": ("active", 1), "healthy": ("active", 0)}
     assert robot.component("healthy").steps == 15  # type: ignore[attr-defined]
+
+
+def test_a_message_that_its_handler_refuses_is_counted_and_the_component_runs_on() -> None:
+    robot = bench("on_add", times=2, error="Refused")
+    statuses = robot.statuses("broken: add")
+    for _ in range(3):
+        robot.publish("/add", Float32(data=5.0))
+    robot.advance(1.0)
+    assert robot.host.states() == {"broken": ("active", 0), "healthy": ("active", 0)}
+    assert [text for text in robot.texts() if "/add" in text] == ["broken: dropped a message on /add: planted"]
+    assert statuses[0].message == "2 messages were refused on /add: unreadable content"
 
 
 @pytest.mark.parametrize("error", ["ValueError", "SystemExit"])

@@ -20,6 +20,7 @@ from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import need
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.printable import plain
+from rbxcompose.base.requests import Refused
 from rbxcompose.base.units import MOST
 from rbxcompose.manifest.yaml_nodes import compose
 
@@ -37,7 +38,7 @@ WRITTEN = {"occupied_thresh": 0.65, "free_thresh": 0.196}  # by map_saver; its g
 GREYS = {OCCUPIED: 0, UNKNOWN: 205, FREE: 254}
 
 
-class MapError(Exception):
+class MapError(Refused):
     """Raised for a map that cannot be read, with a sentence that says why."""
 
 

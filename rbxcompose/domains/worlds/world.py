@@ -11,7 +11,7 @@ from rbxcompose.base.arrays import Array, Bools, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.domains.worlds.contact import TOUCHING, FirstContact, first_contact, in_polygon, overlap, touching
-from rbxcompose.domains.worlds.grid_map import GridMap
+from rbxcompose.domains.worlds.grid_map import GridMap, MapError
 from rbxcompose.domains.worlds.ray_casting import Rays
 from rbxcompose.domains.worlds.shapes import (
     CircleFootprint,
@@ -210,6 +210,8 @@ def grid_of(message: OccupancyGrid) -> GridMap:
     about = message.info
     if not len(message.data):
         return no_walls()
+    if len(message.data) != about.height * about.width:
+        raise MapError(f"{len(message.data)} cells are no map of {about.width} x {about.height}")
     cells = np.asarray(message.data, np.int8).reshape(about.height, about.width)
     return GridMap(cells, about.resolution, pose_in(about.origin))
 

@@ -15,7 +15,7 @@ from rbxcompose.base.requests import Command, OutsideError, Query, Refused, Requ
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.actions import ActionServer
 from rbxcompose.bus.bus import Bus
-from rbxcompose.bus.local import sentence
+from rbxcompose.bus.local import RefusalReason, sentence
 from rbxcompose.bus.names import admin_key, resolve
 from rbxcompose.bus.services import ServedRequest
 from rbxcompose.bus.topics import Subscription
@@ -732,6 +732,16 @@ class Hosted:
         for server in self._claiming:
             server.cancel_all(cause)
 
+    @property
+    def send(self) -> Callable[[Call], None]:
+        """Return what runs a call in the scheduler's thread: soon, or at once if the component has no other."""
+        return _at_once if self.worker is None else self.worker.send
+
+    def refuse(self, name: str, reason: str) -> None:
+        """Count a message of an input that the component cannot use, and report the first one."""
+        if (end := self._ends.get(name)) is not None:
+            end.refuse(RefusalReason.CONTENT, reason)
+
     def refusal(self, port: Port[Any]) -> str:
         """Return why a message, request or goal cannot be taken now; empty if it can."""
         if self.state is not Lifecycle.ACTIVE:
@@ -938,12 +948,18 @@ def _pause(
 def _on_message(hosted: Hosted, component: Component[Any], name: str, port: In[Any]) -> Callable[[Any], None]:
     own = getattr(component, f"on_{name}", None)
     handler: Callable[[Any], None] = own if own is not None else partial(component.received, name)
-    label, depth = f"on_{name}", queue_depth(port.qos)
+    label, depth, send = f"on_{name}", queue_depth(port.qos), hosted.send
+
+    def handle(message: Any) -> None:
+        try:
+            handler(message)
+        except Refused as refusal:
+            send(partial(hosted.refuse, name, str(refusal)))
 
     def take(message: Any) -> None:
         reason = hosted.refusal(port)
         if not reason:  # else it only stays the newest value, for whoever reads it
-            hosted.do(label, partial(handler, message), depth=depth)
+            hosted.do(label, partial(handle, message), depth=depth)
         elif isinstance(port, ServesTopic):
             hosted.log(Level.WARN, f"an order to {name} is not carried out: {reason}")
 
@@ -959,9 +975,7 @@ def _on_request(
     def serve(request: ServedRequest[Any, Any]) -> None:
         if reason := hosted.refusal(port):
             raise Refused(reason)
-        worker = hosted.worker
-        send = worker.send if worker is not None else _at_once
-        hosted.do(label, partial(_answer, label, request, answer, send))
+        hosted.do(label, partial(_answer, label, request, answer, hosted.send))
 
     return serve
 

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from rbxcompose import sdk
+from rbxcompose.base.arrays import np
 from rbxcompose.base.geometry import AT_REST, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.manifest.fields import TopicName
@@ -112,6 +113,10 @@ class SafetyCore:
     def feel(self, kind: str, on: Mapping[str, float], now: float) -> None:
         """Take which switches of a kind are on, with their angles around the robot [rad]."""
         self._on[kind], self._heard[kind] = dict(on), now
+
+    def distrust(self, kind: str) -> None:
+        """Count a kind as silent until it is heard again: what came cannot be read."""
+        self._heard[kind] = NEVER
 
     def forget(self, now: float) -> None:
         """End what it does, and count all silence anew: a stop held the robot, or robot time stood still."""
@@ -230,8 +235,12 @@ class SafetyController(sdk.Component[SafetyControllerConfig]):
 
     def received(self, port: str, message: Switches) -> None:
         """Take which switches are on, and react at once."""
-        states = zip(message.name, message.angle.tolist(), message.is_on, strict=True)
-        on = {name: angle for name, angle, is_on in states if is_on}
+        names, angles, states = message.name, message.angle, message.is_on
+        if not (len(names) == len(angles) == len(states) and np.isfinite(angles).all()):
+            self.core.distrust(self.topics[port])
+            self.act()
+            raise sdk.Refused("each switch has a name, a finite angle and whether it is on")
+        on = {name: angle for name, angle, is_on in zip(names, angles.tolist(), states, strict=True) if is_on}
         self.core.feel(self.topics[port], on, self.now)
         if on or self.core.phase is not SafetyPhase.WATCH:
             self.act()
