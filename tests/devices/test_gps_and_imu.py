@@ -120,6 +120,32 @@ def test_a_receiver_whose_rmc_or_gsa_says_no_has_no_fix() -> None:
         assert not found.is_fix
 
 
+@pytest.mark.parametrize("modes", [("3", "1"), ("1", "3"), ("1", "1")])
+def test_one_system_without_a_fix_vetoes_none_of_the_others(modes: tuple[str, ...]) -> None:
+    receiver = SatelliteReceiver()
+    (gga,) = SentenceReader(Counter()).feed(GGA)
+    fixes: list[Any] = []
+    for _ in range(2):
+        for talker, mode in zip(("GP", "BD"), modes, strict=True):
+            dops = ("2.5", "1.3", "2.0") if mode == "3" else ("99.9",) * 3
+            receiver.take(Sentence(f"{talker}GSA", ("A", mode, *[""] * 12, *dops)))
+        fixes.append(receiver.take(gga))
+    has_fix = "3" in modes
+    assert [found.is_fix for found in fixes] == [has_fix] * 2
+    assert not has_fix or [found.vertical_variance for found in fixes] == [pytest.approx(8.0**2)] * 2
+
+
+def test_a_fix_that_all_systems_have_lost_is_none() -> None:
+    receiver = SatelliteReceiver()
+    (gga,) = SentenceReader(Counter()).feed(GGA)
+    for mode, is_fix in (("3", True), ("1", False), ("2", True)):
+        receiver.take(Sentence("GPGSA", ("A", mode)))
+        receiver.take(Sentence("GLGSA", ("A", "1")))
+        found = receiver.take(gga)
+        assert isinstance(found, SatelliteFix)
+        assert found.is_fix is is_fix
+
+
 def test_vtg_gives_the_velocity_where_no_rmc_comes() -> None:
     receiver, vtg = SatelliteReceiver(), Sentence("GPVTG", ("90.0", "T", "", "M", "10.0", "N", "18.52", "K", "A"))
     found = receiver.take(vtg)

@@ -115,9 +115,10 @@ class SatelliteReceiver:
     """What a receiver says: a fix with each GGA, a velocity with each RMC, or with each VTG if no RMC comes."""
 
     def __init__(self) -> None:
-        self.dimensions = 0  # of the fix by GSA: 2 or 3, 1 for none, 0 if it sends no GSA
+        self.dimensions = 0  # of the fix by GSA: 2 or 3, 1 for none, 0 if it sends no GSA; the most of an epoch
         self.is_valid = True  # by RMC
         self._vdop: float | None = None
+        self._is_gsa_due = True  # the next GSA is the first of an epoch; there is one for each system of satellites
         self._has_rmc = False
 
     def take(self, sentence: Sentence) -> SatelliteFix | GroundVelocity | None:
@@ -135,11 +136,13 @@ class SatelliteReceiver:
             case "VTG" if not self._has_rmc and sentence.text(8) not in ("N", "E", "S"):
                 return _velocity(sentence.number(4), sentence.number(0))
             case "GSA":
-                self.dimensions = int(sentence.number(1) or 0)
-                self._vdop = sentence.number(16)
+                dimensions, vdop = int(sentence.number(1) or 0), sentence.number(16)
+                if self._is_gsa_due or dimensions >= self.dimensions:
+                    self.dimensions, self._vdop, self._is_gsa_due = dimensions, vdop, False
         return None
 
     def _fix(self, sentence: Sentence) -> SatelliteFix:
+        self._is_gsa_due = True
         quality, satellites = int(sentence.number(5) or 0), int(sentence.number(6) or 0)
         if quality in _NO_FIX or not self.is_valid or self.dimensions == 1:
             return SatelliteFix(False, quality, satellites)
