@@ -88,6 +88,19 @@ def test_the_battery_of_a_computer_takes_the_place_of_a_simulated_one(tmp_path: 
     assert (found[-1].level, found[-1].message) == (Level.ERROR, "no battery reports its charge: there is none")
 
 
+@pytest.mark.parametrize("charge", ["250", "101", "-5"])
+def test_a_charge_that_cannot_be_is_an_error_and_not_published(tmp_path: Path, charge: str) -> None:
+    battery = tmp_path / "BAT0"
+    battery.mkdir()
+    for key, text in {"type": "Battery", "capacity": charge}.items():
+        (battery / key).write_text(text, encoding="utf-8")
+    bench = measuring("host_battery", folder=str(tmp_path))
+    found, levels = bench.statuses("one"), bench.collect("battery_level", Float32)
+    bench.advance(1.0)
+    assert (found[-1].level, found[-1].message) == (Level.ERROR, f"the gauge of BAT0 is broken: it says {charge}%")
+    assert levels == []
+
+
 def test_a_time_server_that_does_not_answer_leaves_the_offset_unknown() -> None:
     bench = measuring("clock_monitor", server="127.0.0.1", port=9, timeout="10 ms")
     found = bench.statuses("one")

@@ -64,6 +64,9 @@ class HostBattery(HostMonitor[HostBatteryConfig]):
             there = f"there is {', '.join(battery.name for battery in found)}" if found else "there is none"
             self.status(Level.ERROR, f"no battery{' ' + name if name else ''} reports its charge: {there}")
             return
+        if not 0.0 <= supply.charge <= 1.0:
+            self.status(Level.ERROR, f"the gauge of {supply.name} is broken: it says {supply.charge * PERCENT:g}%")
+            return
         self.battery_level(Float32(data=supply.charge * PERCENT))
         level = self.core.feed(self.now, supply.charge)
         self.status(level, f"{supply.charge:.0%}, {supply.status.lower()}", **values_of(supply))
@@ -83,7 +86,7 @@ def values_of(supply: Supply) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Supply:
-    """A battery: `charge` and `health` from 0 to 1, None where Linux does not know; [V], [A]."""
+    """A battery: `charge` and `health` are shares, None where Linux does not know; [V], [A]."""
 
     name: str
     status: str
