@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from rbxcompose.base.levels import Level
 from rbxcompose.domains.servos.controllers.gpio import GpioConfig, GpioController
 from rbxcompose.msgs.std_msgs import Bool, Float64
 from rbxcompose.msgs.std_srvs import SetBool
@@ -47,6 +48,14 @@ class Lit:
         self.robot.bus.client("me", f"/{name}/set", SetBool)(SetBool.Request(data=is_on), self.answers.append)
         self.robot.advance(0.2)
         return self.answers[-1].response
+
+
+@pytest.mark.parametrize("joints", [True, False])
+def test_only_a_bus_with_joints_is_expected_to_publish_where_they_are(joints: bool) -> None:
+    lit = Lit("pump", joints=joints)
+    found = lit.robot.statuses("servos: joint_states")
+    lit.robot.advance(8.0)
+    assert {status.level for status in found} == ({Level.OK} if joints else set())
 
 
 def test_a_light_is_switched_by_topic_and_by_service_while_its_servo_drives_a_joint() -> None:

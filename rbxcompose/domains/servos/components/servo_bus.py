@@ -248,7 +248,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
     @classmethod
     def ports(cls, config: ServoBusConfig) -> dict[str, Port[Any]]:
         """Return the ports: for each joint, for all, and those of the controllers."""
-        rate = config.rate / cycles_between(config)
+        rate = config.rate / cycles_between(config) if config.joints else None
         found = super().ports(config) | joint_ports(config)
         found |= {name: Out(JointState, name, rate=rate) for name in ("joint_states", "joint_commands")}
         if config.by_physics:
