@@ -18,7 +18,7 @@ from rbxcompose.bus.names import name_problem
 from rbxcompose.commands.console import INTERRUPTED, NotDoneError, emit, refuse, write_report
 from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, SAID_NO, Guest, ReceivedMessage, silence, wanted
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import MappingNode, NodePlaces, ScalarNode, TreeNode, plain_value
+from rbxcompose.manifest.tree import MappingNode, NodePlaces, ScalarNode, TreeNode, number_or_infinity
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.cdr import CdrError, decode
 from rbxcompose.msgs.plain import from_plain, to_plain
@@ -39,7 +39,7 @@ def message_from(message: type[M], text: str) -> M | None:
     """Read a message from YAML; an empty text means all defaults. On mistakes, report them and return None."""
     if not text.strip():
         return message()
-    root, findings = read_text(text, _SHOWN)
+    root, findings = read_text(text, _SHOWN, takes_infinity=True)
     made: M | None = None
     if root is not None and not findings:
         made, findings = from_plain(message, _data(root), NodePlaces(root))
@@ -52,7 +52,7 @@ def message_from(message: type[M], text: str) -> M | None:
 def _data(node: TreeNode) -> object:
     match node:
         case ScalarNode():
-            return plain_value(node)
+            return number_or_infinity(node)
         case MappingNode(entries=entries):
             return {name: _data(entry.value) for name, entry in entries.items()}
     return [_data(item) for item in node.items]

@@ -51,17 +51,18 @@ _new = tuple.__new__  # in half the time of `Span(...)`: every node has a span
 class Walk:
     """One walk over a composed document; the findings are in `findings`.
 
-    `known_tags` are those of files of other programs, which say nothing that the tree does not.
+    `known_tags` are those of files of other programs, which say nothing that the tree does not. With `takes_infinity`,
+    `.inf` and `.nan` are no mistakes.
     """
 
-    def __init__(self, text: str, file: str, known_tags: Collection[str] = ()) -> None:
+    def __init__(self, text: str, file: str, known_tags: Collection[str] = (), *, takes_infinity: bool = False) -> None:
         self.text = text
         self.file = file
         lines = enumerate(text.split("\n"), 1) if "#" in text else ()
         self.commented = {number: line for number, line in lines if " #" in line}
         self.may_repeat = "&" in text  # without an anchor there are no aliases, so nothing has to be remembered
         self.may_tag = "!" in text
-        self.known_tags = known_tags
+        self.known_tags, self.takes_infinity = known_tags, takes_infinity
         self.findings: list[Finding] = []
         # By id: the node, how many nodes it has, how deep it is.
         self._done: dict[int, tuple[tree.TreeNode, int, int]] = {}
@@ -165,7 +166,7 @@ class Walk:
         if not text.isprintable() and (found := FORBIDDEN.search(text)):
             message = f"this text contains the invisible character {code_point(found.group())}"
             self.add(CHARACTER.at(scalar.span, message))
-        if trouble := number_trouble(scalar):
+        if (trouble := number_trouble(scalar)) and not (self.takes_infinity and trouble == tree.NOT_FINITE):
             self.add(NUMBER.at(scalar.span, f"this number {trouble}"))
         return scalar
 
@@ -452,11 +453,14 @@ def _decode(data: bytes, file: str) -> tuple[str, list[Finding]]:
         return text, [NOT_UTF8.at(span, message, label=f"byte 0x{data[error.start]:02x}", help="save it as UTF-8")]
 
 
-def read_text(text: str | bytes, file: str, known_tags: Collection[str] = ()) -> ParsedText:
+def read_text(
+    text: str | bytes, file: str, known_tags: Collection[str] = (), *, takes_infinity: bool = False
+) -> ParsedText:
     """Read the text of one manifest into a located tree; columns count characters from 1.
 
     The tree is None if the text cannot be read to its end; with other findings it holds what could be read.
-    `known_tags` are tags that may be left out; others are findings.
+    `known_tags` are tags that may be left out; others are findings, and so are `.inf` and `.nan`
+    unless it `takes_infinity`.
     """
     if isinstance(text, bytes):
         text, findings = _decode(text, file)
@@ -475,7 +479,7 @@ def read_text(text: str | bytes, file: str, known_tags: Collection[str] = ()) ->
         return None, [failure]
     if root is None:
         return None, [NOT_YAML.at(Span(file, 1, 1, 1, 2), "this file is empty")]
-    walk = Walk(text, file, known_tags)
+    walk = Walk(text, file, known_tags, takes_infinity=takes_infinity)
     node = walk.node(root)
     return node, [*walk.findings, *passwords(text, node)]
 

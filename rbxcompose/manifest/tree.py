@@ -255,6 +255,7 @@ _NUMBER = re.compile(
     r"|(?P<float>[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?)"
     r"|(?P<infinite>[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))"
 )
+NOT_FINITE = "is not finite"
 _MAY_BE_NUMBER = frozenset("+-.0123456789")
 
 
@@ -271,6 +272,12 @@ def plain_value(scalar: ScalarNode) -> PlainValue:
     if form == "float":
         return float(text)
     return int(text) if form == "decimal" else int(text, 0)
+
+
+def number_or_infinity(scalar: ScalarNode) -> PlainValue:
+    """Return the value of a scalar, where `.inf`, `-.inf` and `.nan` are numbers, too."""
+    is_infinite = number_trouble(scalar) == NOT_FINITE
+    return float(scalar.text.replace(".", "")) if is_infinite else plain_value(scalar)
 
 
 def is_empty(node: TreeNode | None) -> bool:
@@ -294,7 +301,7 @@ def _number_form(text: str) -> str:
 
 def _trouble(text: str, form: str) -> str:
     if form == "infinite":
-        return "is not finite"
+        return NOT_FINITE
     if len(text) > NUMBER:
         return f"has {len(text):,} characters, {NUMBER} are the limit"
     return "is too large" if form == "float" and not math.isfinite(float(text)) else ""
