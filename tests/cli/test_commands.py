@@ -385,6 +385,23 @@ def test_a_command_to_a_running_robot_imports_nothing_heavy() -> None:
     assert not {"pydantic", "numpy", "zenoh", "yaml", "rosbags"} & set(found.stdout.split())
 
 
+INTERRUPTING = """
+import os, signal, sys
+class Interrupted:
+    def find_spec(self, name, *others):
+        if name == "rbxcompose.base.dataclass":
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Interrupted())
+from rbxcompose.__main__ import main
+main()
+"""
+
+
+def test_an_interrupt_while_the_command_is_imported_ends_it_silently() -> None:
+    found = subprocess.run([sys.executable, "-c", INTERRUPTING], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (found.returncode, found.stdout, found.stderr) == (-signal.SIGINT, "", "")
+
+
 def test_check_imports_nothing_heavy_that_the_robot_does_not_need() -> None:
     script = "import sys; from rbxcompose.commands.main import main; main(sys.argv[1:]); print(*sys.modules)"
     command = [sys.executable, "-c", script, "check", "robots/turtlebot"]
