@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.goals import goal_of
 from rbxcompose.domains.arms.motion.arm_task import SETTLING, ArmGoal, ArmTask
 from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pairs
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget, SolverSettings
@@ -19,6 +21,7 @@ from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.motion.trace_planner import TraceWish, WayPoint
 from rbxcompose.domains.arms.reasons import MotionReason
 from rbxcompose.domains.body.model import Geometry
+from rbxcompose.msgs import rbxcompose_msgs
 from tests.loops import for_all
 from tests.motion.toy_arm import kinematics, planner
 
@@ -172,6 +175,20 @@ def test_a_target_without_a_solution_says_why(goal: PoseTarget, reason: MotionRe
     assert task.failure is not None
     assert task.failure.reason is reason
     assert named in task.failure.text
+
+
+@pytest.mark.parametrize("angle", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("name", ["roll", "pitch", "yaw"])
+def test_a_goal_with_an_angle_that_is_not_finite_fails(name: str, angle: float) -> None:
+    pose: dict[str, Any] = {"x": 0.3, "z": 0.3, name: angle}
+    goals = (
+        rbxcompose_msgs.ReachPose.Goal(**pose),
+        rbxcompose_msgs.TraceArm.Goal(points=(rbxcompose_msgs.TipPoint(**pose),)),
+    )
+    for goal in goals:
+        task = begun(Site(), goal_of(goal))
+        assert task.failure is not None
+        assert task.failure.reason is MotionReason.UNKNOWN_GOAL
 
 
 def test_the_nearest_pose_is_taken_only_if_that_is_asked_for_and_tells_what_remains() -> None:

@@ -137,4 +137,5 @@ def _point(message: rbxcompose_msgs.TipPoint) -> WayPoint:
 
 
 def _turn(message: rbxcompose_msgs.ReachPose.Goal | rbxcompose_msgs.TipPoint) -> Quaternion:
-    return quaternion_from_rpy(message.roll, message.pitch, message.yaw)
+    angles = (message.roll, message.pitch, message.yaw)
+    return quaternion_from_rpy(*angles) if all(map(math.isfinite, angles)) else (math.nan,) * 4
