@@ -17,6 +17,7 @@ FOLDER = Path("/sys/class/power_supply")
 MICRO = 1e-6
 PERCENT = 100.0
 HYSTERESIS = 0.02
+MOST = 1.1  # of its capacity: one that was measured anew may have a little more than the gauge knows
 
 
 class HostBatteryConfig(Config):
@@ -64,12 +65,13 @@ class HostBattery(HostMonitor[HostBatteryConfig]):
             there = f"there is {', '.join(battery.name for battery in found)}" if found else "there is none"
             self.status(Level.ERROR, f"no battery{' ' + name if name else ''} reports its charge: {there}")
             return
-        if not 0.0 <= supply.charge <= 1.0:
+        if not 0.0 <= supply.charge <= MOST:
             self.status(Level.ERROR, f"the gauge of {supply.name} is broken: it says {supply.charge * PERCENT:g}%")
             return
-        self.battery_level(Float32(data=supply.charge * PERCENT))
-        level = self.core.feed(self.now, supply.charge)
-        self.status(level, f"{supply.charge:.0%}, {supply.status.lower()}", **values_of(supply))
+        charge = min(supply.charge, 1.0)
+        self.battery_level(Float32(data=charge * PERCENT))
+        level = self.core.feed(self.now, charge)
+        self.status(level, f"{charge:.0%}, {supply.status.lower()}", **values_of(supply))
 
 
 def limits_of(config: HostBatteryConfig) -> Limits:
