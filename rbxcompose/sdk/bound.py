@@ -203,6 +203,13 @@ class Look(Protocol):
             LookupError: if there is none; the text names the frames or the times that there are.
         """
 
+    def newest(self) -> int | None:
+        """Return the newest stamp [ns] at which all frames between the two are known; None if they never move.
+
+        Raises:
+            LookupError: as `transform`.
+        """
+
 
 KeyedParts = Mapping[str, Any]
 

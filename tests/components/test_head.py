@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -24,6 +25,7 @@ from rbxcompose.testing import Bench
 from tests.components.slow_servos import with_slow_servos
 from tests.conftest import ROOT
 from tests.loops import for_all
+from tests.parts.project import Project
 from tests.shipped import compiled, robot_and_plan
 from tests.soak import rare
 
@@ -215,6 +217,64 @@ def test_a_frame_is_followed_until_nobody_says_where_it_is() -> None:
         bench.advance(0.05)
     assert past_point(head, (1.0, -0.5, 0.2)) < math.radians(1)
     bench.advance(1.5)
+    assert head.tracker.state != "follows"
+
+
+NODDING = """body: {urdf: neck.urdf}
+world: ../../room.yaml
+buses: {servos: {type: dynamixel}}
+actuators: {one: {bus: servos, model: AX-12, id: 1}, two: {bus: servos, model: AX-12, id: 2}}
+joints: {pan: {actuator: one}, tilt: {actuator: two}}
+controllers: {neck: {type: joint_trajectory, joints: [pan, tilt]}}
+heads: {head: {camera: eye, controller: neck, tracks: {frame: tag_box, mode: position}}}
+components: {base: {type: diff_drive_sim}}
+cameras: {front: {frame: eye, size: [320, 240], view: 60 deg}}
+tags: {size: 20 cm, names: {box: 7}}
+"""
+TAGGED_ROOM = """rbx: 1
+kind: World
+name: room
+objects:
+  box:
+    box: [4 cm, 30 cm, 30 cm]
+    at: {x: 1.5 m, y: 20 cm, heading: 190 deg}
+    z: 20 cm
+    tags: {front: {number: 7, size: 20 cm}}
+spawn: {start: {}}
+"""
+NECK = """<robot name="neck"><link name="base_footprint"/><link name="nape"/><link name="eye"/>
+<joint name="pan" type="revolute"><parent link="base_footprint"/><child link="nape"/><origin xyz="0.05 0 0.4"/>
+<axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="3" effort="1"/></joint>
+<joint name="tilt" type="revolute"><parent link="nape"/><child link="eye"/><origin xyz="0.03 0 0.06"/>
+<axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="3" effort="1"/></joint></robot>
+"""
+
+
+def test_a_head_stands_before_a_tag_that_stands(tmp_path: Path) -> None:
+    pytest.importorskip("cv2", reason="OpenCV is not installed")
+    (tmp_path / "robots/one").mkdir(parents=True)
+    (tmp_path / "robots/one/neck.urdf").write_text(NECK)
+    (tmp_path / "room.yaml").write_text(TAGGED_ROOM)
+    bench = Bench(plan=Project(tmp_path).check(NODDING).plan)
+    head: Any = bench.component("head")
+    bench.advance(2.0)
+    places = []
+    for _ in range(40):
+        bench.advance(0.05)
+        places.append((head.positions["pan"], head.positions["tilt"]))
+    assert head.tracker.state == "follows"
+    for angles in zip(*places, strict=True):
+        assert max(angles) - min(angles) < math.radians(5)  # a simulated camera draws joints a moment late
+
+
+def test_a_frame_counts_once_for_each_time_that_it_is_seen() -> None:
+    bench, head = head_that("heads.head.tracks.frame=tag_box", "heads.head.tracks.lost=200 ms")
+    at = Transform(Vector3(1.0, -0.5, 0.2))
+    placed = TransformStamped(Header(to_time(bench.clock.stamp()), head.body.root), "tag_box", at)
+    bench.publish("/tf", TFMessage(transforms=(placed,)), Qos.STATE)
+    bench.advance(0.15)
+    assert head.tracker.state == "follows"
+    bench.advance(0.15)
     assert head.tracker.state != "follows"
 
 

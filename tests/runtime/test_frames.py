@@ -121,6 +121,15 @@ def test_who_looks_back_finds_the_pose_between_two_that_were_sent() -> None:
     assert world.look.transform().translation == (20.0, 0.0, 0.0)
 
 
+def test_the_newest_time_is_that_of_the_frame_between_that_was_seen_first() -> None:
+    world = World(is_patient=True)
+    with pytest.raises(LookupError):
+        world.look.newest()
+    world.tell(1.0, 0.0, stamp=3.0)
+    world.tell(1.0, 0.0, child="lamp", stamp=2.0)
+    assert Lookup(world.frames, "base", "lamp").newest() == 2_000_000_000
+
+
 def test_a_pose_without_a_stamp_was_measured_when_it_arrived() -> None:
     world = World(is_patient=True)
     world.tell(1.0, 1.0)

@@ -83,6 +83,14 @@ class Lookup:
         """
         return self.frames.transform(self.target, self.source, at)
 
+    def newest(self) -> int | None:
+        """Return the newest stamp [ns] at which all frames between the two are known; None if they never move.
+
+        Raises:
+            LookupError: as `transform`.
+        """
+        return self.frames.newest(self.target, self.source)
+
 
 class Frames:
     """Feeds a transform tree from `/tf` and `/tf_static`.
@@ -121,6 +129,16 @@ class Frames:
             if found is None:
                 raise self.tree.problem(target, source) or TransformError(f"'{source}' has no pose in '{target}'")
         return found
+
+    def newest(self, target: str, source: str) -> int | None:
+        """Return the newest stamp [ns] at which all frames between two are known; None if they never move.
+
+        Raises:
+            TransformError: if they are not connected.
+        """
+        self._moving.catch_up()
+        with self._lock:
+            return self.tree.newest_common(target, source)
 
     def hurry(self) -> None:
         """Take each pose when it arrives: another thread looks them up and must not take them itself."""

@@ -27,7 +27,7 @@ from rbxcompose.msgs.control_msgs import FollowJointTrajectory, PointHead
 from rbxcompose.msgs.geometry_msgs import Point, PointStamped, PoseStamped
 from rbxcompose.msgs.rbxcompose_msgs import LookAtPoint, SceneObjects
 from rbxcompose.msgs.sensor_msgs import JointState
-from rbxcompose.msgs.stamps import to_duration, to_seconds
+from rbxcompose.msgs.stamps import to_duration, to_seconds, to_time
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
 
 LOOK, POINT, FOLLOW, SCENE, STREAM = "look", "point", "follow", "scene", "stream"  # its ports
@@ -136,6 +136,7 @@ class Head(sdk.Component[HeadConfig]):
         self.aimer = self.gaze  # of the goal
         self.sent: sdk.SentGoal | None = None
         self.began, self.said = 0.0, ""
+        self.watched: int | None = None  # when the frame that it follows was seen last [ns]
 
     @property
     def occupation(self) -> str:
@@ -161,24 +162,26 @@ class Head(sdk.Component[HeadConfig]):
         at = message.pose.position
         self.see((at.x, at.y, at.z), message.header.frame_id)
 
-    def see(self, point: Vector3, frame: str) -> None:
-        """Follow a point of a frame."""
+    def see(self, point: Vector3, frame: str, time: float | None = None) -> None:
+        """Follow a point of a frame, which was there at a time [s], or is now."""
         found = self.aimed(point, frame)
         self.said, before = found.text if isinstance(found, NoAim) else "", self.said
         if self.said and self.said != before:
             self.warn(f"a target is not followed: {self.said}")
         if isinstance(found, Aiming):
-            self.tracker.see(found.positions, self.now)
+            self.tracker.see(found.positions, self.now if time is None else time)
 
     def watch_frame(self) -> None:
-        """Follow a frame, as long as somebody says where it is."""
-        lost = round(self.config.tracks.lost * 1e9)
-        frame = self.config.tracks.frame
+        """Follow a frame, from where the body was when it was seen: what sees it may move with the head."""
+        look = self.bound[_look(self.config.tracks.frame)]
         try:
-            self.bound[_look(frame)].transform(at=self.stamp - lost)
+            stamp = look.newest()
+            at = look.transform(at=stamp).translation
         except LookupError:
-            return  # it is lost, or was never seen
-        self.see((0.0, 0.0, 0.0), frame)
+            return  # it was never seen
+        if stamp is None or stamp != self.watched:
+            self.watched = stamp
+            self.see(at, "", None if stamp is None else self.time_of(to_time(stamp)))
 
     def track(self, dt: float) -> None:
         """Send the joints after what is followed, if there is no goal."""
