@@ -100,6 +100,29 @@ def test_it_looks_around_to_both_sides_before_that(least: float, greatest: float
     assert min(seen) < right
 
 
+def test_it_looks_around_though_a_joint_rests_a_hair_beyond_its_limit() -> None:
+    follower = Follower(mode="position", lost=0.2, recentre=0.2, search=20.0)
+    follower.cycle(0.3)
+    for _ in range(60):
+        follower.at = {**follower.at, "tilt": 1.0016}
+        told = follower.cycle()
+        assert told is None or told["tilt"] <= 1.0
+    assert follower.tracker.state is HeadTrackingState.SEARCHES
+
+
+@pytest.mark.parametrize(("search", "state"), [(20.0, "searches"), (0.0, "recentres")])
+def test_joints_that_were_held_go_on_calmly(search: float, state: str) -> None:
+    follower = Follower(lost=0.2, recentre=0.2, search=search)
+    follower.cycle(0.3)
+    follower.at = {"pan": 1.5, "tilt": 0.0}
+    for _ in range(80):
+        told = follower.cycle()
+        follower.at = {"pan": 1.5, "tilt": 0.0}
+        if told is not None and follower.tracker.state == state:
+            assert abs(told["pan"] - 1.5) < 0.2
+    assert follower.tracker.state == state
+
+
 def test_what_leaps_is_another_target_and_does_not_throw_the_head() -> None:
     follower = Follower(mode="position", gain=1.0)
     for _ in range(10):

@@ -134,6 +134,7 @@ SLOWS, EACH = 1.1, 0.05  # by which speeds are divided in each such time [s] wit
 SMOOTH = 0.1  # [s] over which the speed of a target is averaged
 LEAP = 0.5  # [rad] at once: it is another target, whose speed is not known
 STEADY = 0.3  # [s] after a picture of a target, for which that goes on as it did
+HELD = 0.5  # [s] by which joints may be late while they move calmly
 CLOSE = 0.02  # [rad] from the middle that is as good as there
 
 
@@ -231,7 +232,7 @@ class HeadTracker:
     def _around(self, settings: HeadTracking, dt: float, present: Mapping[str, float]) -> dict[str, float]:
         """Turn to one side and to the other, by a quarter turn from ahead if the limits allow it."""
         self.state = HeadTrackingState.SEARCHES
-        told = {name: self._told.get(name, present[name]) for name in self._limits}
+        told = {name: self._calmly(settings, name, present) for name in self._limits}
         first = next(iter(self._limits))
         wanted, ahead = told[first] + self._side * settings.calm * dt, self._within(first, 0.0)
         told[first] = self._within(first, wanted)
@@ -245,14 +246,18 @@ class HeadTracker:
         """Look ahead."""
         told = {}
         for name in self._limits:
-            at = self._told.get(name, present[name])
-            most = settings.calm * dt
+            at, most = self._calmly(settings, name, present), settings.calm * dt
             told[name] = at + min(max(self._within(name, 0.0) - at, -most), most)
         if all(abs(self._within(name, 0.0) - present[name]) <= CLOSE for name in self._limits):
             self.state = HeadTrackingState.RESTS
             return None
         self.state = HeadTrackingState.RECENTRES
         return told
+
+    def _calmly(self, settings: HeadTracking, name: str, present: Mapping[str, float]) -> float:
+        """Return where a joint was sent last, but near where it is, so that one that was held does not jump."""
+        here, most = present[name], settings.calm * HELD
+        return self._within(name, min(max(self._told.get(name, here), here - most), here + most))
 
     def _within(self, name: str, position: float) -> float:
         limits = self._limits[name]
