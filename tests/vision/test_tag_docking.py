@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -92,6 +93,21 @@ def test_a_tag_that_is_nowhere_is_searched_once_around() -> None:
         simulated.time += DT
     assert simulated.docking.state is DockingState.NOT_SEEN
     assert math.tau < turned < 1.3 * math.tau
+
+
+def test_without_its_tag_it_waits_where_it_would_drive_in_and_then_gives_up(soak: Soak) -> None:
+    for seed in range(soak.examples(5, 50)):
+        simulated = Simulated(seed)
+        see = simulated.look
+
+        def look(simulated: Simulated = simulated, see: Callable[[], None] = see) -> None:
+            if simulated.docking.state is not DockingState.APPROACHES:  # there the camera looks elsewhere, or died
+                see()
+
+        simulated.look = look  # type: ignore[method-assign]
+        assert simulated.run() is DockingState.LOST
+        settings, at = simulated.docking.settings, simulated.tag.inverse().compose(simulated.at)
+        assert math.hypot(at.x, at.y) > settings.distance + settings.room / 2
 
 
 def test_a_base_that_does_not_move_is_stuck() -> None:

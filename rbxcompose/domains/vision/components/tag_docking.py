@@ -123,6 +123,7 @@ class Docking:
         limits = GoToSettings(settings.speed, settings.turn_rate, DECELERATION, distance_tolerance=0.02)
         self._driver, self._staging = GoToCore(limits), Pose2()
         self._seen, self._tries, self._searched = time, 0, 0.0
+        self._staged = time  # when it was last on its way to where it drives in
         self._last: Pose2 | None = None
         self._idle = 0.0
 
@@ -148,8 +149,8 @@ class Docking:
         """Return the velocity to command at a pose at a time [s], `dt` [s] after the last one."""
         self._watch(base, dt)
         if self.state is DockingState.STAGES:
-            self._seen = time  # on that way it may look elsewhere
-        if self.state not in OVER and time - self._seen > self.settings.patience:
+            self._staged = time  # on that way it may look elsewhere
+        if self.state not in OVER and time - max(self._seen, self._staged) > self.settings.patience:
             unseen = self.goal is None
             if unseen and self._searched < SPINS:
                 return self._search(base, dt)
@@ -162,7 +163,14 @@ class Docking:
             self._stage()
         if self.state is DockingState.STAGES:
             return self._to_staging(base, dt)
+        if self._is_blind:
+            return AT_REST
         return self._in(base) if self.state is DockingState.APPROACHES else self._turn(base)
+
+    @property
+    def _is_blind(self) -> bool:
+        """Return whether it has not seen the tag since it came to where it drives in."""
+        return self.state is DockingState.APPROACHES and self._seen <= self._staged
 
     def _before(self, distance: float) -> Pose2 | None:
         if (tag := self.place.pose) is None:
@@ -234,7 +242,7 @@ class Docking:
         moves = before is not None and (
             before.distance(base) > 0.002 * dt / 0.05 or abs(wrap_angle(base.heading - before.heading)) > 0.002
         )
-        self._idle = 0.0 if moves or self.goal is None else self._idle + dt
+        self._idle = 0.0 if moves or self.goal is None or self._is_blind else self._idle + dt
         if self._idle > self.settings.patience and self.state not in OVER:
             self.state = DockingState.STUCK
 
