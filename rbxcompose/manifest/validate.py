@@ -346,6 +346,9 @@ def _finding(model: Any, node: tree.TreeNode, path: tree.KeyPath, loc: tree.KeyP
     span = tree.value_span(node, loc)
     is_key = error["loc"][-1:] == ("[key]",)
     place = tree.key_span(node, loc) if is_key else span
+    choices = ["".join(choice) for choice in re.findall(r"'([^']*)'|(\d+)", str(context.get("expected", "")))]
+    if is_key and choices:
+        return _unknown_key(choices, node, path, loc, set())[0]
     is_misnamed = error["type"] == "string_pattern_mismatch" or (is_key and "long" not in error["type"])
     if "valid" not in context and is_misnamed:
         text = value.text if isinstance(value, tree.ScalarNode) and place is span else name
@@ -360,8 +363,7 @@ def _finding(model: Any, node: tree.TreeNode, path: tree.KeyPath, loc: tree.KeyP
             message, about = f"{where((*path, *loc[:-1]))} needs the key '{name}'", about_key(model, loc)
             return MISSING_KEY.at(tree.key_span(node, loc[:-1]), message, help=f"add '{name}: ...'{about}")
         case "literal_error" | "enum":
-            choices = re.findall(r"'([^']*)'|(\d+)", str(context.get("expected", "")))
-            return not_a_choice(span, name, value, ["".join(choice) for choice in choices])
+            return not_a_choice(span, name, value, choices)
         case "value_error" if isinstance(cause := context.get("error"), UnitError):
             return unit_finding(cause, value or node, name)
         case "unreadable":

@@ -142,6 +142,14 @@ def test_without_a_body_a_simulated_sensor_is_at_the_base_or_where_somebody_plac
     assert [each.help for each in found] == [help_text] * (help_text is not None)
 
 
+def test_a_frame_that_hangs_on_a_misspelt_frame_is_no_remedy_for_that(tmp_path: Path) -> None:
+    text = GAZER.replace("frame: neck_top", "frame: face_cam").replace("HEAD", "{}")
+    text += "body: {pieces: {face: {urdf: face.urdf, attach: {to: neck_top}}}}\n"
+    (tmp_path / "face.urdf").write_text('<robot name="face"><link name="camera"/></robot>')
+    found = [each for each in check_text(text, tmp_path).compilation.report if "'face_cam'" in each.message]
+    assert [each.help for each in found] == ["did you mean 'face_camera'?"]
+
+
 GAZER = """rbx: 1
 kind: Robot
 name: gazer

@@ -195,6 +195,7 @@ GOOD = Intrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, -0.2, 0.0, 0.0, 0.
         ("image_width: 640", "image_width: wide", "its 'image_width' is no number of pixels"),
         ("data: [500, ", "data: [", "its 'camera_matrix' has no 'data' of 9 numbers"),
         ("data: [500, ", "data: [.nan, ", "its 'camera_matrix' has 'data' that are no numbers"),
+        ("data: [500, ", "data: [5, ", "is that of a view of 178.2 deg: is it in pixels?"),
         ("data: [500, ", "data: [-500, ", "its 'camera_matrix' has no focal length"),
         ("plumb_bob", "fisheye", "its 'distortion_model' is not one of"),
         ("image_width: 640", "image_width: [", "it is no YAML"),

@@ -61,6 +61,8 @@ def test_each_side_of_a_box_shows_its_tag(index: int) -> None:
         ("box: [10 cm, 10 cm, 10 cm], tags: {front: {number: 3, size: 9 cm}}", "does not fit on 'front', 10 x 10 cm"),
         ("box: [10 cm, 10 cm, 10 cm], tags: {left: {number: 3, size: 5 cm, up: 3 cm}}", "does not fit on 'left'"),
         ("box: [10 cm, 10 cm, 10 cm], tags: {front: 587}", "tag36h11 has the tags 0 to 586, and no 587"),
+        ("box: [10 cm, 10 cm, 10 cm], tags: {frnt: 3}", "did you mean 'front'?"),
+        ("box: [10 cm, 10 cm, 10 cm], tags: {side: 3}", "front, back, left, right, top"),
         ("mesh: chair.stl, tags: {front: 3}", "a mesh has no flat sides for tags"),
         ("box: [10 cm, 10 cm, 10 cm], turns: true", "what 'turns' has a 'path'"),
     ],

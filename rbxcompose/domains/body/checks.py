@@ -44,7 +44,8 @@ def frame_of_body(robot: Robot) -> Iterator[Finding]:
             for name in named:
                 if name not in placed and name not in shape.links:
                     message = f"'{component.name}' looks up the frame '{name}', which no component publishes"
-                    known = suggest(name, [*shape.links, *sorted(placed)], "known frames")
+                    below = {item.child.value for item in written if item.parent.value == name}
+                    known = suggest(name, [*shape.links, *sorted(placed - below)], "known frames")
                     is_mounted = description is None and component.cls.simulated
                     help_text = "write 'frame: base_footprint', or add a 'body' that has it" if is_mounted else known
                     place = robot.value_span_of(component.name, name) or robot.entry_span(component.name)

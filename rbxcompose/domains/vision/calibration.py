@@ -16,7 +16,7 @@ import yaml
 from rbxcompose.base.arrays import Array, Bytes, np
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
-from rbxcompose.domains.worlds.optics import Intrinsics
+from rbxcompose.domains.worlds.optics import LEAST_VIEW, MOST_VIEW, Intrinsics
 
 LARGEST, LARGEST_FILE = 100_000_000, 100_000  # [bytes] of a picture, and of a calibration
 MODELS = {"plumb_bob": (0, 4, 5), "rational_polynomial": (8,)}
@@ -228,7 +228,11 @@ def read_calibration(path: Path) -> Intrinsics:
     bent = _numbers(read, "distortion_coefficients", MODELS[model]) if "distortion_coefficients" in read else []
     if min(matrix[0], matrix[4]) <= 0:
         raise CameraFileError("its 'camera_matrix' has no focal length")
-    return Intrinsics(width, height, matrix[0], matrix[4], matrix[2], matrix[5], tuple(bent))
+    camera = Intrinsics(width, height, matrix[0], matrix[4], matrix[2], matrix[5], tuple(bent))
+    if not LEAST_VIEW < camera.view < MOST_VIEW:
+        view = f"{math.degrees(camera.view):.4g} deg"
+        raise CameraFileError(f"its 'camera_matrix' is that of a view of {view}: is it in pixels?")
+    return camera
 
 
 def calibration_text(camera: Intrinsics) -> str:

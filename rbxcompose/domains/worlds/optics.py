@@ -16,6 +16,7 @@ from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
 
 MOST_BENT = 3.0  # times as wide as a picture is the one that is bent to it
+LEAST_VIEW, MOST_VIEW = 0.01, 3.0  # [rad] from the left to the right edge
 ROUNDS = 20  # of the iteration that straightens what a lens has bent
 DISTORTIONS = {"": (0, 4, 5), "plumb_bob": (0, 4, 5), "rational_polynomial": (0, 8), "thin_prism": (12, 14)}
 """Models of distortion, and how many coefficients each may have."""

@@ -12,6 +12,7 @@ from pydantic import Field
 from rbxcompose.base.config import Angle, Config, Frequency, Length, Time
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.domains.vision.calibration import CameraFileError, read_calibration
+from rbxcompose.domains.worlds.optics import LEAST_VIEW, MOST_VIEW
 from rbxcompose.domains.worlds.sections.world import world
 from rbxcompose.manifest.fields import FileName
 from rbxcompose.manifest.files import resolve
@@ -39,7 +40,7 @@ class CameraModel(Config):
     """The real camera, better one of `/dev/v4l/by-id`."""
     exposure: Time = Field(0.0, ge=0, le=1)
     """For how long the real one exposes a picture; 0 leaves that to it."""
-    view: Angle = Field(math.radians(60), gt=0.01, lt=3)
+    view: Angle = Field(math.radians(60), gt=LEAST_VIEW, lt=MOST_VIEW)
     """Of the simulated one without a calibration: from its left to its right edge."""
     depth: bool = False
     """Whether the simulated one measures depth."""

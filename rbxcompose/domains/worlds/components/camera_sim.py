@@ -12,6 +12,8 @@ from rbxcompose import sdk
 from rbxcompose.base.arrays import Bytes, Singles, np
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.worlds.optics import (
+    LEAST_VIEW,
+    MOST_VIEW,
     TO_OPTICAL,
     Intrinsics,
     cloud_message,
@@ -47,7 +49,7 @@ class CameraSimConfig(SensorConfig):
     """Its frame: x is ahead, or z if its name ends in `optical_frame`, as REP 103 has it."""
     size: tuple[Side, Side] = (320, 240)
     """Width and height of its pictures in pixels."""
-    view: sdk.Angle = Field(math.radians(60), gt=0.01, lt=3)
+    view: sdk.Angle = Field(math.radians(60), gt=LEAST_VIEW, lt=MOST_VIEW)
     """From its left to its right edge."""
     pinhole: list[float] = Field([], max_length=4)
     """In place of the `view`, as a calibration has it: focal lengths fx and fy, and the middle cx and cy [px]."""
