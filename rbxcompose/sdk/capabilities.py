@@ -223,6 +223,14 @@ class WritesFrame(Capability):
 
 
 @dataclass(frozen=True, slots=True)
+class MeasuresIn(Capability):
+    """Messages of its output `port` are in the frame `frame`, or its input `port` takes only those that are."""
+
+    port: str
+    frame: Setting[str]
+
+
+@dataclass(frozen=True, slots=True)
 class PutsThings(Capability):
     """It puts things into the planning scene, which stand still in the frame `stands_in`."""
 

@@ -12,6 +12,7 @@ from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.msgs.vision_msgs import Detection3DArray
 from rbxcompose.sdk import (
     Acceleration,
     AngularSpeed,
@@ -25,6 +26,7 @@ from rbxcompose.sdk import (
     Forwards,
     In,
     Length,
+    MeasuresIn,
     Navigates,
     NeedsExtra,
     OpensPort,
@@ -224,6 +226,18 @@ class Reflex(Component[Config]):
     def capabilities(cls, config: Config) -> tuple[Capability, ...]:
         """Return that it protects the robot."""
         return (CommandsMotion("flight", protects=True),)
+
+
+@component("toy_seer")
+class Seer(Component[Config]):
+    """Sees nothing, in a frame of its own."""
+
+    sights = Out(Detection3DArray, "tags")
+
+    @classmethod
+    def capabilities(cls, config: Config) -> tuple[Capability, ...]:
+        """Return the frame of what it sees."""
+        return (MeasuresIn("sights", Setting("odom")),)
 
 
 class FillerConfig(Config):

@@ -143,6 +143,13 @@ def test_a_frame_that_can_be_set_is_told_where_it_is_set(tmp_path: Path) -> None
     assert found(f"{selector}{base}    body: trailer\n", tmp_path) == []
 
 
+def test_the_frame_of_what_a_stranger_sees_is_known(tmp_path: Path) -> None:
+    text = "  base: {{type: toy_wheels}}\n  seer: {{type: toy_seer}}\n  follow: {{type: tag_follower, frame: {}}}\n"
+    [finding] = found(text.format("base_footprint"), tmp_path)
+    assert (finding.code, finding.help) == ("RBX2026", "write 'frame: odom'")
+    assert found(text.format("odom"), tmp_path) == []
+
+
 def test_the_battery_of_a_stranger_has_a_gauge(tmp_path: Path) -> None:
     plan = check_text(f"{HEAD}components:\n  cell: {{type: toy_cell, lasts: 1 h}}\n", tmp_path).plan
     assert gauges_of(plan) == {"cell": Gauge("/soc", "std_msgs/msg/Float32", "%")}

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import NAMES, WIRING, Finding, Related, Severity, Span, suggest
 from rbxcompose.compiler.check_runner import check
-from rbxcompose.compiler.model.flow import is_written, setting_span
+from rbxcompose.compiler.model.flow import MessageFlow, is_written, setting_span
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.sections.body import body
-from rbxcompose.sdk.capabilities import Drives, Setting, WritesFrame
-from rbxcompose.sdk.ports import Looks
+from rbxcompose.sdk.capabilities import Drives, MeasuresIn, Setting, WritesFrame
+from rbxcompose.sdk.ports import In, Looks
 
 STATIC = "_static"  # suffix of the topic of static transforms; both topics describe one tree
 _TF = ("/tf", f"/tf{STATIC}")
@@ -68,6 +68,23 @@ def _finding(body: Body, place: Span, message: str, help_text: str, about: tuple
     root = body.links[body.root] if body.links else None
     root_is = [Related(root.span, f"the root of the body is '{root.name}'")] if root else []
     return frame_of_body.at(place, message, help=help_text, related=root_is, about=about)
+
+
+@check("RBX2026", Severity.WARNING, closed=(WIRING,))
+def messages_in_another_frame(robot: Robot) -> Iterator[Finding]:
+    """A component takes only messages in a frame, and gets those in another one."""
+    flow = MessageFlow(robot)
+    for reader, taken in robot.declared(MeasuresIn):
+        end = reader.end(taken.port)
+        for source in flow.sources(end) if end and isinstance(end.port, In) else ():
+            for given in robot.components[source.instance].declared(MeasuresIn):
+                if given.port == source.name and given.frame.value != taken.frame.value:
+                    yield messages_in_another_frame.at(
+                        setting_span(robot, (reader, taken.frame.field)),
+                        f"'{reader.name}' takes messages in the frame '{taken.frame.value}', and those of "
+                        f"'{source.topic}' are in '{given.frame.value}'",
+                        help=f"write '{taken.frame.field}: {given.frame.value}'",
+                    )
 
 
 @check("RBX3014", Severity.WARNING, closed=(WIRING, NAMES))

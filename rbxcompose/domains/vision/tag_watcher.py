@@ -67,6 +67,11 @@ class TagWatcher(sdk.Component[C]):
         }
 
     @classmethod
+    def capabilities(cls, config: C) -> tuple[sdk.Capability, ...]:
+        """Declare the frame of its tags."""
+        return (*super().capabilities(config), sdk.MeasuresIn("tags", sdk.Setting(config.frame, "frame")))
+
+    @classmethod
     def fixed_frame(cls, config: C) -> str:
         """Return the frame in which places of tags are kept."""
         return ODOM

@@ -126,8 +126,9 @@ class TabletopDetector(sdk.Component[TabletopDetectorConfig]):
 
     @classmethod
     def capabilities(cls, config: TabletopDetectorConfig) -> tuple[sdk.Capability, ...]:
-        """Declare what it imports, and where things stand."""
+        """Declare the frame of its clouds, what it imports, and where things stand."""
         return (
+            sdk.MeasuresIn(CLOUD, sdk.Setting(config.frame, "frame")),
             sdk.PutsThings(sdk.Setting(config.level, "level")),
             sdk.NeedsExtra(sdk.Setting("scipy"), sdk.Setting("vision")),
         )

@@ -89,13 +89,13 @@ class TagDetector(sdk.Component[TagDetectorConfig]):
 
     @classmethod
     def capabilities(cls, config: TagDetectorConfig) -> tuple[sdk.Capability, ...]:
-        """Declare what it needs, and the frames that it places."""
+        """Declare what it needs, and the frames that it places and measures in."""
         frame = sdk.Setting(config.frame, "frame")
         frames = [
             sdk.WritesFrame("tf", frame, sdk.Setting(f"{FRAME}{name}"), needs_parent=True)
             for name in (*config.names, *config.boards)
         ]
-        return (sdk.NeedsExtra(sdk.Setting("cv2"), sdk.Setting("vision")), *frames)
+        return (sdk.NeedsExtra(sdk.Setting("cv2"), sdk.Setting("vision")), sdk.MeasuresIn("seen", frame), *frames)
 
     def configure(self) -> None:
         """Know no camera yet."""

@@ -153,6 +153,8 @@ class CameraSim(WorldSensor[CameraSimConfig]):
         """Declare what it needs, and its optical frame."""
         found: list[sdk.Capability] = [sdk.NeedsExtra(sdk.Setting("cv2"), sdk.Setting("vision"))]
         frame, optical = sdk.Setting(config.frame, "frame"), config.optical_frame
+        if config.depth and config.cloud:
+            found.append(sdk.MeasuresIn("points", sdk.Setting(optical)))
         if optical != config.frame:
             found.append(sdk.WritesFrame("tf", frame, sdk.Setting(optical), needs_parent=True))
         if config.by_physics:
