@@ -113,10 +113,11 @@ class _Watch:
                     folder.write_findings(self._findings)
                 self._log = Follower(folder.path / NAME)
                 return None
-            case launch.Up(components, processes, seconds):
+            case launch.Up(components, processes, seconds, blocked):
                 self._is_up = True
                 took = "" if self._options.is_stepped else f", {seconds:.2f} s"  # all stepped runs write the same
-                emit(f"{name} is up: {extent(components, processes)}{took}")
+                lacks = f" without {', '.join(blocked)}" if blocked else ""
+                emit(f"{name} is up{lacks}: {extent(components, processes)}{took}")
                 warn_of_lost_log(RobotFolder.of(name))
                 if not self._options.is_stepped:
                     for instance in self._plan.instances:
@@ -127,7 +128,7 @@ class _Watch:
                                 show_link(name, page.port.value, is_lan=page.listen.value == "lan")
                 if self._options.is_detached:
                     self._started.let_go()
-                    return 0
+                    return ROBOT_FAILED if blocked else 0
                 return None
             case launch.AlreadyUp(pid):
                 self._started.wait()

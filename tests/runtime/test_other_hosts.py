@@ -147,3 +147,11 @@ def test_a_change_of_the_security_of_links_says_so_with_their_ends() -> None:
     secured = replace(plan.share, tls=LinkTls("ca", "certificate", "key"), connect=("tls/10.0.0.2:7500",))
     words = "links: none -> mtls, tcp/10.0.0.2:7500 -> tls/10.0.0.2:7500; they open again"
     assert summary(changes(plain, replace(plan, share=secured))).startswith(words)
+
+
+def test_who_does_not_start_because_another_failed_keeps_no_host_waiting() -> None:
+    stage = desk()
+    tell(stage, "blocked")
+    assert stage.conductor.state_of("go_to")[0] == "blocked"
+    stage.pass_time(0.5)
+    assert (stage.reports[-1].states["go_to"], stage.ups) == ("blocked", 1)

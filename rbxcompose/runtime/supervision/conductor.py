@@ -14,6 +14,8 @@ from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.supervision.members import (
+    BLOCKED,
+    DONE,
     LOOK,
     BlockedComponents,
     ConductorEffects,
@@ -123,7 +125,7 @@ class Conductor:
         self.time = 0.0  # [s] of robot time, as far as known
         self.states: dict[str, tuple[str, int]] = {instance.name: ("unconfigured", 0) for instance in plan.instances}
         self.is_real_time = not options.is_stepped and not plan.follows_clock
-        self.blocked = BlockedComponents(effects)
+        self.blocked = BlockedComponents(effects, is_stepped=options.is_stepped)
         self.plan, self.layers = plan, options.layers
         self.generation = 0  # of the plan: how often it was changed
         self._changing: Changing | None = None
@@ -141,6 +143,11 @@ class Conductor:
     def is_stopped(self) -> bool:
         """Return whether everything that moves is held."""
         return self.latch.is_stopped
+
+    def state_of(self, name: str) -> tuple[str, int]:
+        """Return the state of a component and its restarts; it is BLOCKED if it waits for a failed one to start."""
+        state, restarts = self.states[name]
+        return (BLOCKED if name in self.blocked.unstarted else state), restarts
 
     @property
     def phase(self) -> Phase:
@@ -170,16 +177,15 @@ class Conductor:
 
     def _proceed(self) -> None:
         """Do the next step of starting, for the whole robot or for restarted processes."""
+        self.blocked.look(self.plan, self.states, self.hosts.failed, self.members)
         if self.is_going_down or not self._all_configured():
             return
-        waiting = [
-            instance for instance in self.plan.instances if self.states[instance.name][0] not in ("active", "failed")
-        ]
+        waiting = [instance for instance in self.plan.instances if self.state_of(instance.name)[0] not in DONE]
         fresh = [instance for instance in waiting if instance.name not in self.members[instance.process].requested]
         if self.phase is Phase.STARTING and waiting[:1] != fresh[:1]:
             return  # the answer of the first one is pending, or it is being restarted in place
-        slow = {instance.name for instance in waiting if component_type(instance.type).blocking}
-        fresh = [instance for instance in self.hosts.reached(fresh) if slow.isdisjoint(instance.starts_after)]
+        late = {instance.name for instance in waiting}
+        fresh = [instance for instance in self.hosts.reached(fresh) if late.isdisjoint(instance.starts_after)]
         if fresh:
             group = fresh[0].process
             names = [one.name for one in takewhile(lambda instance: instance.process == group, fresh)]
@@ -196,7 +202,7 @@ class Conductor:
         for group in self.plan.groups:
             self._start(self.members[group])
         if self._changing:
-            self._changing.look(self.states)
+            self._changing.look({name: self.state_of(name) for name in self.states}, self.blocked.causes)
 
     def _all_configured(self) -> bool:
         members = (self.members[group] for group in self.plan.groups)
@@ -337,7 +343,7 @@ class Conductor:
             self.go_down(ROBOT_FAILED, message, Level.ERROR)
 
     def _are(self, states: Mapping[str, tuple[str, int]]) -> None:
-        """Apply new states; inform components blocked by a failed one, and hold motion if it was on a command path."""
+        """Apply new states; if a component has failed on the path of commands, hold motion."""
         states = {name: state for name, state in states.items() if name in self.states}
         new = {name for name, (state, _) in states.items() if state == "failed" and self.states[name][0] != "failed"}
         self.states.update(states)
@@ -345,7 +351,6 @@ class Conductor:
         self._notify_hosts()
         if self._options.is_stepped:  # there it would be received at another instant in each run
             return
-        self.blocked.look(self.plan, self.states, self.hosts.failed, self.members)
         commanding = [
             instance.name for instance in self.plan.instances if instance.name in new and is_commanding(instance)
         ]
@@ -370,13 +375,13 @@ class Conductor:
         if (end := self.hosts.receive(report, self._scheduler.now)) is not None:
             self.go_down(end.exit_code, f"{end.reason} (host '{report.host}')")
         self.latch.heard_host(report)
-        self.blocked.look(self.plan, self.states, self.hosts.failed, self.members)
         self._proceed()
 
     def _notify_hosts(self) -> None:
         is_of_all = self.is_going_down and self.exit_code != INTERRUPTED  # a signal is for this host alone
         end = messages.RobotEnd(self.exit_code, self.reason) if is_of_all else None
-        self.hosts.report(self.states, self.latch.shared, end, is_going_down=self.is_going_down)
+        states = {name: self.state_of(name) for name in self.states}
+        self.hosts.report(states, self.latch.shared, end, is_going_down=self.is_going_down)
 
     def _alive(self, member: Member) -> None:
         if member.is_reported_lost and member.is_configured:

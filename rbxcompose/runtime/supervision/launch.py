@@ -38,11 +38,12 @@ class Begun:
 
 @dataclass(frozen=True, slots=True)
 class Up:
-    """All components are active, `seconds` of real time after the start."""
+    """All components are active but those `blocked`, `seconds` of real time after the start."""
 
     components: int
     processes: int
     seconds: float
+    blocked: list[str] = field(default_factory=list)  # they start after others, which have failed
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +200,7 @@ def _run(launch: Launch, folder: RobotFolder, lock: int, reports: TextIO) -> Run
     plan, clock = launch.plan, launch.clock
 
     def report_up() -> None:
-        _report(reports, Up(len(plan.instances), len(plan.groups), clock.now()))
+        _report(reports, Up(len(plan.instances), len(plan.groups), clock.now(), supervisor.conductor.blocked.unstarted))
 
     supervisor = Supervisor(launch, folder, lock, report_up)
     try:

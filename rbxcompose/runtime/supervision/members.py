@@ -105,6 +105,7 @@ class Member:
     def exited(self, how: str) -> str:
         """Note its end; return how it ended in words, with the reason if it was killed for one."""
         self.is_there = self.is_configured = False
+        self.requested.clear()
         self.moves, self.runs = (), {}
         return self.killed_for if self.killed_for and how == KILLED else how
 
@@ -114,28 +115,42 @@ class Member:
         self.policy.begin(now)
         self.is_configured = self.is_started = self.is_at_rest = self.is_reported_lost = False
         self.moves, self.runs, self.killed_for = (), {}, ""
-        self.requested.clear()
 
+
+BLOCKED = "blocked"  # the state of a component that starts after a failed one, or cannot do its work without it
+DONE = ("active", "failed", BLOCKED)  # states in which nobody waits for a component to start
 
 _FED_BY = {In.kind: Out.kind, Calls.kind: Serves.kind, CallsAction.kind: ServesAction.kind}
 
 
-def blocked_by(plan: Plan, failed: Collection[str]) -> dict[str, str]:
-    """Return the components that cannot work because all that serve or feed a port have failed: name -> one of those.
+def down_by(waiting: Iterable[Instance], failed: Iterable[str]) -> dict[str, str]:
+    """Return who is down, each with who failed: the failed, and those waiting, in start order, that start after them."""
+    down = {name: name for name in failed}
+    for instance in waiting:
+        if cause := _awaited(instance, down):
+            down[instance.name] = down[cause]
+    return down
 
-    An input that is open to the outside waits for none. A component that starts after a failed one waits for it, too.
+
+def blocked_by(plan: Plan, down: Mapping[str, str]) -> dict[str, str]:
+    """Return the components that cannot work because all that serve or feed a port are down: name -> one that failed.
+
+    An input that is open to the outside waits for none. A component that starts after one that is down waits, too.
     """
     found: dict[str, str] = {}
-    for instance in plan.instances if failed else ():
-        if instance.name not in failed and (cause := _cause(plan, instance, failed)):
-            found[instance.name] = cause
+    for instance in plan.instances if down else ():
+        if down.get(instance.name) != instance.name and (cause := _cause(plan, instance, down)):
+            found[instance.name] = down[cause]
     return found
 
 
+def _awaited(instance: Instance, names: Collection[str]) -> str:
+    return next((name for name in instance.starts_after if name in names), "")
+
+
 def _cause(plan: Plan, instance: Instance, failed: Collection[str]) -> str:
-    late = [name for name in instance.starts_after if name in failed]
-    if late:
-        return late[0]
+    if late := _awaited(instance, failed):
+        return late
     for wire in _needed(instance):
         feeding = [other.name for other in plan.everywhere if _feeds(other, wire)]
         if feeding and all(name in failed for name in feeding):
@@ -186,18 +201,31 @@ class KeptValues:
 
 
 class BlockedComponents:
-    """Knows who is blocked; `causes` has for each blocked component the one that failed."""
+    """Knows who is blocked; `causes` has for each blocked component the one that failed.
 
-    def __init__(self, effects: ConductorEffects) -> None:
+    Of these, those in `unstarted` must not start: they have not been active, and start after it.
+    """
+
+    def __init__(self, effects: ConductorEffects, *, is_stepped: bool) -> None:
         self.causes: dict[str, str] = {}
-        self._effects = effects
+        self.unstarted: list[str] = []
+        self._effects, self._is_stepped = effects, is_stepped
 
     def look(
         self, plan: Plan, states: Mapping[str, tuple[str, int]], others: Collection[str], members: Mapping[str, Member]
     ) -> None:
         """Find out who is blocked now, and tell those for whom this is news; `others` have failed on other hosts."""
         failed = {*others, *(name for name, (state, _) in states.items() if state == "failed")}
-        before, self.causes = self.causes, blocked_by(plan, failed)
+        waiting = [
+            instance
+            for instance in plan.instances
+            if states[instance.name][0] not in DONE and instance.name not in members[instance.process].requested
+        ]
+        down = down_by(waiting, failed)
+        self.unstarted = [name for name in down if name not in failed]
+        before, self.causes = self.causes, blocked_by(plan, down)
+        if self._is_stepped:  # there the processes would receive it at another instant in each run
+            return
         for name in self.causes.keys() - before.keys():
             self._effects.log(Level.WARN, f"'{name}' {blocked_text(self.causes, name)}")
         touched = {name for name in {*before, *self.causes} if before.get(name) != self.causes.get(name)}

@@ -12,10 +12,9 @@ from rbxcompose.base.levels import Level
 from rbxcompose.compiler.plan.model import Instance, OtherHost, Share
 from rbxcompose.runtime.channel import HostReport, Lost, RobotEnd, SharedStop
 from rbxcompose.runtime.folder import ClockOffset
-from rbxcompose.runtime.supervision.members import ConductorEffects
+from rbxcompose.runtime.supervision.members import BLOCKED, DONE, ConductorEffects
 
 SILENT = 2.0  # [s] without a report after which the components of a host count as lost; links lose more than processes
-_DONE = ("active", "failed")
 
 
 @dataclass
@@ -120,7 +119,7 @@ class OtherHosts:
         """Yield instances until the first one that starts after a component which another host has yet to activate."""
         elsewhere = {one.name for host in self._others.values() if not host.is_optional for one in host.instances}
         for instance in instances:
-            if any(name in elsewhere and self._state(name) not in _DONE for name in instance.starts_after):
+            if any(name in elsewhere and self._state(name) not in DONE for name in instance.starts_after):
                 return
             yield instance
 
@@ -134,7 +133,7 @@ class OtherHosts:
         return not missing
 
     def _is_active(self, host: OtherHost) -> bool:
-        return all(self._state(instance.name) in _DONE for instance in host.instances) and host.name in self._known
+        return all(self._state(instance.name) in DONE for instance in host.instances) and host.name in self._known
 
     def _state(self, name: str) -> str:
         """Return the state of a component of another host; unconfigured if this is unknown."""
@@ -143,6 +142,6 @@ class OtherHosts:
 
     @property
     def failed(self) -> set[str]:
-        """Return the components of other hosts that have failed."""
+        """Return the components of other hosts that have failed, or do not start because others have."""
         reports = (known.report.states for known in self._known.values())
-        return {name for states in reports for name, state in states.items() if state == "failed"}
+        return {name for states in reports for name, state in states.items() if state in ("failed", BLOCKED)}

@@ -16,7 +16,7 @@ from rbxcompose.compiler.plan.diff import BOUNDS, WHOLE, Change, difference
 from rbxcompose.compiler.plan.dump import dump
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as messages
-from rbxcompose.runtime.supervision.members import ConductorEffects, Member, is_commanding
+from rbxcompose.runtime.supervision.members import BLOCKED, DONE, ConductorEffects, Member, blocked_text, is_commanding
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.registry import component_type
 
@@ -337,14 +337,16 @@ class Changing:
 
     # The end
 
-    def look(self, states: Mapping[str, tuple[str, int]]) -> None:
-        """End the change once all components have reached their final states."""
+    def look(self, states: Mapping[str, tuple[str, int]], blocked: Mapping[str, str]) -> None:
+        """End the change once all components have reached their final states; `blocked` has the causes."""
         if self.is_over or not self._has_switched or self._setting:
             return
-        if all(states[name][0] in ("active", "failed") for name in self.changes.starting):
+        if all(states[name][0] in DONE for name in self.changes.starting):
             for name in sorted(self.changes.starting):
                 if states[name][0] == "failed":
                     self.failures.setdefault(name, f"'{name}' has failed and is never restarted, the log says why")
+                elif states[name][0] == BLOCKED:
+                    self.failures[name] = f"'{name}' {blocked_text(blocked, name)}"
             self._end("; ".join(self.failures.values()))
 
     def time_is_up(self, states: Mapping[str, tuple[str, int]]) -> None:

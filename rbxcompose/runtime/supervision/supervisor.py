@@ -436,7 +436,7 @@ class Supervisor:
         )
 
     def _component(self, name: str, type_name: str, process: str) -> ComponentState:
-        state, restarts = self.conductor.states[name]
+        state, restarts = self.conductor.state_of(name)
         waits_for = self.conductor.blocked.causes.get(name)
         child = self._children.get(process)
         pid = child.process.pid if child and child.process else None
