@@ -50,6 +50,11 @@ def goal(x: float, y: float, heading: float = 0.0, frame: str = "map") -> Naviga
     return NavigateToPose.Goal(pose=PoseStamped(header=Header(frame_id=frame), pose=pose))
 
 
+def come_to(robot: Bench, x: float) -> None:
+    moved = TransformStamped(header=Header(frame_id="map"), child_frame_id="base_footprint")
+    robot.publish("/tf", TFMessage(transforms=(replace(moved, transform=Transform(translation=Vector3(x=x))),)))
+
+
 class Driver:
     """A client that keeps what it is told."""
 
@@ -138,24 +143,38 @@ def test_a_goal_that_cannot_be_reached_ends_with_the_reason() -> None:
 def test_a_goal_waits_at_rest_while_no_position_comes_and_goes_on_with_the_next() -> None:
     robot = Bench(instance("transforms", "transforms"), instance("go_to", "go_to"))
     driver, commands = Driver(robot), robot.collect("cmd_vel", Twist)
-
-    def come_to(x: float) -> None:
-        moved = TransformStamped(header=Header(frame_id="map"), child_frame_id="base_footprint")
-        robot.publish("/tf", TFMessage(transforms=(replace(moved, transform=Transform(translation=Vector3(x=x))),)))
-
-    come_to(0.0)
+    come_to(robot, 0.0)
     driver.send(goal(1.0, 0.0))
     robot.advance(1.0)
     assert commands[-1].linear.x > 0.0
     robot.advance(60.0)  # as when the link to the host of the base is cut
     why = "no position of the base in 'map' has come for 2 s: waits for the next"
     assert (driver.ended, commands[-1], str(robot.records).count(why)) == ([], Twist(), 1)
-    come_to(0.5)
-    robot.advance(0.2)
+    come_to(robot, 0.5)
+    robot.advance(1.5)
     assert commands[-1].linear.x > 0.0
-    come_to(1.0)
+    come_to(robot, 1.0)
     robot.advance(0.2)
     assert [end.outcome for end in driver.ended] == [Outcome.SUCCEEDED]
+
+
+def test_a_goal_ends_when_odometry_has_begun_again_and_the_next_counts_from_there() -> None:
+    robot = Bench(instance("transforms", "transforms"), instance("go_to", "go_to"))
+    driver, commands = Driver(robot), robot.collect("cmd_vel", Twist)
+    come_to(robot, 0.0)
+    driver.send(goal(1.0, 0.0))
+    for x in (0.1, 0.2, 0.3, 0.4, 0.5):
+        robot.advance(0.35)
+        come_to(robot, x)
+    robot.advance(0.7)  # as long as a driver that was killed takes to start
+    come_to(robot, 0.0)
+    robot.advance(0.1)
+    why = "the odometry of the base has jumped, so its position is not known any more"
+    assert [end.result for end in driver.ended] == [NavigateToPose.Result(error_code=1, error_msg=why)]
+    assert commands[-1] == Twist()
+    driver.send(goal(1.0, 0.0))
+    robot.advance(0.5)
+    assert commands[-1].linear.x > 0.0
 
 
 def test_a_goal_in_another_frame_is_refused() -> None:

@@ -20,6 +20,7 @@ from rbxcompose.msgs.std_msgs import Header
 
 MAP = "map"
 UNKNOWN = 2.0  # [s] without a position, as after a restart of the base; if there is none at all, a goal ends
+LEAPS = 0.2, 0.5  # [m], [rad] by which odometry may be off what the base can have driven since its last change
 FARTHEST = 100_000.0  # [m] from the origin; no map is as large
 ServedPose = sdk.ServedGoal[NavigateToPose.Goal, NavigateToPose.Result, NavigateToPose.Feedback]
 
@@ -48,6 +49,7 @@ class GoTo(BaseDriver[GoToConfig]):
     rate = 20.0
     steps_for_goals = True
     pose = sdk.Looks(source="base_footprint", target=MAP)
+    odometry = sdk.Looks(source="base_footprint", target="odom")
     go_to = sdk.ServesAction(NavigateToPose, "go_to", claims="base")
 
     @classmethod
@@ -63,6 +65,7 @@ class GoTo(BaseDriver[GoToConfig]):
         self.driving: object = None  # the goal that the core drives to
         self.began = 0.0  # [s], when it began to
         self.blind_since = math.inf  # [s]
+        self.seen: tuple[Pose2, float] | None = None  # the newest odometry during this goal, and since when [s]
 
     def reconfigure(self, old: GoToConfig) -> None:
         """Continue to the current goal with the new settings."""
@@ -107,8 +110,11 @@ class GoTo(BaseDriver[GoToConfig]):
         """Command the base for one cycle and report where it is and what remains."""
         wanted = pose_in(goal.request.pose.pose)
         if goal is not self.driving:
-            self.driving, self.began = goal, self.now
+            self.driving, self.began, self.seen = goal, self.now, None
             self.core.start(wanted)
+        if self.has_leapt():
+            self.fail(goal, "the odometry of the base has jumped, so its position is not known any more")
+            return
         velocity, done = self.core.update(pose, dt)
         self.drive(velocity)
         if done:
@@ -124,6 +130,18 @@ class GoTo(BaseDriver[GoToConfig]):
                 distance_remaining=self.core.distance,
             )
             goal.feedback(told)
+
+    def has_leapt(self) -> bool:
+        """Return whether odometry is where the base cannot have driven, as after a driver has begun again at zero."""
+        before, pose = self.seen, self.odometry.now()
+        if pose is None or (before is not None and pose == before[0]):
+            return False
+        self.seen = pose, self.now
+        if before is None:
+            return False
+        step, duration = before[0].inverse().compose(pose), self.now - before[1]
+        limits = LEAPS[0] + self.config.speed * duration, LEAPS[1] + self.config.turn_rate * duration
+        return math.hypot(step.x, step.y) > limits[0] or abs(step.heading) > limits[1]
 
     def hold(self) -> None:
         """Command a halt: no step follows while robot time stands still."""
