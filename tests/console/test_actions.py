@@ -269,6 +269,23 @@ def test_a_service_may_answer_with_a_list() -> None:
     assert room.asked()[-1] == ServiceAnswer(1, SetBool.Response(success=True, message="ding"))
 
 
+def test_a_response_that_cannot_be_used_fails_the_request_with_the_reason() -> None:
+    room = Room()
+    client = room.client()
+    client.does("advertise_service", service="/bell", type="std_srvs/SetBool")
+    room.bridge.requested("/bell", 1, SetBool.Request())
+    client.gets()
+    (status,) = client.does("service_response", service="bell", id="request:1", values={"sound": 1}, result=True)
+    answer = room.asked()[-1]
+    assert isinstance(answer, ServiceAnswer)
+    assert (answer.number, answer.response) == (1, None)
+    assert "its response cannot be used: " in answer.error
+    assert "has no field 'sound'" in answer.error
+    assert "has no field 'sound'" in status["msg"]
+    (status,) = client.does("service_response", service="bell", id="request:1", values={})
+    assert "no open request" in status["msg"]
+
+
 def test_a_service_that_exists_is_not_served_again() -> None:
     (status,) = Room().client().does("advertise_service", service="/lamp", type="std_srvs/SetBool")
     assert status["msg"] == "'/lamp' is served already"

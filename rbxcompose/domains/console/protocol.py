@@ -935,11 +935,10 @@ class Bridge:
     def _call(self, number: int, target: OperationTarget, given: object, data: Mapping[str, Any]) -> None:
         type_ = self._type_of(target.name, target.type, data.get("type"), "service")
         request = from_json(type_.Request, arguments(type_.Request, given), self._stamp)
-        timeout = data.get("timeout")
-        if isinstance(timeout, bool) or not isinstance(timeout, int | float | None):
-            raise BadFrameError("'timeout' is a number of seconds")
-        patience = min(timeout, LONGEST_PATIENCE) if timeout is not None and timeout > 0 else PATIENCE
-        self._requests.append(ServiceCall(number, target.name, type_, request, patience))
+        timeout = data.get("timeout") or PATIENCE
+        if isinstance(timeout, bool) or not isinstance(timeout, int | float) or not 0 <= timeout <= LONGEST_PATIENCE:
+            raise BadFrameError(f"'timeout' is a number of seconds from 0 to {LONGEST_PATIENCE:g}")
+        self._requests.append(ServiceCall(number, target.name, type_, request, timeout))
 
     # Services and actions of clients
 
@@ -978,16 +977,20 @@ class Bridge:
         number = next((one for one in served.open if data.get("id") == f"request:{one}"), -1) if served else -1
         if served is None or served.client != client.number or number < 0:
             raise BadFrameError(f"there is no open request to '{service}' of this id")
+        served.open.discard(number)
         if data.get("result") is False:
             values = data.get("values")
             reason = values.get("message") if isinstance(values, dict) else values
             refusal = _short(reason) if isinstance(reason, str) and reason else "it was refused"
             self._requests.append(ServiceAnswer(number, None, refusal))
         else:
-            values = arguments(served.type.Response, data.get("values") or {})
-            response = from_json(served.type.Response, values, self._stamp)
+            try:
+                values = arguments(served.type.Response, data.get("values") or {})
+                response = from_json(served.type.Response, values, self._stamp)
+            except WrongMessageError as error:
+                self._requests.append(ServiceAnswer(number, None, f"its response cannot be used: {error}"))
+                raise
             self._requests.append(ServiceAnswer(number, response))
-        served.open.discard(number)
 
     def _action_feedback(self, client: _Client, data: Mapping[str, Any], target: OperationTarget) -> None:
         served, number = self._carried_out(client, data, target.name)

@@ -1056,7 +1056,7 @@ class GatewaySession:
             self._carry_out_further()
 
         def call() -> None:
-            caller(request.request, then or answered, timeout=max(_PAUSE, deadline - self._now))
+            caller(request.request, then or answered, timeout=max(_PAUSE, round(deadline - self._now, 2)))
 
         self._once(lambda: caller.is_available or self._now >= deadline, call)
 
