@@ -9,11 +9,13 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
+from rbxcompose.bus.topics import Publisher
 from rbxcompose.compiler.model.robot import ends_of
 from rbxcompose.compiler.plan.model import Instance, Plan, Wire
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.compiler.systems.share import exchanges
 from rbxcompose.msgs import registry
+from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
 from rbxcompose.msgs.rcl_interfaces import Parameter, ParameterValue
 from rbxcompose.msgs.types import Message
@@ -42,10 +44,25 @@ def instance(
     return Instance(name, type_name, made, cls.process, (), wires)
 
 
+class _BenchPublisher(Publisher[M]):
+    """Encodes each message, so that whoever publishes what cannot be sent fails as with a listener elsewhere."""
+
+    def __call__(self, message: M) -> None:
+        super().__call__(message)
+        encode(message)
+
+
+class _BenchBus(Bus):
+    def publisher(self, owner: str, topic: str, message: type[M], qos: Qos) -> Publisher[M]:
+        node = self._node(owner)
+        return node.keep(_BenchPublisher(self._topics, node, topic, message, qos))
+
+
 class Bench:
     """Instances, or a whole `plan`, in one process on a stepped clock, configured and active immediately.
 
-    `records` holds what they logged, `events` what they reported to the supervisor; live settings keep `rules`.
+    `records` holds what they logged, `events` what they reported to the supervisor; live settings keep `rules`. A
+    component that publishes a value that its message cannot have, such as text as a number, fails.
     """
 
     def __init__(
@@ -64,7 +81,7 @@ class Bench:
         self.plan = plan.in_one_process() if plan else Plan("bench", "bench.yaml", tuple(instances), messages=own)
         registry.choose(self.plan.messages)
         bus = self.plan.bus
-        self.bus = Bus(
+        self.bus = _BenchBus(
             self.scheduler, self.clock, domain=bus.domain, namespace=bus.namespace, wire=bus.wire, log=self._note
         )
         self.host = Host(

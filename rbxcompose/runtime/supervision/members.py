@@ -124,7 +124,7 @@ _FED_BY = {In.kind: Out.kind, Calls.kind: Serves.kind, CallsAction.kind: ServesA
 
 
 def down_by(waiting: Iterable[Instance], failed: Iterable[str]) -> dict[str, str]:
-    """Return who is down, each with who failed: the failed, and those waiting, in start order, that start after them."""
+    """Return who is down, with who failed: the failed, and those waiting, in start order, that start after them."""
     down = {name: name for name in failed}
     for instance in waiting:
         if cause := _awaited(instance, down):
