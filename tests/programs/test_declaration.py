@@ -136,6 +136,16 @@ def test_capabilities_are_those_of_any_other_base() -> None:
             "'B=C' is not a valid name (a variable's name has one character or more, and no '=')",
         ),
         (
+            {"environment": {"ROS_DOMAIN_ID": "33"}},
+            "'ROS_DOMAIN_ID' is not a valid name"
+            " (the robot sets it: remove it; the domain of all is 'bus: {domain: 7}')",
+        ),
+        (
+            {"secrets": {"RBXCOMPOSE_KEY_ODOM": "x"}},
+            "'RBXCOMPOSE_KEY_ODOM' is not a valid name"
+            " (the robot sets it: remove it; the domain of all is 'bus: {domain: 7}')",
+        ),
+        (
             {"ready": {"output": "a("}},
             "'output': is not a regular expression: missing ), unterminated subpattern at position 1",
         ),

@@ -27,7 +27,7 @@ def findings(there: Path, /, **config: Any) -> list[tuple[str, str, int]]:
 
 def executable(file: Path, text: str = "#!/bin/sh\n", mode: int = 0o755) -> None:
     file.parent.mkdir(exist_ok=True)
-    file.write_text(text, encoding="utf-8")
+    file.write_text(text, encoding="latin-1")
     file.chmod(mode)
 
 
@@ -58,6 +58,8 @@ def test_a_file_that_may_not_be_run_is_told_with_what_makes_it_so(tmp_path: Path
 
 
 NO_LINE = "driver: the first line of a script names what runs it: '#!/bin/sh'"
+CUT_OFF = "driver is cut off: it begins as a binary, and ends within its header"
+OWN = Path("/proc/self/exe").read_bytes()[:20].decode("latin-1")
 CR_LF = "the lines of driver end with CR LF; Linux needs LF alone"
 
 
@@ -72,7 +74,11 @@ CR_LF = "the lines of driver end with CR LF; Linux needs LF alone"
         ("", NO_LINE),
         ("#!\ntrue\n", NO_LINE),
         ("echo hello\n", NO_LINE),
-        ("\x7fELF\2\1\1\0", ""),
+        ("\x7fELF\2\1\1\0", CUT_OFF),
+        ("\x7fELF", CUT_OFF),
+        (OWN, ""),
+        (OWN[:18] + chr(ord(OWN[18]) ^ 1) + OWN[19:], "driver is built for another kind of processor"),
+        ("\x7fELF\1" + OWN[5:18] + chr(ord(OWN[18]) ^ 1) + OWN[19:], ""),
     ],
 )
 def test_a_script_needs_what_runs_it(tmp_path: Path, text: str, why: str) -> None:

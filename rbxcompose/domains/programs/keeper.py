@@ -30,6 +30,9 @@ _AT_ONCE = 1.0  # [s] for what was killed to end
 _ORPHANED = 1.0  # [s] that a program has when nobody is left to drive the robot
 _CLEANS_UP = 5.0  # [s] for the command that cleans up
 _LIBC = ctypes.CDLL(None)
+_ELF = b"\x7fELF"  # how a binary begins
+_CLASS, _MACHINE = 4, slice(18, 20)  # where its header has whether it is of 32 or 64 bit, and for which processor
+_EMULATORS = "/proc/sys/fs/binfmt_misc"
 _TAKEN = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE)
 
 
@@ -151,6 +154,8 @@ def _obstacle_in(file: str) -> str:
             start = script.read(256)
     except OSError:
         return ""  # it may be run, but not read
+    if start.startswith(_ELF):
+        return _obstacle_in_binary(file, start)
     words = start[2:].partition(b"\n")[0].replace(b"\t", b" ").strip(b" ").split(b" ")  # a CR belongs to a word
     interpreter = os.fsdecode(words[0]) if start.startswith(b"#!") else ""
     if not interpreter:
@@ -159,6 +164,20 @@ def _obstacle_in(file: str) -> str:
     if name.endswith(b"\r"):
         return f"the lines of {file} end with CR LF; Linux needs LF alone"
     return f"{file} is to be run by {interpreter}, which is not there" if not os.path.exists(interpreter) else ""
+
+
+def _obstacle_in_binary(file: str, start: bytes) -> str:
+    """Return why this machine cannot run a binary with this header, by that of the Python which runs here."""
+    if len(start) < _MACHINE.stop:
+        return f"{file} is cut off: it begins as a binary, and ends within its header"
+    with open("/proc/self/exe", "rb") as python:
+        own = python.read(_MACHINE.stop)
+    is_alike = start[_CLASS] == own[_CLASS]  # a machine of 64 bit may also run what is for its ancestor of 32 bit
+    if not is_alike or start[_MACHINE] == own[_MACHINE]:
+        return ""
+    emulators = os.listdir(_EMULATORS) if os.path.isdir(_EMULATORS) else []
+    is_emulated = any(name.startswith("qemu") for name in emulators)
+    return "" if is_emulated else f"{file} is built for another kind of processor"
 
 
 def keep(wanted: ProgramOrder, child: int, ended: int, report: Report) -> None:

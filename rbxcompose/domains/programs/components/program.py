@@ -98,6 +98,10 @@ def _is_variable(name: str) -> str:
         raise PydanticCustomError(
             "variable", "no name", {"help": "a variable's name has one character or more, and no '='"}
         )
+    if name == "ROS_DOMAIN_ID" or name.startswith("RBXCOMPOSE_"):
+        raise PydanticCustomError(
+            "variable", "no name", {"help": "the robot sets it: remove it; the domain of all is 'bus: {domain: 7}'"}
+        )
     return name
 
 
@@ -474,7 +478,7 @@ class Runner(Component[R]):
                         self.is_ready = True
                 case "started", _:
                     self.is_ready = self.is_ready or ready is None
-                    self.state = TaskStatus(Level.OK, "runs")
+                    self.state = TaskStatus(Level.OK, self._running)
                 case _:
                     self._log(lines)
                     lines = []
@@ -508,6 +512,10 @@ class Runner(Component[R]):
         self._hear_the_rest()
         raise OutsideError(how)
 
+    @property
+    def _running(self) -> str:
+        return f"runs, pid {self.child.pid}" if self.child is not None and self.child.pid is not None else "runs"
+
     def _hear_the_rest(self) -> None:
         """Wait for the keeper, which ends what was left behind; what was written to the last is logged."""
         is_over = False
@@ -540,7 +548,7 @@ class Runner(Component[R]):
         if text:
             self.state = TaskStatus(Level.WARN, text)
         elif self.suspended:
-            self.state = TaskStatus(Level.OK, "runs")
+            self.state = TaskStatus(Level.OK, self._running)
         if text != self.suspended:
             self.suspended = text
             self.warn(text or "is no longer suspended")
@@ -561,7 +569,7 @@ class Runner(Component[R]):
         status = self.watched.look(found, self.now)
         for text in self.watched.news(status):
             self.warn(text)
-        self.state = TaskStatus(status.level, f"runs; {status.message}", status.values)
+        self.state = TaskStatus(status.level, f"{self._running}; {status.message}", status.values)
 
     def _seen(self, link: SessionLink, domain: int) -> set[KeyOnBus]:
         """Return what is seen of its session; nothing, if it is not the one that it was given.
