@@ -166,7 +166,7 @@ def test_a_goal_ends_when_odometry_has_begun_again_and_the_next_counts_from_ther
     for x in (0.1, 0.2, 0.3, 0.4, 0.5):
         robot.advance(0.35)
         come_to(robot, x)
-    robot.advance(0.7)  # as long as a driver that was killed takes to start
+    robot.advance(1.5)  # a driver that was killed takes its time to start
     come_to(robot, 0.0)
     robot.advance(0.1)
     why = "the odometry of the base has jumped, so its position is not known any more"

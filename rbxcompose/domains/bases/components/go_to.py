@@ -21,6 +21,7 @@ from rbxcompose.msgs.std_msgs import Header
 MAP = "map"
 UNKNOWN = 2.0  # [s] without a position, as after a restart of the base; if there is none at all, a goal ends
 LEAPS = 0.2, 0.5  # [m], [rad] by which odometry may be off what the base can have driven since its last change
+ORIGIN = 0.05  # [m] from the origin of odometry: there a driver that has started again is, and hardly another
 FARTHEST = 100_000.0  # [m] from the origin; no map is as large
 ServedPose = sdk.ServedGoal[NavigateToPose.Goal, NavigateToPose.Result, NavigateToPose.Feedback]
 
@@ -139,7 +140,8 @@ class GoTo(BaseDriver[GoToConfig]):
         self.seen = pose, self.now
         if before is None:
             return False
-        step, duration = before[0].inverse().compose(pose), self.now - before[1]
+        step = before[0].inverse().compose(pose)
+        duration = 0.0 if math.hypot(pose.x, pose.y) < ORIGIN else self.now - before[1]
         limits = LEAPS[0] + self.config.speed * duration, LEAPS[1] + self.config.turn_rate * duration
         return math.hypot(step.x, step.y) > limits[0] or abs(step.heading) > limits[1]
 
