@@ -224,8 +224,8 @@ def test_services_are_called_with_maps_and_lists() -> None:
         assert client.gets() == [answer]
 
 
-@for_all("given, wanted", [(60, 60.0), (0.5, 0.5), (0, 10.0), (None, 10.0)])
-def test_a_call_waits_as_long_as_its_client_says(given: float | None, wanted: float) -> None:
+@for_all("given, wanted", [(60, 60.0), (100, 60.0), (math.inf, 60.0), (0.5, 0.5), (0, 10.0), (-1, 10.0), (None, 10.0)])
+def test_a_call_waits_as_long_as_its_client_says_but_not_for_ever(given: float | None, wanted: float) -> None:
     room = Room()
     assert room.client().does("call_service", service="lamp", timeout=given) == []
     (call,) = room.asked()
@@ -259,9 +259,8 @@ def test_each_failed_call_is_answered_with_values() -> None:
     assert isinstance(call, ServiceCall)
     room.bridge.answered(call.number, None, "the server is gone")
     assert client.gets()[0]["values"] == "the server is gone"
-    for timeout in ("5", True, -1, 600, math.inf, math.nan):
-        (answer,) = client.does("call_service", service="/lamp", timeout=timeout)
-        assert answer["values"] == "'timeout' is a number of seconds from 0 to 60"
+    (answer,) = client.does("call_service", service="/lamp", timeout="5")
+    assert answer["values"] == "'timeout' is a number of seconds"
 
 
 def test_an_answer_for_a_client_that_is_gone_is_dropped() -> None:

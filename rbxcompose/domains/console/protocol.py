@@ -935,10 +935,11 @@ class Bridge:
     def _call(self, number: int, target: OperationTarget, given: object, data: Mapping[str, Any]) -> None:
         type_ = self._type_of(target.name, target.type, data.get("type"), "service")
         request = from_json(type_.Request, arguments(type_.Request, given), self._stamp)
-        timeout = data.get("timeout") or PATIENCE
-        if isinstance(timeout, bool) or not isinstance(timeout, int | float) or not 0 <= timeout <= LONGEST_PATIENCE:
-            raise BadFrameError(f"'timeout' is a number of seconds from 0 to {LONGEST_PATIENCE:g}")
-        self._requests.append(ServiceCall(number, target.name, type_, request, timeout))
+        timeout = data.get("timeout")
+        if isinstance(timeout, bool) or not isinstance(timeout, int | float | None):
+            raise BadFrameError("'timeout' is a number of seconds")
+        patience = min(timeout, LONGEST_PATIENCE) if timeout is not None and timeout > 0 else PATIENCE
+        self._requests.append(ServiceCall(number, target.name, type_, request, patience))
 
     # Services and actions of clients
 
