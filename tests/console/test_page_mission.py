@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 
 from rbxcompose.base.requests import Refused
 from tests.console.browser import CHROMIUM
-from tests.console.fake_gateway import FakeGateway, FakeLog
+from tests.console.fake_gateway import CONFIG, FakeGateway, FakeLog
 from tests.console.looks import PHONE, WIDE, expect_fit, violations
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
@@ -190,11 +190,23 @@ def test_tests_of_another_version_are_said_to_be_so(open_page: Callable[..., Pag
 
 
 @pytest.mark.soak
-def test_a_robot_without_missions_says_where_they_are_written(
-    open_page: Callable[..., Page], gateway: FakeGateway
+@pytest.mark.parametrize(
+    "why", ["", "this robot has no component of type 'mission'", "there is no query 'mission.ListMissions'"]
+)
+@pytest.mark.parametrize("role", ["configure", "operate"])
+def test_a_robot_without_missions_gets_its_first_one_from_who_may_change_it(
+    open_page: Callable[..., Page], gateway: FakeGateway, why: str, role: str
 ) -> None:
+    gateway.config = {**CONFIG, "role": role}
     gateway.windows["mission/ListMissions"] = []
-    expect(open_page(page_name="mission").get_by_text("This robot has no missions.")).to_be_visible()
+    if why:
+        gateway.refuse("mission/ListMissions", why)
+    page = open_page(page_name="mission")
+    expect(page.get_by_text("This robot has no missions.")).to_be_visible()
+    expect(page.get_by_text("in its manifest")).to_have_count(int(role == "operate"))
+    expect(page.get_by_role("button", name="New mission")).to_have_count(int(role == "configure"))
+    expect(page.get_by_label("Story")).to_be_hidden()
+    assert violations(page) == []
 
 
 def test_missions_that_do_not_answer_are_said_to_be_silent_and_what_was_shown_stays(

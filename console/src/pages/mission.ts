@@ -18,6 +18,7 @@ import "./mission.css";
 const LOOK = 250; // [ms] between two looks at a mission, and at the breakpoints
 const SELDOM = 2_000; // [ms] between two looks at what changes seldom
 const STORY = 200; // lines that are kept
+const NONE = /no component|no query/; // of what a robot without missions answers, which may not even know the question
 
 /** What the page shows of a mission that the robot does not have, such as a new one. */
 const UNKNOWN = { about: "The running robot does not have this mission.", state: "idle", claims: [], inputs: [], starts: [] };
@@ -38,8 +39,8 @@ export const page: Page = {
       "mission/ListMissions",
       (answer, refused) => {
         const missions = Array.isArray(answer) ? (answer as unknown as Listed[]) : [];
-        const silent = refused && !/no component/.test(refused) ? `The missions do not answer now: ${refused}.` : "";
-        if (!view && missions.length === 0) {
+        const silent = refused && !NONE.test(refused) ? `The missions do not answer now: ${refused}.` : "";
+        if (!view && missions.length === 0 && (silent || robot.config.role !== "configure")) {
           const hint = silent ? [] : [h("p", {}, "Missions are written under `missions:` in its manifest.")];
           box.replaceChildren(emptyCard("warning", silent || "This robot has no missions.", ...hint));
           return;
@@ -175,7 +176,7 @@ class MissionView {
       };
       this.#list.append(make);
     }
-    this.#list.hidden = this.#list.childElementCount < 2;
+    this.#list.hidden = missions.length === 1 && this.#list.childElementCount === 1;
     if (wanted && wanted !== this.#chosen) this.#choose(wanted);
     this.#showHead();
   }
@@ -232,7 +233,8 @@ class MissionView {
   // Control
 
   #showHead(): void {
-    if (!this.#chosen) return;
+    this.#side.hidden = this.#editor !== null || !this.#chosen;
+    if (!this.#chosen) return this.#head.replaceChildren(h("p", {}, "This robot has no missions. A new one begins with a template."));
     const known = this.#missions.find(({ name }) => name === this.#chosen);
     const mission = known ?? { ...UNKNOWN, name: this.#chosen };
     const isActive = ACTIVE.has(mission.state);
@@ -260,7 +262,6 @@ class MissionView {
     this.#editor = name ? new MissionEditor(this.#robot, name, () => this.#edit("")) : null;
     if (this.#editor) this.element.append(this.#editor.element);
     chosenByHand ||= name; // another mission that starts does not take the text away
-    this.#side.hidden = this.#editor !== null;
     if (this.#tree) this.#tree.element.hidden = this.#editor !== null;
     this.element.classList.toggle("edits", this.#editor !== null);
     this.#headOf = "";
