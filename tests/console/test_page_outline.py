@@ -32,7 +32,9 @@ NESTED = f"""{FETCH}  # again and again
 @pytest.fixture
 def page(open_page: Callable[..., Page], project: Project) -> Page:
     project.file.write_text(NESTED, encoding="utf-8")
-    return edits(open_page(page_name="mission"))
+    page = edits(open_page(page_name="mission"))
+    expect(page.get_by_text("No mistakes")).to_be_visible()  # what is said of the text moves what is below
+    return page
 
 
 def shot(page: Page, name: str) -> None:
