@@ -51,7 +51,7 @@ ROOMS: dict[str, Cost] = {
     "domains/servos": Cost(code=7849, files=47, small=2, imports=559),
     "domains/vision": Cost(code=2558, files=24, small=1, imports=302),
     "domains/worlds": Cost(code=4459, files=36, small=3, imports=516),
-    "manifest": Cost(code=3588, files=19, small=1, imports=272),
+    "manifest": Cost(code=3589, files=19, small=1, imports=272),
     "missions": Cost(code=12030, files=78, small=3, imports=1030),
     "msgs": Cost(code=1559, files=14, small=3, imports=93),
     "runtime": Cost(code=7730, files=38, small=0, imports=680),
@@ -62,7 +62,7 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114028,
+    "lines of code": 114029,
     "files": 750,
     "files of 1 to 30 lines of code": 42,
     "lines of imports": 10443,

@@ -240,7 +240,8 @@ def topic_for_a_port(place: RefusedValue, node: TreeNode) -> Repair[TreeNode] | 
         return None
     meant = f"topic: {node.text}" if place.path[-1] == "port" else f"{{topic: {node.text}}}"
     finding = replace(place.finding, help=f"a name that begins with '/' is a topic: write '{meant}'")
-    return Repair(replace(node, text=f"{node.text[1:].replace('/', '_')}.data"), (finding,))
+    any_port = f"{node.text[1:].replace('/', '_')}.data"  # so that the rest is read, too; it is not written
+    return Repair(replace(node, text=any_port), (finding,))
 
 
 @value_slip("model_type", "model_attributes_type")
