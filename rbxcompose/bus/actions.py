@@ -289,7 +289,7 @@ class ActionServer(Generic[G, R, F]):
         reason = self._accept(request.message.goal) if self._goals.find(id_) is None else "it was sent before"
         if reason:
             self._log(f"a goal was refused: {reason}")
-            request.reply(response(accepted=False))
+            request.reply(response(accepted=False), reason)
             return
         if self._goals.current is not None:
             self._replace(self._goals.current)
@@ -382,7 +382,7 @@ class SentGoal(Generic[R]):
             self._client.ask_to_cancel(self.id)  # the answer may only be late, and the goal accepted
             self._end(Ended(Outcome.LOST, message=reply.error))
         elif not reply.response.accepted:
-            self._end(Ended(Outcome.REJECTED, message="the server refused it; its log has the reason"))
+            self._end(Ended(Outcome.REJECTED, message=reply.error or "the server refused it and gives no reason"))
         else:
             self._is_accepted = True
             self._client.ask_for_result(self)

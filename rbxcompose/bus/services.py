@@ -66,14 +66,14 @@ class ServedRequest(Generic[Q, R]):
         """Return whether it is still unanswered."""
         return self._answer is not None
 
-    def reply(self, response: R) -> None:
-        """Answer the request.
+    def reply(self, response: R, reason: str = "") -> None:
+        """Answer the request, with the `reason` if the response refuses it.
 
         Raises:
             TypeError: if `response` has not the type of the service.
         """
         self.require(response)
-        self._end(Reply(response))
+        self._end(Reply(response, reason))
 
     def fail(self, error: str) -> None:
         """Report that there will be no answer, and why."""
@@ -199,7 +199,8 @@ class Server(Generic[Q, R]):
             question.fail(reply.error)
         else:
             # By the client's sequence number and GID, ROS matches the reply with its request.
-            question.reply(encode(reply.response), asker._replace(stamp=self._process.clock.stamp()).encode())
+            attachment = asker._replace(stamp=self._process.clock.stamp()).encode()
+            question.reply(encode(reply.response), attachment, reply.error)
 
 
 @dataclass(slots=True)
@@ -322,7 +323,7 @@ class Client(Generic[Q, R]):
             self._end(sequence, Reply(None, answer.error))
             return
         try:
-            self._end(sequence, Reply(decode(self._service.Response, answer.payload)))
+            self._end(sequence, Reply(decode(self._service.Response, answer.payload), answer.reason))
         except ValueError as error:
             self._end(sequence, Reply(None, f"malformed reply: {error}"))
 

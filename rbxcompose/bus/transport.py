@@ -40,8 +40,8 @@ class Arrival(Protocol):
 class Question(Arrival, Protocol):
     """A request from another process, to be answered once, now or later."""
 
-    def reply(self, payload: bytes, attachment: bytes) -> None:
-        """Answer the request."""
+    def reply(self, payload: bytes, attachment: bytes, reason: str = "") -> None:
+        """Answer the request; the `reason` why it is refused, if it is, reaches clients of ours only."""
         ...
 
     def fail(self, error: str) -> None:
@@ -51,10 +51,11 @@ class Question(Arrival, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class TransportReply:
-    """The outcome of a request: a payload, or an error."""
+    """The outcome of a request: a payload, perhaps with the reason of a refusal, or an error."""
 
     payload: bytes = b""
     error: str = ""
+    reason: str = ""
 
 
 OnReply: TypeAlias = Callable[[TransportReply], None]

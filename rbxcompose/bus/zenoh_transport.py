@@ -260,8 +260,12 @@ class _Question(_Arrival):
         super().__init__(query)
         self._key, self._query, self._on_own = key, query, on_own
 
-    def reply(self, payload: bytes, attachment: bytes) -> None:
-        self._on_own(lambda: self._end(lambda query: query.reply(self._key, payload, attachment=attachment)))
+    def reply(self, payload: bytes, attachment: bytes, reason: str = "") -> None:
+        # The type of ROS has no room for the reason of a refusal, and clients of ROS ignore the encoding.
+        encoding = zenoh.Encoding.ZENOH_BYTES.with_schema(_cut(reason)) if reason else None
+        self._on_own(
+            lambda: self._end(lambda query: query.reply(self._key, payload, encoding=encoding, attachment=attachment))
+        )
 
     def fail(self, error: str) -> None:
         self._on_own(lambda: self._end(lambda query: query.reply_err(error)))
@@ -281,9 +285,14 @@ class _Asked:
 
 def _answer(reply: zenoh.Reply) -> TransportReply:
     if reply.ok is not None:
-        return TransportReply(reply.ok.payload.to_bytes())
+        return TransportReply(reply.ok.payload.to_bytes(), reason=str(reply.ok.encoding).partition(";")[2])
     error = reply.err.payload.to_string() if reply.err is not None else GONE
     return TransportReply(error=EXPIRED if error == ZENOH_EXPIRED else error)
+
+
+def _cut(reason: str) -> str:
+    """Return what fits into an encoding of Zenoh, whose schema has at most 255 bytes."""
+    return reason.encode()[:250].decode(errors="ignore")
 
 
 def _at_once(callback: Callable[[], None]) -> None:

@@ -118,7 +118,7 @@ class Fed:
     payload: bytes
     attachment: bytes
 
-    def reply(self, payload: bytes, attachment: bytes) -> None:
+    def reply(self, payload: bytes, attachment: bytes, reason: str = "") -> None:
         """Leave the reply to the witness."""
 
     def fail(self, error: str) -> None:

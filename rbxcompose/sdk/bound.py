@@ -62,7 +62,7 @@ class Latest(Protocol[M_co]):
 
 @dataclass(frozen=True, slots=True)
 class Reply(Generic[R]):
-    """The end of a call: a response, or the reason for having none."""
+    """The end of a call: a response, or the reason for having none, or for one that refuses."""
 
     response: R | None
     error: str = ""

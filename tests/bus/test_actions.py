@@ -68,12 +68,12 @@ def test_the_reason_of_an_abort_is_logged(alone: Alone) -> None:
     assert alone.log == [("base", "go_to: a goal was aborted: a wheel is stuck")]
 
 
-def test_a_refused_goal_never_starts_and_the_reason_is_logged(alone: Alone, ends: Ends) -> None:
+def test_a_refused_goal_never_starts_and_the_reason_is_logged_and_reaches_its_client(alone: Alone, ends: Ends) -> None:
     server = served(alone, refusal="not at the dock")
     alone.bus.action_client("mission", "go_to", NavigateToPose)(TO_DOCK, ends.append)
     alone.settle()
     assert server.current is None
-    assert ends == [Ended(Outcome.REJECTED, message="the server refused it; its log has the reason")]
+    assert ends == [Ended(Outcome.REJECTED, message="not at the dock")]
     assert alone.log == [("base", "go_to: a goal was refused: not at the dock")]
 
 

@@ -16,7 +16,7 @@ class Asked:
     payload: bytes = b""
     refused: list[str] = field(default_factory=list)
 
-    def reply(self, payload: bytes, attachment: bytes) -> None:
+    def reply(self, payload: bytes, attachment: bytes, reason: str = "") -> None:
         raise AssertionError("nobody answers here")
 
     def fail(self, error: str) -> None:

@@ -46,7 +46,7 @@ class Question:
     payload: bytes
     attachment: bytes
 
-    def reply(self, payload: bytes, attachment: bytes) -> None:
+    def reply(self, payload: bytes, attachment: bytes, reason: str = "") -> None:
         self.wire.note("reply", self.key, payload, attachment)
 
     def fail(self, error: str) -> None:

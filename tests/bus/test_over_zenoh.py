@@ -232,6 +232,7 @@ def test_an_action_is_carried_out_cancelled_and_left(network: Network, one: Conn
 
     send(Goal(behavior_tree="too far"), ends.append)
     network.until(lambda: len(ends) == 1)
+    assert ends == [Ended(Outcome.REJECTED, message="too far")]
 
     send(Goal(), ends.append, heard.append)
     network.until(lambda: server.current)

@@ -83,7 +83,7 @@ class Asking:
     payload = attachment = b""
     answer: Any = None
 
-    def reply(self, payload: bytes, attachment: bytes) -> None:
+    def reply(self, payload: bytes, attachment: bytes, reason: str = "") -> None:
         self.answer = json.loads(payload)
 
     def fail(self, error: str) -> None:

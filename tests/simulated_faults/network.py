@@ -254,8 +254,8 @@ class _Question:
     payload: bytes
     attachment: bytes
 
-    def reply(self, payload: bytes, attachment: bytes) -> None:
-        self._send(TransportReply(payload))
+    def reply(self, payload: bytes, attachment: bytes, reason: str = "") -> None:
+        self._send(TransportReply(payload, reason=reason))
 
     def fail(self, error: str) -> None:
         self._send(TransportReply(error=error))

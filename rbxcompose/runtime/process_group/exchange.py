@@ -64,7 +64,7 @@ def answer(request: ServedRequest[Any, Any], reply: Reply[Any]) -> None:
     if reply.response is None:
         request.fail(reply.error)
     else:
-        request.reply(reply.response)
+        request.reply(reply.response, reply.error)
 
 
 class _While:
