@@ -129,6 +129,7 @@ def _real(path: Path) -> Path:
     return path.resolve()
 
 
+@once
 def _absolute(written: str, folder: Path) -> Path | None:
     """Return the real path (of its robot file, if it is a folder); None if it is impossible or leaves the library."""
     is_library = written.startswith(PREFIX)

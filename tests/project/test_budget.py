@@ -33,7 +33,7 @@ ROOMS: dict[str, Cost] = {
     "__init__": Cost(code=1, files=1, small=1, imports=0),
     "__main__": Cost(code=8, files=1, small=1, imports=3),
     "base": Cost(code=3797, files=25, small=3, imports=215),
-    "bus": Cost(code=2387, files=17, small=0, imports=161),
+    "bus": Cost(code=2394, files=17, small=0, imports=161),
     "commands": Cost(code=2700, files=24, small=3, imports=342),
     "compiler": Cost(code=7803, files=53, small=1, imports=878),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
@@ -51,7 +51,7 @@ ROOMS: dict[str, Cost] = {
     "domains/servos": Cost(code=7849, files=47, small=2, imports=559),
     "domains/vision": Cost(code=2558, files=24, small=1, imports=302),
     "domains/worlds": Cost(code=4459, files=36, small=3, imports=516),
-    "manifest": Cost(code=3589, files=19, small=1, imports=272),
+    "manifest": Cost(code=3590, files=19, small=1, imports=272),
     "missions": Cost(code=12030, files=78, small=3, imports=1030),
     "msgs": Cost(code=1559, files=14, small=3, imports=93),
     "runtime": Cost(code=7730, files=38, small=0, imports=680),
@@ -62,7 +62,7 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114029,
+    "lines of code": 114037,
     "files": 750,
     "files of 1 to 30 lines of code": 42,
     "lines of imports": 10443,
