@@ -200,7 +200,7 @@ class Head(sdk.Component[HeadConfig]):
         """Refuse what is no goal."""
         if not all(map(math.isfinite, (goal.x, goal.y, goal.z, goal.tolerance, goal.duration))):
             return "the goal is not finite"
-        return "its tolerance and its duration are not below 0" if min(goal.tolerance, goal.duration) < 0.0 else ""
+        return "its tolerance and its duration must not be below 0" if min(goal.tolerance, goal.duration) < 0.0 else ""
 
     def accept_point(self, goal: PointHead.Goal) -> str:
         """Refuse what is no goal, and a frame that the head does not turn."""
@@ -213,7 +213,7 @@ class Head(sdk.Component[HeadConfig]):
         turned = {joint.name for joint in self.body.joints_above(frame)}
         if not turned & self.limits.keys():
             return f"the head does not turn '{plain(frame)}'"
-        return "its velocity is not below 0" if goal.max_velocity < 0.0 else ""
+        return "its velocity must not be below 0" if goal.max_velocity < 0.0 else ""
 
     def step(self, dt: float) -> None:
         """Begin with a new goal; end one that was cancelled; follow what moves if there is none."""

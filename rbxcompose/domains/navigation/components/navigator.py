@@ -284,7 +284,7 @@ class Navigator(BaseDriver[NavigatorConfig]):
         if frame not in ("", MAP_FRAME):
             return f"a goal must be given in '{MAP_FRAME}', not in '{frame}'"
         is_near = all(abs(number) < MOST for number in (pose.x, pose.y, pose.heading))
-        return "" if is_near else "the numbers of a pose are finite and below 1e15"
+        return "" if is_near else "the numbers of a pose must be finite, and below 1e15"
 
     def accept_spin(self, goal: Spin.Goal) -> str:
         """Refuse a turn during a drive, and one that is none."""
@@ -298,7 +298,7 @@ class Navigator(BaseDriver[NavigatorConfig]):
     def accept_backup(self, goal: Nav2BackUp.Goal) -> str:
         """Refuse what `back_up` refuses, and a speed that is none."""
         if not 0 < goal.speed <= self.config.speed:
-            return f"the speed is above 0 and at most {self.config.speed:g} m/s"
+            return f"the speed must be above 0 and at most {self.config.speed:g} m/s"
         return self.accept_back_up(BackUp.Goal(distance=abs(goal.target.x)))
 
     def accept_manoeuvre(self) -> str:
