@@ -230,9 +230,9 @@ def test_an_action_is_carried_out_cancelled_and_left(network: Network, one: Conn
     ends: list[Ended[NavigateToPose.Result]] = []
     heard: list[NavigateToPose.Feedback] = []
 
-    send(Goal(behavior_tree="too far"), ends.append)
+    send(Goal(behavior_tree="too far: " + "\u00fc" * 200), ends.append)  # more than an encoding of Zenoh can hold
     network.until(lambda: len(ends) == 1)
-    assert ends == [Ended(Outcome.REJECTED, message="too far")]
+    assert ends == [Ended(Outcome.REJECTED, message="too far: " + "\u00fc" * 120)]
 
     send(Goal(), ends.append, heard.append)
     network.until(lambda: server.current)
