@@ -37,6 +37,7 @@ def keep_attached() -> None:
 HEARTBEAT = 0.5  # [s] after a latched message until its sequence number is repeated
 ZENOH_EXPIRED = "Timeout"  # Zenoh's answer in place of a server's
 GONE = "the server is gone"
+REFUSED = "refused: "  # before the reason in the encoding of a reply, which others may use as they like
 
 OnOwn = Callable[[Callable[[], None]], None]
 
@@ -262,7 +263,7 @@ class _Question(_Arrival):
 
     def reply(self, payload: bytes, attachment: bytes, reason: str = "") -> None:
         # The type of ROS has no room for the reason of a refusal, and clients of ROS ignore the encoding.
-        encoding = zenoh.Encoding.ZENOH_BYTES.with_schema(_cut(reason)) if reason else None
+        encoding = zenoh.Encoding.ZENOH_BYTES.with_schema(_cut(REFUSED + reason)) if reason else None
         self._on_own(
             lambda: self._end(lambda query: query.reply(self._key, payload, encoding=encoding, attachment=attachment))
         )
@@ -285,7 +286,7 @@ class _Asked:
 
 def _answer(reply: zenoh.Reply) -> TransportReply:
     if reply.ok is not None:
-        return TransportReply(reply.ok.payload.to_bytes(), reason=str(reply.ok.encoding).partition(";")[2])
+        return TransportReply(reply.ok.payload.to_bytes(), reason=str(reply.ok.encoding).partition(f";{REFUSED}")[2])
     error = reply.err.payload.to_string() if reply.err is not None else GONE
     return TransportReply(error=EXPIRED if error == ZENOH_EXPIRED else error)
 

@@ -232,7 +232,7 @@ def test_an_action_is_carried_out_cancelled_and_left(network: Network, one: Conn
 
     send(Goal(behavior_tree="too far: " + "\u00fc" * 200), ends.append)  # more than an encoding of Zenoh can hold
     network.until(lambda: len(ends) == 1)
-    assert ends == [Ended(Outcome.REJECTED, message="too far: " + "\u00fc" * 120)]
+    assert ends == [Ended(Outcome.REJECTED, message="too far: " + "\u00fc" * 116)]
 
     send(Goal(), ends.append, heard.append)
     network.until(lambda: server.current)

@@ -33,7 +33,7 @@ ROOMS: dict[str, Cost] = {
     "__init__": Cost(code=1, files=1, small=1, imports=0),
     "__main__": Cost(code=8, files=1, small=1, imports=3),
     "base": Cost(code=3797, files=25, small=3, imports=215),
-    "bus": Cost(code=2394, files=17, small=0, imports=161),
+    "bus": Cost(code=2395, files=17, small=0, imports=161),
     "commands": Cost(code=2700, files=24, small=3, imports=342),
     "compiler": Cost(code=7803, files=53, small=1, imports=878),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
@@ -62,7 +62,7 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114037,
+    "lines of code": 114038,
     "files": 750,
     "files of 1 to 30 lines of code": 42,
     "lines of imports": 10443,
