@@ -128,6 +128,7 @@ class WitnessedCall:
     sequence: int  # of the request among those of its client; a reply has the same
     is_reply: bool
     message: Message | None  # None: a reply without a response, since the request was refused or failed
+    reason: str = ""  # why a reply refuses the request, or has no response
 
 
 Witness = Callable[[WitnessedCall], None]

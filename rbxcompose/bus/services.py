@@ -188,11 +188,8 @@ class Server(Generic[Q, R]):
             return None
 
     def _report(self, witness: Witness, request: ServedRequest[Q, R], reply: Reply[R]) -> None:
-        witness(
-            WitnessedCall(
-                self._owner, self.route[0], self._service, request.client, request.sequence, True, reply.response
-            )
-        )
+        sent = (request.client, request.sequence, True, reply.response, reply.error)
+        witness(WitnessedCall(self._owner, self.route[0], self._service, *sent))
 
     def _answer(self, question: Question, asker: Attachment, reply: Reply[R]) -> None:
         if reply.response is None:

@@ -28,7 +28,7 @@ from rbxcompose.msgs.std_msgs import Float64, String
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.runtime.log import Record
 from rbxcompose.runtime.process_group.host import Host
-from rbxcompose.runtime.recording.tape import EVENT_TOPIC, INSTANTS, ORDERS, Tape, event_of
+from rbxcompose.runtime.recording.tape import EVENT_TOPIC, INSTANTS, ORDERS, REASONS, Tape, event_of
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Qos, Serves, ServesAction
 from rbxcompose.sdk.registry import component_type
@@ -310,6 +310,7 @@ class ReplayFeed:
         self._stage, self._services, self._aliases, self._expect = stage, services, aliases, expect
         self._instant = (0, 0.0)  # [ns], [s]
         self._count = 0
+        self._reason = ""
         self._next: Recorded | None = None
         self._last = 0  # [ns], of the record read last
         self._is_whole = False
@@ -330,12 +331,16 @@ class ReplayFeed:
         return math.inf if self._is_whole else self._last
 
     def _following(self) -> Recorded | None:
-        """Return the next record that is not an instant."""
+        """Return the next record that is neither an instant nor the reason of the reply behind it."""
+        self._reason = ""
         for record in self._records:
             self._last = record.log_time
-            if record.topic.name != INSTANTS:
+            if record.topic.name == INSTANTS:
+                self._instant = (record.log_time, decode(Float64, record.payload).data)
+            elif record.topic.name == REASONS:
+                self._reason = decode(String, record.payload).data
+            else:
                 return record
-            self._instant = (record.log_time, decode(Float64, record.payload).data)
         return None
 
     def _time(self, record: Recorded) -> float:
@@ -426,8 +431,9 @@ class ReplayFeed:
         elif info.event_type == ServiceEventInfo.RESPONSE_SENT:
             answered = self._stage.waiting.pop((key, info.client_gid, info.sequence_number), None)
             if answered is not None:
-                failed = TransportReply(error="the recorded request failed")
-                answered(TransportReply(encode(event.response[0])) if event.response else failed)
+                failed = TransportReply(error=self._reason or "the recorded request failed")
+                whole = (TransportReply(encode(each), reason=self._reason) for each in event.response)
+                answered(next(whole, failed))
 
 
 def _belong_together(first: Recorded, record: Recorded) -> bool:

@@ -54,7 +54,7 @@ ROOMS: dict[str, Cost] = {
     "manifest": Cost(code=3590, files=19, small=1, imports=272),
     "missions": Cost(code=12030, files=78, small=3, imports=1030),
     "msgs": Cost(code=1559, files=14, small=3, imports=93),
-    "runtime": Cost(code=7730, files=38, small=0, imports=680),
+    "runtime": Cost(code=7739, files=38, small=0, imports=680),
     "sdk": Cost(code=1407, files=8, small=0, imports=162),
     "testing": Cost(code=384, files=5, small=2, imports=57),
     "tools": Cost(code=17765, files=116, small=8, imports=1858),
@@ -62,7 +62,7 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114038,
+    "lines of code": 114045,
     "files": 750,
     "files of 1 to 30 lines of code": 42,
     "lines of imports": 10443,

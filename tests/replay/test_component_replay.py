@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -76,18 +77,37 @@ def said(capsys: pytest.CaptureFixture[str]) -> str:
     return "".join(capsys.readouterr())
 
 
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    folder = tmp_path_factory.mktemp("run")
+def recorded(folder: Path, robot: Path, *options: str) -> Recording:
     path = folder / "run.mcap"
     # In a process of its own: a robot forks, and this one may have had sessions of Zenoh, whose threads forbid that.
-    up = ("up", str(ROOT / "robots/turtlebot"), "--rate", "max", "--record", str(path), *ROUND)
+    up = ("up", str(robot), "--rate", "max", "--record", str(path), *options)
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder)}
     run_command(up, environment, 60.0).check_returncode()
     reader = RecordingReader(io.BytesIO(path.read_bytes()))
     records = list(reader.messages())
     assert reader.damage == ""
     return Recording(path, load(reader.attachments[PLAN].decode()), records, list(reader.topics))
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    return recorded(tmp_path_factory.mktemp("run"), ROOT / "robots/turtlebot", *ROUND)
+
+
+AWAY = "{rbx: 1, kind: Mission, name: away, do: [{recharge: , optional: true}, {wait: 1 s}]}\n"
+
+
+def test_a_goal_is_refused_again_for_the_same_reason(tmp_path: Path) -> None:
+    for folder in ("robots/turtlebot", "missions"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
+    (tmp_path / "missions/away.yaml").write_text(AWAY, encoding="utf-8")
+    overlay = tmp_path / "overlay.yaml"
+    overlay.write_text(
+        "{rbx: 1, kind: Overlay, name: away, missions: {away: missions/away.yaml}, start: away}\n", encoding="utf-8"
+    )
+    run = recorded(tmp_path, tmp_path / "robots/turtlebot", "-f", str(overlay))
+    assert any(b"the robot's position is unknown" in record.payload for record in run.records)
+    assert [run.again(name).difference for name in ("mission", "charger")] == [None, None]
 
 
 @pytest.mark.parametrize("name", COMPONENTS)

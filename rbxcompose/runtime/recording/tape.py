@@ -1,7 +1,8 @@
 """A tape: all that happens on the bus of one process on a stepped clock, in order and exactly enough to repeat it.
 
-Besides the topics of the robot, it holds the events of services, as ROS 2 records them, and on two topics of its own
-the orders that the host received and the instants whose time [s] cannot be computed from nanoseconds.
+Besides the topics of the robot, it holds the events of services, as ROS 2 records them, and on three topics of its own
+the orders that the host received, the instants whose time [s] cannot be computed from nanoseconds, and the reason of a
+reply that refuses or fails, before its event, which has no room for it.
 """
 
 import json
@@ -29,6 +30,7 @@ PLAN = "plan.json"  # name of the attachment with the plan of the robot
 EVENT_TOPIC = "_service_event"  # suffix of the topic of a service's events
 ORDERS = "/rbxcompose/orders"
 INSTANTS = "/rbxcompose/instants"
+REASONS = "/rbxcompose/reasons"
 
 
 class Tape:
@@ -53,6 +55,8 @@ class Tape:
         info = ServiceEventInfo(event_type=kind, stamp=stamp, client_gid=call.client, sequence_number=call.sequence)
         held = () if call.message is None else (call.message,)
         message = event(info=info, response=held) if call.is_reply else event(info=info, request=held)
+        if call.reason:
+            self._say(REASONS, String(data=call.reason))
         self._say(f"{call.name}/{EVENT_TOPIC}", message, node=call.node, sequence=call.sequence)
 
     def order(self, verb: str, *words: object) -> None:
