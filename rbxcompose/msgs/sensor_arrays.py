@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from rbxcompose.base.arrays import Array, Bytes, np
+from rbxcompose.base.geometry import Pose2, Quaternion, Transform3, yaw_of
 from rbxcompose.msgs.sensor_msgs import Image, LaserScan, PointCloud2, PointField
 
 _CHANNELS = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4, "mono8": 1, "8UC1": 1, "8UC3": 3}
 DEPTHS: Mapping[str, str] = {"mono16": "u2", "16UC1": "u2", "32FC1": "f4"}
 """Encodings of pictures whose values are depths, and what a value is."""
+LEVEL = 1e-6  # sine of half a tilt that is none
 
 
 class WrongPictureError(ValueError):
@@ -139,3 +142,33 @@ def rays_of(scan: LaserScan) -> tuple[Array, Array]:
     with np.errstate(invalid="ignore", over="ignore"):
         angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges), dtype=np.float64)
     return angles, ranges
+
+
+def level_rays(at: Transform3, scan: LaserScan) -> tuple[Pose2, Array, Array]:
+    """Return a scan as seen from above: the pose of its sensor, and the angles [rad] and ranges [m] of its rays there.
+
+    `at` is the pose of the sensor. One that is mounted upside-down turns the other way; of one that is tilted, what is
+    level of each ray counts.
+    """
+    angles, ranges = rays_of(scan)
+    turned, shares = seen_from_above(at.rotation, angles)
+    with np.errstate(invalid="ignore"):  # inf of a ray that goes straight up
+        return at.to_pose2(), turned, ranges * shares
+
+
+def seen_from_above(rotation: Quaternion, angles: Array) -> tuple[Array, Array]:
+    """Return the angles [rad] of rays on the ground, counted from the heading of their sensor, and their level shares.
+
+    `angles` are those around the z axis of a sensor with a rotation. The first of the rays stays next to the second.
+    """
+    x, y, z, w = rotation
+    tilt = math.hypot(x, y)  # sine of half the angle between the axis of the sensor and the vertical
+    side = 1.0 if tilt < math.sqrt(0.5) else -1.0
+    if min(tilt, math.hypot(z, w)) < LEVEL:
+        return side * angles, np.ones(len(angles))
+    with np.errstate(invalid="ignore"):
+        cos, sin = np.cos(angles), np.sin(angles)
+        along = (1 - 2 * (y * y + z * z)) * cos + 2 * (x * y - z * w) * sin
+        across = 2 * (x * y + z * w) * cos + (1 - 2 * (x * x + z * z)) * sin
+        off = np.arctan2(across, along) - yaw_of(rotation) - side * angles
+        return side * angles + np.remainder(off + math.pi, math.tau) - math.pi, np.hypot(along, across)

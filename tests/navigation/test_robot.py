@@ -10,14 +10,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from rbxcompose.base.geometry import Pose2
+from rbxcompose.base.geometry import Pose2, Transform3, quaternion_from_rpy
 from rbxcompose.base.levels import Level
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.bases.components.diff_drive_sim import DiffDriveSim
 from rbxcompose.domains.navigation.components.navigator import Navigator
 from rbxcompose.domains.navigation.planner import PlannedPath
 from rbxcompose.domains.worlds.grid_map import map_files
+from rbxcompose.domains.worlds.world import grid_of
 from rbxcompose.msgs.builtin_interfaces import Duration, Time
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 from rbxcompose.msgs.geometry_msgs import (
@@ -36,6 +39,7 @@ from rbxcompose.msgs.nav_msgs import OccupancyGrid, Odometry
 from rbxcompose.msgs.nav_msgs import Path as PathMessage
 from rbxcompose.msgs.poses import message_of, pose_in
 from rbxcompose.msgs.rbxcompose_msgs import BackUp, World
+from rbxcompose.msgs.sensor_arrays import level_rays, rays_of
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header, String
@@ -546,6 +550,58 @@ def test_a_laser_sees_what_stands_at_its_height(tmp_path: Path) -> None:
     room.bench.advance(0.3)
     ahead = scans[-1].ranges[len(scans[-1].ranges) // 2]
     assert ahead == pytest.approx(1.9, abs=1e-6)  # over the step, to the wall
+
+
+TURNED = """<robot name="turned"><link name="base_footprint"/><link name="base_link"><collision><geometry>
+<cylinder radius="0.17" length="0.18"/></geometry></collision></link><link name="laser_link"/>
+<joint name="body" type="fixed"><parent link="base_footprint"/><child link="base_link"/><origin xyz="0 0 0.1"/></joint>
+<joint name="mount" type="fixed"><parent link="base_link"/><child link="laser_link"/>
+<origin xyz="0.1 0.05 0.2" rpy="ROLL 0.1 1"/></joint></robot>"""
+BOX = "objects:\n  box: {box: [20 cm, 20 cm, 80 cm], at: {x: -1.5 m, y: 70 cm}}\n"
+
+
+@pytest.mark.parametrize("roll", [math.pi, *rare(0.0, 3.0)])
+def test_a_laser_may_be_mounted_upside_down(tmp_path: Path, roll: float) -> None:
+    (tmp_path / "robots/one").mkdir(parents=True)
+    (tmp_path / "robots/one/turned.urdf").write_text(TURNED.replace("ROLL", str(roll)), encoding="utf-8")
+    robot = ROBOT.replace("rbx:robots/turtlebot/turtlebot.urdf", "turned.urdf").replace(
+        "base_link, noise", "laser_link, noise"
+    )
+    room = Room(tmp_path, robot + "  costs: {obstacles: {frame: laser_link}}\n", WORLD + BOX)
+    maps = room.bench.collect("/global_costmap/costmap", OccupancyGrid, Qos.LATCHED)
+    scans = room.bench.collect("/scan", LaserScan)
+    room.bench.advance(2.0)
+    sensor = Transform3((-2.0, 0.0, 0.1)).compose(Transform3((0.1, 0.05, 0.2), quaternion_from_rpy(roll, 0.1, 1.0)))
+    angles, ranges = rays_of(scans[-1])
+    ends = [
+        sensor.apply((reach * math.cos(angle), reach * math.sin(angle), 0.0))
+        for angle, reach in zip(angles, ranges, strict=True)
+        if reach < 0.9
+    ]
+    assert len(ends) >= 5
+    assert all(-1.65 < x < -1.35 and 0.55 < y < 0.85 for x, y, _ in ends)
+    costs = grid_of(maps[-1])
+    assert costs.occupied_at((-1.5, 0.63))
+    assert not costs.occupied_at((-1.5, -0.63))
+
+
+@given(
+    st.tuples(*[st.floats(-math.pi, math.pi)] * 3),
+    st.floats(-math.pi, math.pi),
+    st.lists(st.floats(0.1, 10.0), min_size=1, max_size=20),
+)
+def test_rays_end_where_the_transform_of_their_sensor_puts_them(
+    rpy: tuple[float, float, float], first: float, reaches: list[float]
+) -> None:
+    at = Transform3((1.0, -2.0, 0.3), quaternion_from_rpy(*rpy))
+    scan = LaserScan(angle_min=first, angle_increment=0.1, ranges=np.array(reaches, np.float32))
+    pose, angles, ranges = level_rays(at, scan)
+    for turned, share, angle, reach in zip(angles, ranges, *rays_of(scan), strict=True):
+        x, y, _ = at.apply((reach * math.cos(angle), reach * math.sin(angle), 0.0))
+        heading = pose.heading + turned
+        assert (pose.x + share * math.cos(heading), pose.y + share * math.sin(heading)) == pytest.approx(
+            (x, y), abs=1e-4
+        )
 
 
 PIT = "holes: {pit: {area: [[-3 m, -1 m], [1 m, -1 m], [1 m, 5 cm], [-3 m, 5 cm]]}}\n"

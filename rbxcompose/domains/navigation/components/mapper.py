@@ -16,7 +16,7 @@ from rbxcompose.domains.navigation.costs import trace
 from rbxcompose.domains.worlds.grid_map import FREE, OCCUPIED, UNKNOWN, GridMap
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_message
 from rbxcompose.msgs.nav_msgs import OccupancyGrid
-from rbxcompose.msgs.sensor_arrays import rays_of
+from rbxcompose.msgs.sensor_arrays import level_rays
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
@@ -175,7 +175,7 @@ class Mapper(sdk.Component[MapperConfig]):
             return  # diagnostics of transforms say so
         message, (at,) = placed
         try:
-            self.changed |= self.mapper.see(at.to_pose2(), *rays_of(message), message.range_max)
+            self.changed |= self.mapper.see(*level_rays(at, message), message.range_max)
             self.trouble = ""
         except ValueError as error:
             if not self.trouble:

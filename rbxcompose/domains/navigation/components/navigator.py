@@ -41,7 +41,7 @@ from rbxcompose.msgs.nav2_msgs import NavigateThroughPoses, NavigateToPose, Spin
 from rbxcompose.msgs.nav_msgs import OccupancyGrid, Path
 from rbxcompose.msgs.poses import message_of, pose_in
 from rbxcompose.msgs.rbxcompose_msgs import BackUp, RunMission
-from rbxcompose.msgs.sensor_arrays import rays_of
+from rbxcompose.msgs.sensor_arrays import level_rays
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import LONGEST, to_duration, to_time
 from rbxcompose.msgs.std_msgs import Header
@@ -249,8 +249,7 @@ class Navigator(BaseDriver[NavigatorConfig]):
         if placed is None:
             return
         message, (at,) = placed
-        sensor = at.to_pose2()
-        if self.costs.see(sensor, *rays_of(message), min(self.config.sees, message.range_max), self.now):
+        if self.costs.see(*level_rays(at, message), min(self.config.sees, message.range_max), self.now):
             self.seen = self.time_of(message.header.stamp)
             is_late = self.now - self.seen > self.config.silence
             self.unusable = f"its scans are {self.now - self.seen:.1f} s old" if is_late else ""

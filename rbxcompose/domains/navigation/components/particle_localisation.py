@@ -17,7 +17,7 @@ from rbxcompose.domains.worlds.world import MAP_FRAME, grid_of
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import OccupancyGrid
 from rbxcompose.msgs.poses import message_of
-from rbxcompose.msgs.sensor_arrays import rays_of
+from rbxcompose.msgs.sensor_arrays import level_rays, rays_of
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.std_srvs import Empty
@@ -173,9 +173,9 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
             return  # diagnostics of transforms say so
         message, (laser, base) = placed
         self.filter.move(base.to_pose2())
-        angles, ranges = rays_of(message)
-        ranges = np.where(ranges <= message.range_max, ranges, math.inf)
-        is_weighed = self.filter.see(laser.to_pose2(), angles, ranges, anew=self.doubt == BEGAN_AGAIN)
+        sensor, angles, ranges = level_rays(laser, message)
+        ranges = np.where(rays_of(message)[1] <= message.range_max, ranges, math.inf)
+        is_weighed = self.filter.see(sensor, angles, ranges, anew=self.doubt == BEGAN_AGAIN)
         covariance = self.filter.covariance
         if self.filter.quality >= FOUND and math.sqrt(covariance[[0, 1], [0, 1]].max()) <= SURE:
             self.doubt = ""

@@ -13,7 +13,7 @@ from rbxcompose.domains.navigation.reports import PeopleConfig, TellsPeople
 from rbxcompose.domains.worlds.world import MAP_FRAME, grid_of
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs.nav_msgs import OccupancyGrid
-from rbxcompose.msgs.sensor_arrays import rays_of
+from rbxcompose.msgs.sensor_arrays import level_rays
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.sdk.bound import NewestMessage
 from rbxcompose.sdk.ports import BULK
@@ -82,7 +82,7 @@ class PeopleTracker(TellsPeople[PeopleTrackerConfig]):
         message, (at,) = placed
         self.taken = self.now
         most = min(self.config.farthest, message.range_max)
-        found = sightings(at.to_pose2(), *rays_of(message), most, self.walls)
+        found = sightings(*level_rays(at, message), most, self.walls)
         self.tracks.see(found, self.now)
         self.tell(self.tracks.people(self.now))
 

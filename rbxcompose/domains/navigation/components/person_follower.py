@@ -26,7 +26,7 @@ from rbxcompose.msgs.nav_msgs import OccupancyGrid
 from rbxcompose.msgs.people_msgs import People
 from rbxcompose.msgs.poses import pose_in
 from rbxcompose.msgs.rbxcompose_msgs import FollowPerson
-from rbxcompose.msgs.sensor_arrays import rays_of
+from rbxcompose.msgs.sensor_arrays import level_rays
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.sdk.bound import NewestMessage
 from rbxcompose.sdk.ports import BULK
@@ -155,7 +155,7 @@ class PersonFollower(BaseDriver[PersonFollowerConfig]):
         if placed is None:
             return
         message, (at,) = placed
-        if self.costs.see(at.to_pose2(), *rays_of(message), min(self.config.sees, message.range_max), self.now):
+        if self.costs.see(*level_rays(at, message), min(self.config.sees, message.range_max), self.now):
             self.seen = self.time_of(message.header.stamp)
             is_late = self.now - self.seen > self.config.silence
             self.unusable = f"its scans are {self.now - self.seen:.1f} s old" if is_late else ""

@@ -11,6 +11,7 @@ from rbxcompose import sdk
 from rbxcompose.base.arrays import Array, np
 from rbxcompose.domains.worlds.sensors import SensorConfig, WorldSensor
 from rbxcompose.manifest.fields import Farthest, TopicName
+from rbxcompose.msgs.sensor_arrays import seen_from_above
 from rbxcompose.msgs.sensor_msgs import LaserScan
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
@@ -66,7 +67,10 @@ class LaserSim(WorldSensor[LaserSimConfig]):
         if self.seen is None or (place := self.place()) is None:
             return
         config, (pose, height) = self.config, place
-        found = self.seen.distances((pose.x, pose.y), self.angles + pose.heading, config.farthest, self.now, height)
+        angles, shares = seen_from_above(self.bound["mounting"].transform().rotation, self.angles)
+        found = self.seen.distances((pose.x, pose.y), angles + pose.heading, config.farthest, self.now, height)
+        found /= np.maximum(shares, 1e-9)  # of a ray straight up, nothing
+        found[found >= config.farthest] = math.inf
         if config.noise:
             found += self.random.normal(0.0, config.noise, found.shape)
         found[found < config.nearest] = -math.inf  # too near, as REP 117 says it
