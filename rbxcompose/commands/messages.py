@@ -279,6 +279,7 @@ def _end(ended: Ended[Any], name: str, is_interrupted: bool, as_json: bool) -> i
     if ended.result is not None:
         _tell("result", ended.result, as_json)
     if is_interrupted:
+        sys.stderr.write(f"'{name}': {ended.outcome}\n")  # its result may look like that of a success
         return INTERRUPTED
     if ended.outcome is Outcome.SUCCEEDED:
         return 0

@@ -117,11 +117,15 @@ def test_a_goal_is_sent_and_its_result_printed(robot: Robot) -> None:
 
 def test_an_interrupt_cancels_the_goal(robot: Robot) -> None:
     words = robot.command("action", "send", "/go_to", FAR, "--json")
-    with Forked(words, env=robot.environment, stdout=subprocess.PIPE, text=True, cwd=ROOT) as sending:
+    with Forked(
+        words, env=robot.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT
+    ) as sending:
         assert sending.stdout is not None
+        assert sending.stderr is not None
         assert "feedback" in json.loads(sending.stdout.readline())
         sending.send_signal(signal.SIGINT)
         rest = sending.stdout.read()
+        assert sending.stderr.read() == "'/go_to': canceled\n"
         assert sending.wait(PATIENCE) == 130
     assert "result" in json.loads(rest.splitlines()[-1])
 

@@ -745,6 +745,17 @@ def test_before_the_first_scan_a_robot_is_at_its_start_by_odometry(tmp_path: Pat
     }
 
 
+def test_a_robot_that_believes_in_another_place_is_warned_of(tmp_path: Path) -> None:
+    room = Room(tmp_path, ROBOT + "  localisation: {type: particles, start: {x: 2 m, y: 2 m, heading: 90 deg}}\n")
+    statuses = room.bench.statuses("localisation: scan")
+    turn = Twist(angular=Vector3(z=0.5))
+    for _ in range(20):
+        room.bench.publish("/cmd_vel", turn)
+        room.bench.advance(0.2)
+    assert statuses[-1].level == Level.WARN
+    assert statuses[-1].message.endswith("either much is not on the map, or the robot is elsewhere on it")
+
+
 def test_a_late_laser_does_not_make_odometry_begin_again(tmp_path: Path) -> None:
     robot = ROBOT.replace("noise:", "latency: 0.8 s, noise:").replace("0.4 m/s", "0.5 m/s")
     room = Room(tmp_path, robot + "  localisation: {type: particles}\n")

@@ -159,6 +159,20 @@ def zone_beside_map(robot: Robot) -> Iterator[Finding]:
             )
 
 
+@check("RBX3616", Severity.WARNING, closed=())
+def idle_localisation_key(robot: Robot) -> Iterator[Finding]:
+    """A key of a localisation says where the robot is, and odometry alone tells that."""
+    if (found := _navigation(robot)) is None or (model := found.model.localisation).type != "odometry":
+        return
+    for name in sorted(model.model_fields_set - {"type"}):
+        key = name.rstrip("_")
+        yield idle_localisation_key.at(
+            robot.key("navigation", "localisation", key),
+            f"'{key}' has no effect with 'type: odometry': the robot is where its odometry begins, and drives on",
+            help="write 'type: particles' for a robot with a laser, or 'type: tags' for one with a camera",
+        )
+
+
 @check("RBX3622", Severity.WARNING, closed=(WIRING, NAMES))
 def scans_too_rare(robot: Robot) -> Iterator[Finding]:
     """Scans come so rarely that the robot takes its laser for silent in between."""

@@ -244,7 +244,7 @@ class PathFollower:
         """Return the velocity along the arc to a place; it is not commanded yet."""
         limits = self.settings
         curvature = 2 * math.sin(bearing) / away
-        speed = limits.speed * costs.share_at(pose.x, pose.y)
+        speed = self._zoned(pose, costs)
         if abs(curvature) * limits.curve > 1:
             speed = max(speed / (abs(curvature) * limits.curve), SLOWEST * speed)
         near = min(costs.value_at(pose.x, pose.y), INSCRIBED) / INSCRIBED
@@ -256,6 +256,19 @@ class PathFollower:
         speed = _near(speed, self._speed, limits.acceleration * dt)
         # Curves follow the speed: twice as much room for them.
         return Velocity2(speed, _near(speed * curvature, self._turn_rate, 2 * limits.turn_acceleration * dt))
+
+    def _zoned(self, pose: Pose2, costs: LayeredCosts) -> float:
+        """Return how fast the robot may be [m/s], so that it keeps the speed of its zone, and can brake to that of the
+        next one before it is there."""
+        limits = self.settings
+        speed = limits.speed * costs.share_at(pose.x, pose.y)
+        late = LAG * self._speed + costs.grid.resolution
+        ahead = np.arange(0.0, late + self._speed**2 / (2 * limits.acceleration), costs.grid.resolution)
+        x, y = (np.interp(self._behind[self._at] + ahead, self._behind, values) for values in self._points.T)
+        for at, *place in zip(ahead.tolist(), x.tolist(), y.tolist(), strict=True):
+            kept = limits.speed * costs.share_at(*place)
+            speed = min(speed, math.sqrt(kept * kept + 2 * limits.acceleration * max(0.0, at - late)))
+        return speed
 
     def _yields(self, pose: Pose2, costs: LayeredCosts) -> float:
         """Return how fast the robot may be [m/s], so that it stands when somebody ahead who walks up to it is there.

@@ -24,8 +24,11 @@ from rbxcompose.msgs.std_srvs import Empty
 from rbxcompose.sdk.bound import NewestMessage
 from rbxcompose.sdk.ports import BULK
 
-LOST = 0.3  # share of a scan that the map explains below which the robot is probably elsewhere
-FOUND, SURE = 0.5, 0.3  # such a share, and a standard deviation [m], by which a doubtful place is right
+# Share of a scan that the map explains, and a standard deviation [m], by which a doubtful place is right. In the house of
+# the examples, a map explains at least 54 % of twenty scans in a row, or 42 % beside two people; seen from a wrong place
+# in nine of ten cases less than 50 %.
+FOUND, SURE = 0.5, 0.3
+LATELY = 0.05  # share of the newest scan in the mean of the last ones
 
 
 class LocalisationConfig(sdk.Config):
@@ -88,6 +91,7 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
         super().configure()
         self.filter: ParticleFilter | None = None
         self.scan = NewestMessage[LaserScan]()
+        self.explains = math.nan  # share of the last scans that the map explains
         self.correction: Pose2 | None = None  # of `odom` in `map`, as soon as map and odometry are known
 
     def activate(self) -> None:
@@ -108,10 +112,12 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
         if self.doubt:
             help_text = "give a pose on 'initialpose', or let it drive by hand until it has found itself"
             return sdk.TaskStatus(Level.ERROR, f"{self.doubt}, so nothing drives: {help_text}")
-        if math.isnan(self.filter.quality):
+        if math.isnan(self.explains):
             return sdk.TaskStatus(Level.OK, "no scan has been compared with the map yet")
-        share = f"the map explains {self.filter.quality:.0%} of what the laser sees"
-        return sdk.TaskStatus(Level.OK if self.filter.quality >= LOST else Level.WARN, share)
+        share = f"the map explains {self.explains:.0%} of what the laser sees"
+        if self.explains >= FOUND:
+            return sdk.TaskStatus(Level.OK, share)
+        return sdk.TaskStatus(Level.WARN, f"{share}: either much is not on the map, or the robot is elsewhere on it")
 
     def on_map(self, message: OccupancyGrid) -> None:
         """Begin in a new map: at the start, or where the robot was believed to be."""
@@ -132,6 +138,7 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
         """Begin again with no idea."""
         if self.filter is not None:
             self.filter.start_anywhere()
+            self.explains = math.nan
             self.doubt = self.doubt and RESTARTED  # scans from one place do not decide among all
         return Empty.Response()
 
@@ -144,6 +151,7 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
         except ValueError as error:
             self.warn(str(error))
             return False
+        self.explains = math.nan
         return True
 
     def go_on_from(self, since: RecallPlace, stayed: Pose2 | None) -> str:
@@ -176,8 +184,10 @@ class ParticleLocalisation(Localiser[LocalisationConfig]):
         sensor, angles, ranges = level_rays(laser, message)
         ranges = np.where(rays_of(message)[1] <= message.range_max, ranges, math.inf)
         is_weighed = self.filter.see(sensor, angles, ranges, anew=self.doubt == BEGAN_AGAIN)
-        covariance = self.filter.covariance
-        if self.filter.quality >= FOUND and math.sqrt(covariance[[0, 1], [0, 1]].max()) <= SURE:
+        quality, covariance = self.filter.quality, self.filter.covariance
+        if not math.isnan(quality):
+            self.explains = quality if math.isnan(self.explains) else self.explains + LATELY * (quality - self.explains)
+        if quality >= FOUND and math.sqrt(covariance[[0, 1], [0, 1]].max()) <= SURE:
             self.doubt = ""
         if is_weighed:
             self.tell(self.filter, message.header)
