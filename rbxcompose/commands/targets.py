@@ -6,7 +6,7 @@ import argparse
 import json
 import os
 import stat
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from importlib.util import find_spec
 from pathlib import Path
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 UNUSED = kind("RBX9007", Severity.WARNING)
 _USE = "name it in a robot ('missions:', 'include:')"
 _MANIFESTS = ("*.yaml", "*.yml")
-_ROBOTS, _SYSTEMS = "robots", "systems"
+_ROBOTS, _SYSTEMS, _MISSIONS = "robots", "systems", "missions"
 _TESTS = (".test.yaml", ".test.yml")
 _SUFFIXES = (".yaml", ".yml")
 UNNAMED = kind("RBX9031")
@@ -86,8 +86,9 @@ class Targets:
 def targets(paths: Iterable[str]) -> Targets:
     """Return the targets that command-line paths name.
 
-    A path is a robot's file or folder, `rbx:robots/NAME`, a folder with robots or else tests below it, or any other
-    manifest, which means the robots of its project that use it. Other files mean the robot in whose folder they are.
+    A path is a robot's file or folder, `rbx:robots/NAME`, a project, a folder with robots or else tests below it, or
+    any other manifest, which means the robots of its project that use it. Other files mean the robot in whose folder
+    they are.
     """
     out = Targets()
     for written in paths:
@@ -97,8 +98,8 @@ def targets(paths: Iterable[str]) -> Targets:
         elif written.startswith(PREFIX) or not path.exists():
             out.robots.append(written)
         elif path.is_dir():
-            robots = [written] if (path / ROBOT_FILE).exists() else robots_below(path)
-            tests = [] if robots else tests_of([path])
+            robots = [written] if os.path.lexists(path / ROBOT_FILE) else robots_below(path)
+            tests = tests_of(filter(Path.is_dir, [path / _MISSIONS if robots else path]))
             out.tests += map(shown_name, tests)
             systems = systems_of(path)
             out.systems += systems
@@ -135,17 +136,27 @@ def kind_of(path: Path) -> str:
 
 
 def robots_below(folder: Path) -> list[str]:
-    """Return the robot files of a project, or of a folder of robots; at most two folders deep."""
+    """Return the robot files of a project, or of a folder of robots; elsewhere than there, two folders deep.
+
+    What has the name of one counts whatever it contains: reading it gives the finding.
+    """
     base = folder / _ROBOTS if (folder / _ROBOTS).is_dir() else folder
-    files = (path for depth in ("", "*/", "*/*/") for pattern in _MANIFESTS for path in base.glob(depth + pattern))
-    return sorted(shown_name(path.resolve()) for path in files if kind_of(path) == ROBOT)
+    depths = ("", "*/", "*/*/", *(["**/"] if base.resolve().name == _ROBOTS else ()))
+    return _manifests(base, depths, lambda path: path.stem == Path(ROBOT_FILE).stem or kind_of(path) == ROBOT)
 
 
 def systems_of(folder: Path) -> list[str]:
-    """Return the systems of a project, or of a folder of systems."""
+    """Return the systems of a project, or of a folder of systems, where a file without a kind counts, too."""
     base = folder / _SYSTEMS if (folder / _SYSTEMS).is_dir() else folder
-    files = (path for pattern in _MANIFESTS for path in base.glob(pattern))
-    return sorted(shown_name(path.resolve()) for path in files if kind_of(path) == SYSTEM)
+    kinds = (SYSTEM, "") if base.resolve().name == _SYSTEMS else (SYSTEM,)
+    return _manifests(base, [""], lambda path: kind_of(path) in kinds)
+
+
+def _manifests(base: Path, depths: Iterable[str], is_wanted: Callable[[Path], bool]) -> list[str]:
+    """Return the names of the wanted YAML files below a folder that are not hidden, at some depths."""
+    files = {path for depth in depths for pattern in _MANIFESTS for path in base.glob(depth + pattern)}
+    seen = (path for path in files if not any(part.startswith(".") for part in path.relative_to(base).parts))
+    return sorted({shown_name(_reached(path)) for path in seen if is_wanted(path)})
 
 
 def systems_here() -> list[str]:
@@ -161,8 +172,13 @@ def tests_of(paths: Iterable[Path]) -> list[Path]:
     found: dict[Path, None] = {}
     for path in paths:
         below = sorted(filter(_may_be_test, path.rglob("*"))) if path.is_dir() else [path]
-        found.update((one.absolute() if _is_odd(one) else one.resolve(), None) for one in below)
+        found.update((_reached(each), None) for each in below)
     return list(found)
+
+
+def _reached(path: Path) -> Path:
+    """Return the file that a path leads to, or the path itself if that cannot be read."""
+    return path.absolute() if _is_odd(path) else path.resolve()
 
 
 def _may_be_test(path: Path) -> bool:

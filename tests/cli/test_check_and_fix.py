@@ -190,6 +190,45 @@ def test_a_folder_of_tests_means_each_of_them(project: Path, capsys: pytest.Capt
     assert output(capsys, "missions/tests", code=0).splitlines() == ["the test two is fine", "the test one is fine"]
 
 
+def test_a_project_means_its_tests_too(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (project / "missions/tests").mkdir()
+    (project / "missions/tests/a.test.yaml").write_text(TEST.format("a", "sucess"))
+    assert "missions/tests/a.test.yaml:7:12" in output(capsys, ".", code=1)
+    assert output(capsys, "robots", code=0).splitlines() == ["turtlebot is fine: 9 components in 3 processes"]
+
+
+BROKEN = {
+    "empty": b"",
+    "of another kind": b"rbx: 1\nkind: Mission\nname: bot\n",
+    "of a kind that is none": b"rbx: 1\nkind: Cart\n",
+    "without a kind": b"rbx: 1\nname: bot\n",
+    "in another encoding": "rbx: 1\nkind: Robot\n".encode("utf-16"),
+    "a list": b"- rbx: 1\n",
+    "a link to nothing": None,
+}
+
+
+@pytest.mark.parametrize("folder", ["robots/other", "robots/on/the/second/floor"])
+def test_a_robot_whose_file_is_broken_is_not_passed_over(
+    folder: str, project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = project / folder / "robot.yaml"
+    file.parent.mkdir(parents=True)
+    for content in BROKEN.values():
+        file.unlink(missing_ok=True)
+        if content is None:
+            file.symlink_to("nowhere")
+        else:
+            file.write_bytes(content)
+        assert f"{folder}/robot.yaml" in output(capsys, code=1)
+
+
+def test_a_system_that_has_lost_its_kind_is_not_passed_over(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (project / "systems").mkdir()
+    (project / "systems/two.yaml").write_text("rbx: 1\nname: two\n")
+    assert "systems/two.yaml" in output(capsys, code=1)
+
+
 def test_warnings_count_only_under_strict(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     change(project / ROBOT, "about: Patrols a square", "about: Room #3")
     assert "1 warning" in output(capsys, str(ROBOT), code=0)

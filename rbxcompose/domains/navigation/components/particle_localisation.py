@@ -24,9 +24,9 @@ from rbxcompose.msgs.std_srvs import Empty
 from rbxcompose.sdk.bound import NewestMessage
 from rbxcompose.sdk.ports import BULK
 
-# Share of a scan that the map explains, and a standard deviation [m], by which a doubtful place is right. In the house of
-# the examples, a map explains at least 54 % of twenty scans in a row, or 42 % beside two people; seen from a wrong place
-# in nine of ten cases less than 50 %.
+# Share of a scan that the map explains, and a standard deviation [m], by which a doubtful place is right. In the house
+# of the examples, a map explains at least 54 % of twenty scans in a row, or 42 % beside two people; seen from a wrong
+# place in nine of ten cases less than 50 %.
 FOUND, SURE = 0.5, 0.3
 LATELY = 0.05  # share of the newest scan in the mean of the last ones
 
