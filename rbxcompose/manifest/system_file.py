@@ -138,7 +138,6 @@ class LinkModel(Config):
 
 
 ShortHost = Annotated[HostModel, BeforeValidator(_in_full, json_schema_input_type=HostModel | None)]
-SECURITY = "security"
 SECTIONS = {"hosts": dict[Name, ShortHost], "robots": dict[Name, SystemRobotModel]}
 LINKS = {"links": dict[Name, LinkModel]}
 PROFILES = {"profiles": dict[Name, dict[str, Any]]}

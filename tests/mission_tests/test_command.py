@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from unittest.mock import Mock
 from xml.etree import ElementTree
 
 import pytest
 
 from rbxcompose.commands.main import main as command
 from rbxcompose.missions.view.tested import keep_tested, read_tested
+from rbxcompose.tools.commands import test as verb
 from rbxcompose.tools.mission_tests.reader import TrialReader
 from tests.conftest import ROOT
 from tests.mission_tests.trying import Trying
@@ -174,6 +176,23 @@ def test_results_that_cannot_be_written_are_told_before_any_test_runs(
     assert command(["test", PATROL, "--junit", str(file)]) == 2
     told = capsys.readouterr()
     assert (told.out, told.err) == ("", f"rbxcompose test: '{file}' cannot be written: No such file or directory\n")
+
+
+def test_older_results_stay_until_there_are_new_ones(
+    trying: Trying, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trying.read("expect:\n  outcome: failure\n", "ending")
+    words, file = ["test", str(trying.folder / "tried.test.yaml"), "--junit"], tmp_path / "out.xml"
+    assert command([*words, str(file), "--filter", "nothing"]) == 2
+    assert not file.exists()
+    file.write_text("<old/>")
+    with monkeypatch.context() as patched:
+        patched.setattr(verb, "run_trial", Mock(side_effect=KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            command([*words, str(file)])
+    assert file.read_text() == "<old/>"
+    assert command([*words, str(file)]) == 0
+    assert "<testsuites" in file.read_text()
 
 
 def test_results_for_a_full_disk_are_told(trying: Trying, capsys: pytest.CaptureFixture[str]) -> None:

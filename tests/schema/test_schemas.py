@@ -78,7 +78,7 @@ def mistakes(text: str) -> list[str]:
 
 
 def manifests() -> list[Path]:
-    folders = ("robots", "missions", "parts", "overlays", "worlds")
+    folders = ("robots", "missions", "parts", "overlays", "systems", "worlds")
     files = (path for folder in folders for path in (ROOT / folder).rglob("*.yaml"))
     return sorted(path for path in files if not path.stem.endswith("_map"))
 

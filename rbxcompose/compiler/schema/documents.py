@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache, lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from rbxcompose.base.config import Name, Time, field_docs
 from rbxcompose.base.files import replace_file
@@ -35,7 +35,9 @@ _WIDTH = 120  # of a line in a file
 
 def system_schema(types: Iterable[str]) -> Schema:
     """Return the schema of a system; it is the same for all types of components."""
-    keys = {system_file.SECURITY: system_file.SystemFile.model_fields[system_file.SECURITY].annotation}
+    own = system_file.SystemFile.model_fields.keys() - ManifestHeader.model_fields.keys()
+    hints = get_type_hints(system_file.SystemFile, include_extras=True)
+    keys = {name: hint for name, hint in hints.items() if name in own and hint is not Any}
     schemas, definitions = schemas_of({**system_file.SECTIONS, **system_file.LINKS, **system_file.PROFILES, **keys})
     about = field_docs(system_file.SystemFile)
     sections = {

@@ -14,6 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Report
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, emit, has_colour, misused, write_report
@@ -54,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     files = tests_of(arguments.paths)
     if not files:
         return misused("test", f"no tests ('kind: Test') in {plain(', '.join(map(str, arguments.paths)))}")
-    if problem := _save(arguments, ""):  # now, and not after all tests have run
+    if problem := _save(arguments):  # now, and not after all tests have run
         return problem
     reading = TrialReader(os.environ, unsaved_of(arguments))
     coverage, writer = Coverage(), TrialWriter(has_colour(sys.stdout))
@@ -77,13 +78,22 @@ def run(arguments: argparse.Namespace) -> int:
     return problem or (0 if all(file_outcome.passed for file_outcome in outcomes) else FINDINGS)
 
 
-def _save(arguments: argparse.Namespace, results: str) -> int:
-    """Write the results for `--junit`; return the exit code if they cannot be written, else 0."""
+def _save(arguments: argparse.Namespace, results: str | None = None) -> int:
+    """Write the results for `--junit`, or try whether they can be; return the exit code if they cannot, else 0."""
+    file: Path | None = arguments.junit
     try:
-        if arguments.junit:
-            arguments.junit.write_text(results, encoding="utf-8")
+        if file is not None and results is None:
+            is_new = not file.exists()
+            file.open("a").close()
+            if is_new:
+                file.unlink()
+        elif file is not None and results is not None:
+            if file.exists() and not file.is_file():
+                file.write_text(results, encoding="utf-8")  # such as to a pipe
+            else:
+                replace_file(file.resolve(), results.encode())
     except OSError as error:
-        return misused("test", f"'{plain(str(arguments.junit))}' cannot be written: {error.strerror}")
+        return misused("test", f"'{plain(str(file))}' cannot be written: {error.strerror}")
     return 0
 
 
