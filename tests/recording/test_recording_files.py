@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import resource
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -171,6 +172,18 @@ def test_what_a_killed_recorder_left_is_recovered(tmp_path: Path) -> None:
     assert good.messages >= len(MESSAGES) - 20
     assert bad.problem
     assert sorted(os.listdir(tmp_path)) == ["a.mcap", "other.mcap.part"]
+
+
+def test_a_recovery_without_room_leaves_nothing_behind(tmp_path: Path) -> None:
+    (tmp_path / "a.mcap.part").write_bytes(unfinished(MESSAGES)[:-5])
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        (found,) = recover_all(tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert found.problem == "File too large"
+    assert os.listdir(tmp_path) == ["a.mcap.part"]
 
 
 def test_an_empty_part_becomes_a_recording_of_nothing(tmp_path: Path) -> None:

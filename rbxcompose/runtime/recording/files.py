@@ -150,7 +150,7 @@ def recover_all(folder: Path) -> Iterator[Recovered]:
                 if _is_ours(file, part):
                     yield Recovered(path, _recover(file, part, path))
         except (OSError, NotARecordingError) as error:
-            yield Recovered(part, problem=str(error))
+            yield Recovered(part, problem=getattr(error, "strerror", None) or str(error))
 
 
 def _is_ours(file: IO[bytes], part: Path) -> bool:
@@ -170,10 +170,11 @@ def _recover(file: IO[bytes], part: Path, path: Path) -> int:
     with new.open("xb") as whole:
         try:
             messages = recover(file, whole)
-        except NotARecordingError:
+            whole.flush()
+            os.fsync(whole.fileno())
+        except (OSError, NotARecordingError):  # such as on a full disk
             new.unlink()
             raise
-        os.fsync(whole.fileno())
     os.rename(new, part)  # now the part is complete, and recovering it again would change nothing
     os.rename(part, path)
     sync_folder(path.parent)
