@@ -318,6 +318,15 @@ class Repeated:
 
 
 @dataclass(frozen=True, slots=True)
+class LiveSettings:
+    """The settings of a component as text, once they are not those of its plan: it gets them back after a restart of
+    its process. With an empty text, they are those of the plan."""
+
+    instance: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class TimeIsUp:
     """The time for which the robot was to run is over, on a stepped clock."""
 
@@ -384,13 +393,12 @@ class FromHost:
 
 
 LifecycleOrder = Configure | Activate | Start | Brake | Shutdown
-PlanOrder = Consider | Adopt | Retire | Prepare | Reconfigure
+PlanOrder = Consider | Adopt | Retire | Prepare | Reconfigure | LiveSettings
 ChannelOrder = LifecycleOrder | Stop | Release | Lost | Blocked | Ask | PlanOrder | SettingOrder | ToHosts
-ProgressWord = Configured | States | Failed | Repeated | StoppedByBus | AtRest | TimeIsUp | Summary | Alive
+KeptWord = Repeated | LiveSettings | ComponentNoted
+ProgressWord = Configured | States | Failed | StoppedByBus | AtRest | TimeIsUp | Summary | Alive
 AnswerWord = Answered | Refusal | Considered | Retired | Reconfigured
-ChannelWord = (
-    ProgressWord | StoppedByBus | MissionOver | RobotHeld | ComponentNoted | AnswerWord | SettingWord | FromHost
-)
+ChannelWord = ProgressWord | StoppedByBus | MissionOver | RobotHeld | KeptWord | AnswerWord | SettingWord | FromHost
 ChannelMessage = ChannelOrder | ChannelWord
 
 MESSAGES: Family[ChannelMessage] = Family(get_args(ChannelMessage))

@@ -42,14 +42,15 @@ def test_a_client_that_is_killed_in_the_middle_of_a_change_leaves_it_whole(robot
 
 def test_a_component_that_dies_in_the_middle_of_a_change_leaves_nothing_of_it(robot: Robot, tmp_path: Path) -> None:
     client = half_way(robot, tmp_path / "wait")
-    process = robot.folder.read_state()
-    assert process is not None
-    process.processes["other"].send_signal(signal.SIGKILL)
+    robot.process_of("second").send_signal(signal.SIGKILL)
     (tmp_path / "wait").unlink()
     told, _ = client.communicate(timeout=PATIENCE)
     assert "process 'other' has ended meanwhile" in told
     eventually(lambda: "\n".join(sizes(robot)) == "0\n0")
     assert not robot.has_logged("set: size")
     assert robot.do("param", "set", "first.size=3", "second.size=4").returncode == 0
+    assert sizes(robot) == ["3", "4"]
+    robot.process_of("second").send_signal(signal.SIGKILL)
+    eventually(lambda: robot.has_logged("set: size = 4, by the restart of its process"))
     assert sizes(robot) == ["3", "4"]
     assert robot.do("down").returncode == 0

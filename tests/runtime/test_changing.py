@@ -78,6 +78,15 @@ def test_what_changes_is_retired_in_reverse_order_then_started_in_order() -> Non
     assert stage.orders(say.Activate) == [("robot", say.Activate(["mux"])), ("mission", say.Activate(["mission"]))]
 
 
+def test_what_was_set_while_it_ran_is_forgotten_of_what_starts_with_another_plan() -> None:
+    stage = Changed()
+    for name in ("mux", "base"):
+        stage.speak("robot", say.LiveSettings(name, "as text"))
+    stage.apply(with_settings(robot(), "mux", output="other"))
+    stage.retire("robot")
+    assert stage.conductor.kept.settings.keys() == {"base"}
+
+
 def test_components_are_activated_once_they_are_configured_and_then_it_is_told() -> None:
     stage = Changed().apply(with_settings(robot(), "mux", output="other"))
     stage.retire("robot")

@@ -435,6 +435,19 @@ def test_a_process_that_was_killed_is_told_again_what_people_had_begun() -> None
     assert stage.orders(say.Ask) == [("mission", say.Ask(0, "mission", begun))]
 
 
+def test_a_process_that_was_killed_gets_back_what_was_set_while_it_ran() -> None:
+    stage = Stage().start()
+    live = say.LiveSettings("mission", "as text")
+    stage.speak("mission", live)
+    for known in ([("mission", live)], []):
+        stage.sent.clear()
+        stage.exit("mission")
+        stage.scheduler.advance(stage.scheduler.now + 0.5)
+        stage.configure("mission")
+        assert stage.orders(say.LiveSettings) == known
+        stage.speak("mission", say.LiveSettings("mission", ""))
+
+
 def test_a_router_that_finds_no_port_ends_the_robot_with_its_reason() -> None:
     stage = Stage()
     stage.speak("router", say.Failed("", "no port is free"))

@@ -25,7 +25,7 @@ from rbxcompose.missions.sources import PAUSE
 from rbxcompose.msgs.rcl_interfaces import Log
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_srvs import SetBool
-from rbxcompose.runtime.channel import Failed, Repeated, States
+from rbxcompose.runtime.channel import Failed, LiveSettings, Repeated, States
 from rbxcompose.runtime.faults import RestartPolicy, explain
 from rbxcompose.runtime.log import Record, WriteRecord
 from rbxcompose.runtime.process_group.parameters import NOBODY_ELSE, Deciders, Parameters
@@ -101,7 +101,7 @@ A = TypeVar("A")
 
 SLOW = 0.005  # [s] in one callback, after which diagnostics name it: nothing else in the process runs meanwhile
 
-Notice = States | Failed | Repeated | RobotEvent  # what a host reports to the supervisor on its own
+Notice = States | Failed | Repeated | LiveSettings | RobotEvent  # what a host reports to the supervisor on its own
 OnOrder = Callable[..., None]  # takes the name of a method of the host, and its arguments
 
 
@@ -153,7 +153,8 @@ class Host:
         self.frames = self._frames(instances)
         self.hosted = {instance.name: Hosted(self, instance) for instance in instances}
         namespace = plan.bus.namespace
-        self.parameters = Parameters(self.owner, bus, clock, namespace, self.hosted, self._fails_soon, deciders)
+        failed = self._fails_soon
+        self.parameters = Parameters(self.owner, bus, clock, namespace, self.hosted, failed, deciders, notify)
         self.statuses.is_active = self._is_active
         self._policies = {instance.name: RestartPolicy(instance.restart) for instance in instances}
         self._retired: dict[str, Component[Any]] = {}  # those that another one may replace
@@ -286,6 +287,12 @@ class Host:
             hosted.log(Level.WARN, str(refusal))
         else:
             self._guarded(instance, partial(hosted.recall, request))
+
+    def restore(self, instance: str, text: str) -> None:
+        """Give a component the settings that it had before its process was restarted."""
+        hosted = self.hosted.get(instance)
+        if hosted is not None and (reason := self.parameters.restore(hosted, text)):
+            hosted.log(Level.WARN, f"has the settings of its manifest again: {reason}")
 
     def _is_active(self, name: str) -> bool:
         return name in self.hosted and self.hosted[name].state is Lifecycle.ACTIVE

@@ -14,12 +14,12 @@ from rbxcompose.base.units import format_quantity
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import resolve
 from rbxcompose.bus.services import ServedRequest
-from rbxcompose.compiler.plan.dump import dump_configs
+from rbxcompose.compiler.plan.dump import dump_configs, load_configs
 from rbxcompose.compiler.plan.model import Instance
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.rbxcompose_parameters import ChangeParameters, NodeChange
 from rbxcompose.msgs.stamps import to_time
-from rbxcompose.runtime.channel import AskForChange
+from rbxcompose.runtime.channel import AskForChange, LiveSettings
 from rbxcompose.runtime.settings_history import BY_A_TOOL, MARK, ChangeCause, ParameterHistory
 from rbxcompose.sdk import parameters as core
 from rbxcompose.sdk.component import Component
@@ -147,7 +147,7 @@ class LiveChanges:
         done = self._done[number] = []
         for change in self._prepared.get(number, ()):
             is_there = change.hosted.component is not None
-            if reason := self._follow(change.hosted, change.new) if is_there else "it has failed meanwhile":
+            if reason := self.follow(change.hosted, change.new) if is_there else "it has failed meanwhile":
                 return "; ".join(filter(None, (reason, self.undo(number))))
             done.append(change)
         return ""
@@ -155,7 +155,7 @@ class LiveChanges:
     def undo(self, number: int) -> str:
         """Give components their old values back; return why one does not take them."""
         done = self._done.pop(number, [])
-        reasons = [self._follow(change.hosted, change.old) for change in reversed(done)]
+        reasons = [self.follow(change.hosted, change.old) for change in reversed(done)]
         return "; ".join(filter(None, reasons))
 
     def end(self, number: int) -> None:
@@ -164,7 +164,8 @@ class LiveChanges:
         for change in self._done.pop(number, ()):
             self.on_change(change.hosted, change.old, change.cause)
 
-    def _follow(self, hosted: Settable, config: Config) -> str:
+    def follow(self, hosted: Settable, config: Config) -> str:
+        """Apply a configuration to a component, or to what it becomes; return why not."""
         name = hosted.instance.name
         if hosted.component is None:  # it comes back with this
             hosted.config = config
@@ -180,7 +181,7 @@ class LiveChanges:
 
 
 EVENTS = "/parameter_events"
-BY_APPLY = ChangeCause("apply")
+BY_APPLY, BY_RESTART = ChangeCause("apply"), ChangeCause("the restart of its process")
 OWN = 0  # the number of a change where there is no supervisor
 # The supervisor numbers its changes from 1; what is prepared when it is asked for has the negative of that number.
 
@@ -211,8 +212,10 @@ class Parameters:
         hosted: Mapping[str, Settable],
         failed: Callable[[str, BaseException], None],
         deciders: Deciders,
+        notify: Callable[[LiveSettings], None],
     ) -> None:
         self._bus, self._clock, self._namespace, self._deciders = bus, clock, namespace, deciders
+        self._notify = notify
         self._publish_event = bus.publisher(owner, EVENTS, rcl.ParameterEvent, Qos.EVENT)
         self._histories: dict[str, ParameterHistory] = {}
         self.changes = LiveChanges(hosted, failed, self.report_change, self.history)
@@ -251,6 +254,13 @@ class Parameters:
         old = hosted.config
         hosted.reconfigure(config)
         self.report_change(hosted, old, BY_APPLY)
+
+    def restore(self, hosted: Settable, text: str) -> str:
+        """Give a component the settings that it had before its process was restarted; return why it refuses."""
+        old, (config,) = hosted.config, load_configs(text).values()
+        reason = self.changes.follow(hosted, config)
+        self.report_change(hosted, old, BY_RESTART)
+        return reason
 
     def want(self, wanted: WantedChange, then: WhenDecided) -> None:
         """Change settings of components, by their nodes; `then` gets why not, now or later.
@@ -314,6 +324,8 @@ class Parameters:
         self.history(name).note(core.differences(hosted.config, old), after, cause, self._clock.stamp())
         stamp = to_time(self._clock.stamp())
         self._publish_event(rcl.ParameterEvent(stamp=stamp, node=self.node(name), changed_parameters=tuple(after)))
+        is_live = hosted.config != hosted.instance.config
+        self._notify(LiveSettings(name, self.changes.text({name: hosted.config}) if is_live else ""))
 
 
 class _Served:

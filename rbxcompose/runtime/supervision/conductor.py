@@ -230,7 +230,7 @@ class Conductor:
             case messages.Failed(instance, text, time):
                 self.time = max(self.time, time)
                 self._failed(instance, text)
-            case messages.Repeated() | ComponentNoted():
+            case messages.Repeated() | messages.LiveSettings() | ComponentNoted():
                 self.kept.receive(message)
                 self._effects.states_changed()
             case MissionOver():
@@ -274,6 +274,9 @@ class Conductor:
         if member.is_stopped is not self.is_stopped:  # that changed after it was forked
             self.latch.notify(member)
         self.blocked.notify(self.plan, member)
+        for instance in self.plan.of_group(member.name) if member.restarts else ():
+            if (settings := self.kept.settings.get(instance.name)) is not None:
+                self._effects.send(member.name, settings)
         if member.name == self._router and self.endpoint is None:
             self.endpoint = endpoint
             for group in self.plan.groups:
@@ -460,6 +463,8 @@ class Conductor:
         fresh = {
             instance.name: ("unconfigured", 0) for instance in self.plan.instances if instance.name in changes.starting
         }
+        for name in changes.starting:
+            self.kept.settings.pop(name, None)
         self.hosts.adopt(self.plan.share)
         if self._router and changes.links_change and self.members[self._router].is_there:
             self._effects.send(self._router, messages.Adopt(text_of(self.plan, ())))

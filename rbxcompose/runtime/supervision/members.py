@@ -181,18 +181,24 @@ def blocked_text(causes: Mapping[str, str], name: str) -> str:
 
 
 class KeptValues:
-    """By component: requests that it gets again after its process was restarted, and notes for people."""
+    """By component: what it gets again after its process was restarted, and notes for people."""
 
     def __init__(self) -> None:
         self.notes: dict[str, str] = {}
+        self.settings: dict[str, messages.LiveSettings] = {}
         self._requests: dict[str, list[dict[str, Any]]] = {}
 
-    def receive(self, message: messages.Repeated | ComponentNoted) -> None:
-        """Keep this instead of what the component told before."""
-        if isinstance(message, messages.Repeated):
-            self._requests[message.instance] = message.requests
-        else:
-            self.notes[message.component] = message.text
+    def receive(self, message: messages.KeptWord) -> None:
+        """Keep this instead of what the component reported before."""
+        match message:
+            case messages.Repeated(instance, requests):
+                self._requests[instance] = requests
+            case messages.LiveSettings(instance, text):
+                self.settings[instance] = message
+                if not text:
+                    del self.settings[instance]
+            case ComponentNoted(component, text):
+                self.notes[component] = text
 
     def repeated(self, instances: Iterable[Instance]) -> Iterator[tuple[str, dict[str, Any]]]:
         """Yield the requests for components, each with the name of its component."""
