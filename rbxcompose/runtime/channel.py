@@ -318,7 +318,7 @@ class Repeated:
 
 
 @dataclass(frozen=True, slots=True)
-class LiveSettings:
+class SettingsKept:
     """The settings of a component as text, once they are not those of its plan: it gets them back after a restart of
     its process. With an empty text, they are those of the plan."""
 
@@ -393,9 +393,9 @@ class FromHost:
 
 
 LifecycleOrder = Configure | Activate | Start | Brake | Shutdown
-PlanOrder = Consider | Adopt | Retire | Prepare | Reconfigure | LiveSettings
+PlanOrder = Consider | Adopt | Retire | Prepare | Reconfigure | SettingsKept
 ChannelOrder = LifecycleOrder | Stop | Release | Lost | Blocked | Ask | PlanOrder | SettingOrder | ToHosts
-KeptWord = Repeated | LiveSettings | ComponentNoted
+KeptWord = Repeated | SettingsKept | ComponentNoted
 ProgressWord = Configured | States | Failed | StoppedByBus | AtRest | TimeIsUp | Summary | Alive
 AnswerWord = Answered | Refusal | Considered | Retired | Reconfigured
 ChannelWord = ProgressWord | StoppedByBus | MissionOver | RobotHeld | KeptWord | AnswerWord | SettingWord | FromHost

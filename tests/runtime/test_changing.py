@@ -81,7 +81,7 @@ def test_what_changes_is_retired_in_reverse_order_then_started_in_order() -> Non
 def test_what_was_set_while_it_ran_is_forgotten_of_what_starts_with_another_plan() -> None:
     stage = Changed()
     for name in ("mux", "base"):
-        stage.speak("robot", say.LiveSettings(name, "as text"))
+        stage.speak("robot", say.SettingsKept(name, "as text"))
     stage.apply(with_settings(robot(), "mux", output="other"))
     stage.retire("robot")
     assert stage.conductor.kept.settings.keys() == {"base"}

@@ -437,15 +437,15 @@ def test_a_process_that_was_killed_is_told_again_what_people_had_begun() -> None
 
 def test_a_process_that_was_killed_gets_back_what_was_set_while_it_ran() -> None:
     stage = Stage().start()
-    live = say.LiveSettings("mission", "as text")
+    live = say.SettingsKept("mission", "as text")
     stage.speak("mission", live)
     for known in ([("mission", live)], []):
         stage.sent.clear()
         stage.exit("mission")
         stage.scheduler.advance(stage.scheduler.now + 0.5)
         stage.configure("mission")
-        assert stage.orders(say.LiveSettings) == known
-        stage.speak("mission", say.LiveSettings("mission", ""))
+        assert stage.orders(say.SettingsKept) == known
+        stage.speak("mission", say.SettingsKept("mission", ""))
 
 
 def test_a_router_that_finds_no_port_ends_the_robot_with_its_reason() -> None:

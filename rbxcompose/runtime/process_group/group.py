@@ -377,7 +377,7 @@ class ProcessGroup:
                 self._change(self._made_host(), message)
             case _ if isinstance(message, messages.ComponentSettingOrder):
                 change_settings(self._made_host(), message, self._channel)
-            case messages.LiveSettings(instance, text):
+            case messages.SettingsKept(instance, text):
                 self._made_host().restore(instance, text)
             case messages.Blocked(causes):
                 self._made_host().statuses.block(causes)

@@ -25,7 +25,7 @@ from rbxcompose.missions.sources import PAUSE
 from rbxcompose.msgs.rcl_interfaces import Log
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_srvs import SetBool
-from rbxcompose.runtime.channel import Failed, LiveSettings, Repeated, States
+from rbxcompose.runtime.channel import Failed, Repeated, SettingsKept, States
 from rbxcompose.runtime.faults import RestartPolicy, explain
 from rbxcompose.runtime.log import Record, WriteRecord
 from rbxcompose.runtime.process_group.parameters import NOBODY_ELSE, Deciders, Parameters
@@ -101,7 +101,7 @@ A = TypeVar("A")
 
 SLOW = 0.005  # [s] in one callback, after which diagnostics name it: nothing else in the process runs meanwhile
 
-Notice = States | Failed | Repeated | LiveSettings | RobotEvent  # what a host reports to the supervisor on its own
+Notice = States | Failed | Repeated | SettingsKept | RobotEvent  # what a host reports to the supervisor on its own
 OnOrder = Callable[..., None]  # takes the name of a method of the host, and its arguments
 
 

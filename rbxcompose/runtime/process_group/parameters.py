@@ -19,7 +19,7 @@ from rbxcompose.compiler.plan.model import Instance
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.rbxcompose_parameters import ChangeParameters, NodeChange
 from rbxcompose.msgs.stamps import to_time
-from rbxcompose.runtime.channel import AskForChange, LiveSettings
+from rbxcompose.runtime.channel import AskForChange, SettingsKept
 from rbxcompose.runtime.settings_history import BY_A_TOOL, MARK, ChangeCause, ParameterHistory
 from rbxcompose.sdk import parameters as core
 from rbxcompose.sdk.component import Component
@@ -212,7 +212,7 @@ class Parameters:
         hosted: Mapping[str, Settable],
         failed: Callable[[str, BaseException], None],
         deciders: Deciders,
-        notify: Callable[[LiveSettings], None],
+        notify: Callable[[SettingsKept], None],
     ) -> None:
         self._bus, self._clock, self._namespace, self._deciders = bus, clock, namespace, deciders
         self._notify = notify
@@ -325,7 +325,7 @@ class Parameters:
         stamp = to_time(self._clock.stamp())
         self._publish_event(rcl.ParameterEvent(stamp=stamp, node=self.node(name), changed_parameters=tuple(after)))
         is_live = hosted.config != hosted.instance.config
-        self._notify(LiveSettings(name, self.changes.text({name: hosted.config}) if is_live else ""))
+        self._notify(SettingsKept(name, self.changes.text({name: hosted.config}) if is_live else ""))
 
 
 class _Served:

@@ -230,7 +230,7 @@ class Conductor:
             case messages.Failed(instance, text, time):
                 self.time = max(self.time, time)
                 self._failed(instance, text)
-            case messages.Repeated() | messages.LiveSettings() | ComponentNoted():
+            case messages.Repeated() | messages.SettingsKept() | ComponentNoted():
                 self.kept.receive(message)
                 self._effects.states_changed()
             case MissionOver():

@@ -185,7 +185,7 @@ class KeptValues:
 
     def __init__(self) -> None:
         self.notes: dict[str, str] = {}
-        self.settings: dict[str, messages.LiveSettings] = {}
+        self.settings: dict[str, messages.SettingsKept] = {}
         self._requests: dict[str, list[dict[str, Any]]] = {}
 
     def receive(self, message: messages.KeptWord) -> None:
@@ -193,7 +193,7 @@ class KeptValues:
         match message:
             case messages.Repeated(instance, requests):
                 self._requests[instance] = requests
-            case messages.LiveSettings(instance, text):
+            case messages.SettingsKept(instance, text):
                 self.settings[instance] = message
                 if not text:
                     del self.settings[instance]

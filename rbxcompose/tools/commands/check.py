@@ -1,7 +1,7 @@
 """Report every error of a robot before a motor moves.
 
-PATH is a robot's file or folder, a folder with robots or tests below it, a test, a system, or a mission or part: it
-checks the robots of the project that use it. An overlay is checked on the robot beside it, else: check ROBOT -f FILE.
+PATH is a project, a robot's file or folder, a folder with robots or tests below it, a test, a system, or a mission or
+part: it checks the robots of the project that use it. An overlay is checked on the robot beside it, else: check ROBOT -f FILE.
 Exit codes: 0 fine, 1 errors found (with --strict also warnings), 2 wrong usage.
 """
 
@@ -38,7 +38,7 @@ _WORDS = 200  # characters of a title
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("paths", nargs="*", default=["."], metavar="PATH", help="what to check; else the robots here")
+    parser.add_argument("paths", nargs="*", default=["."], metavar="PATH", help="what to check; else the project here")
     add_layer_options(parser)
     add_unsaved_option(parser)
     parser.add_argument("--format", choices=format_names(), default=TEXT, help="output format")
