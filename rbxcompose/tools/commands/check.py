@@ -1,7 +1,8 @@
 """Report every error of a robot before a motor moves.
 
 PATH is a project, a robot's file or folder, a folder with robots or tests below it, a test, a system, or a mission or
-part: it checks the robots of the project that use it. An overlay is checked on the robot beside it, else: check ROBOT -f FILE.
+part: it checks the robots of the project that use it. An overlay is checked on the robot beside it, else: check ROBOT
+-f FILE.
 Exit codes: 0 fine, 1 errors found (with --strict also warnings), 2 wrong usage.
 """
 
