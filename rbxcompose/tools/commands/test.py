@@ -83,9 +83,8 @@ def _save(arguments: argparse.Namespace, results: str | None = None) -> int:
     file: Path | None = arguments.junit
     try:
         if file is not None and results is None:
-            is_new = not file.exists()
-            file.open("a").close()
-            if is_new:
+            if not file.exists():
+                file.touch()
                 file.unlink()
         elif file is not None and results is not None:
             if file.exists() and not file.is_file():
