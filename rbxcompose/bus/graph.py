@@ -150,7 +150,8 @@ class TopicWriter:
 
 @dataclass(frozen=True, slots=True)
 class TopicReader:
-    """What matters to writers about a subscription of this process; `arrived` [s] is when the last message came."""
+    """What matters to writers about a subscription of this process; `arrived` [s] is when the last message came, and
+    `begun` [s] when it began to listen."""
 
     owner: str
     route: Route
@@ -158,6 +159,7 @@ class TopicReader:
     arrived: float
     expects_speech: bool  # an existing writer should publish before long, unlike one of events or commands
     is_latched: bool = False  # what came before the whole robot was active counts, too
+    begun: float = 0.0
 
 
 class Writers:
@@ -201,7 +203,7 @@ class Writers:
         if not writers or not reader.expects_speech:
             return ""
         known = min(writer.since for writer in writers)
-        since = max(started, known)
+        since = max(started, known, reader.begun)
         # The only message of a latched topic may come while the robot starts, and before the token of its publisher. It
         # does not come again when the link to its publisher does.
         latched = min(writer.first for writer in writers) - SILENCE

@@ -138,7 +138,7 @@ class Subscription(Generic[M]):
         self._may_be_silent = may_be_silent
         rate = max_rate or most_per_second(qos)
         self._allowances = None if rate is None or math.isinf(rate) else Allowances(rate)
-        self._arrived = -math.inf  # [s] of robot time
+        self._arrived, self._begun = -math.inf, node.process.clock.now()  # [s] of robot time
         depth = max(PATIENT_QUEUE, queue_depth(qos)) if is_patient else queue_depth(qos)
         self._patience = depth // 2 if is_patient else 1  # messages that may wait for each other
         self._has_complained = False  # in the log; diagnostics continue to count
@@ -179,7 +179,8 @@ class Subscription(Generic[M]):
         type_hash = self._process.wire.hash_of(self._message)
         is_part_of_an_action = "/_" in self.route[0]  # nothing is published there until there is a goal
         speaks = expects_speech(self._qos) and not (is_part_of_an_action or self._may_be_silent)
-        return TopicReader(self.owner, self.route, type_hash, self._arrived, speaks, self._qos is Qos.LATCHED)
+        is_latched = self._qos is Qos.LATCHED
+        return TopicReader(self.owner, self.route, type_hash, self._arrived, speaks, is_latched, self._begun)
 
     def listen(self) -> None:
         """Start to receive from other processes."""

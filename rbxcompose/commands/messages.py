@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import yaml
@@ -44,7 +45,7 @@ def message_from(message: type[M], text: str) -> M | None:
     if root is not None and not findings:
         made, findings = from_plain(message, _data(root), NodePlaces(root))
     if findings:
-        write_report(Report([*findings]), {_SHOWN: text})
+        write_report(Report([replace(finding, fix=None) for finding in findings]), {_SHOWN: text})  # of no file
         return None
     return made
 
@@ -211,6 +212,8 @@ def publish(guest: Guest, arguments: argparse.Namespace) -> int:
         return refuse(NO_NAME.at(None, problem))
     topic = find(guest.graph().topics, name)
     of_type = [kind for kind in (topic.kinds if topic else ()) if kind.type == message.TYPE]
+    if topic is not None and topic.takers and not of_type:
+        raise NotDoneError(_nobody(topic, name, message, of_type))  # subscribers would report a publisher of that type
     publisher = guest.bus(of_type[0] if of_type else None).publisher(NAME, name, message, Qos.EVENT)
     if not guest.run(lambda: publisher.has_match, arguments.timeout):
         raise NotDoneError(_nobody(topic, name, message, of_type))

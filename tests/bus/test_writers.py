@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -67,6 +68,8 @@ def test_silence_counts_from_when_both_are_there_and_the_robot_has_started() -> 
     assert told(token(), now=1.0 + SILENCE) == ""
     assert told(token(), now=1.1 + SILENCE)
     assert told(token(), now=3.0 + SILENCE, started=3.0) == ""
+    assert told(token(), replace(READER, begun=3.0), now=3.0 + SILENCE) == ""
+    assert told(token(), replace(READER, begun=3.0), now=3.1 + SILENCE)
 
 
 def test_a_publisher_that_comes_back_must_be_heard_again() -> None:

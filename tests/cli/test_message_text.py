@@ -31,6 +31,7 @@ def test_a_mistake_has_its_place(capsys: pytest.CaptureFixture[str]) -> None:
     assert "error[RBX9023]" in told
     assert "--> MESSAGE:1:2" in told
     assert "did you mean 'linear'?" in told
+    assert "check --fix" not in told  # of no file
 
 
 @pytest.mark.parametrize("number", [".nan", ".inf", "-.inf", ".NaN", ".Inf"])

@@ -97,6 +97,7 @@ def test_who_publishes_to_nobody_is_told_so(robot: Robot) -> None:
     assert done.returncode == 1
     done = robot.do("topic", "pub", "/cmd_vel/teleop", "std_msgs/Empty", "--timeout", "0.2s")
     assert "is not of type std_msgs/msg/Empty, but geometry_msgs/msg/Twist" in done.stderr
+    assert "'_rbxcompose' publishes" not in robot.do("logs").stdout
 
 
 def test_a_service_is_called(robot: Robot) -> None:

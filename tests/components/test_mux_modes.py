@@ -53,6 +53,14 @@ def look(robot: Bench) -> MuxState:
     return robot.host.ask("cmd_vel", LookAtMux("cmd_vel"))
 
 
+def test_nobody_misses_commands_of_a_source_that_is_silent() -> None:
+    robot = bench(message="trajectory_msgs/msg/JointTrajectory")
+    inputs = [
+        each.reader for each in robot.bus.subscriptions if each.route[0] in ("/cmd_vel/teleop", "/cmd_vel/navigation")
+    ]
+    assert [reader.expects_speech for reader in inputs] == [False, False]
+
+
 def test_the_limits_of_a_hand_over_change_while_the_robot_runs() -> None:
     robot = bench(handover={"linear": "0.1 m/s^2"})
     out = robot.collect("/cmd_vel", Twist)

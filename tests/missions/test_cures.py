@@ -131,6 +131,13 @@ def test_every_finding_about_a_mission_tells_the_cure(text: str, cures: list[str
         assert bool(finding.help) == bool(cure)
 
 
+@for_all("arguments, is_one", [("{room: dock}", True), ("{room: dock, floor: dock}", False)])
+def test_one_unknown_argument_may_be_meant_as_the_main_one(arguments: str, *, is_one: bool, tmp_path: Path) -> None:
+    checked = check_text(ROBOT, tmp_path, others={"mission.yaml": f"{HEAD}do: {{go_to: {arguments}}}"})
+    found = [finding for finding in checked.compilation.report if finding.code == "RBX4105"]
+    assert ["write 'go_to: dock'" in finding.help for finding in found] == ([True] if is_one else [False, False])
+
+
 def test_what_was_saved_is_a_map_so_it_is_no_number(tmp_path: Path) -> None:
     text = f"{HEAD}do:\n  - {{recharge: {{}}, save: got}}\n  - check: $got > 1\n  - check: $got.level > 1\n"
     (finding,) = (

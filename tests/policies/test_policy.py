@@ -316,6 +316,7 @@ def test_a_paused_goal_rests_and_keeps_its_time(tmp_path: Path) -> None:
     pause = running.bench.bus.client("bench", "/run_policy/pause", SetBool)
     pause(SetBool.Request(data=True), lambda _: None)
     assert running.wish(0.2, 5.0)[-1] == (0.0, 0.0)
+    assert running.statuses[-1].message == "is paused"
     pause(SetBool.Request(data=False), lambda _: None)
     assert (0.2, 0.1) in running.wish(0.2, 0.8)
     assert running.ends == []

@@ -56,7 +56,7 @@ class Wire(NoTransport):
 class Process:
     """A process that listens to a level, and what it tells of that."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, is_restart: bool = False) -> None:
         self.scheduler, self.clock = Scheduler(), SteppedClock()
         self.wire = Wire(self.scheduler)
         self.bus = bus = Bus(self.scheduler, self.clock, transport=self.wire, log=lambda owner, text: None)
@@ -65,7 +65,7 @@ class Process:
         bus.subscribe("tools", "/diagnostics", DiagnosticArray, Qos.STATE, self._note)
         bus.subscribe("charger", "level", Float32, Qos.STATE, lambda message: None)
         self.told: list[tuple[str, Level, str]] = []
-        deliveries.start()
+        deliveries.start(is_restart=is_restart)
 
     def _note(self, message: DiagnosticArray) -> None:
         self.told += [(status.name, Level(status.level), status.message) for status in message.status]
@@ -96,6 +96,12 @@ def test_refused_messages_are_counted_once_a_second_and_forgiven_when_no_more_co
     process.advance(PERIOD)
     assert process.told[0] == ("charger: level", Level.WARN, "3 messages were refused on /level: wrong length")
     assert process.told[-1] == ("charger: level", Level.OK, "messages arrive as they should")
+
+
+def test_a_restarted_process_takes_back_what_the_one_before_complained_of() -> None:
+    process = Process(is_restart=True)
+    process.advance(2 * PERIOD)
+    assert ("charger: level", Level.OK, "messages arrive as they should") in process.told
 
 
 def test_a_silent_publisher_is_told_until_it_speaks(process: Process) -> None:

@@ -10,7 +10,7 @@ from heapq import heappop, heappush
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
-from rbxcompose.domains.diagnostics.requests import LatchedLevel, LevelChange
+from rbxcompose.domains.diagnostics.requests import NOT_YET, LatchedLevel, LevelChange
 from rbxcompose.domains.diagnostics.settings import (
     OTHER,
     SHOWN,
@@ -116,7 +116,7 @@ class GroupItem:
             return item.cause
         if self.level is not STALE or item.level == STALE:
             if status is None:
-                return "has not reported yet"
+                return NOT_YET
             return status.message if OK <= item.level <= STALE else f"level {item.level} is unknown: {status.message}"
         last = f", last: {status.message}" if status and status.message else ""
         return f"silent since {item.received_at:.1f} s{last}" if status else "never reported"

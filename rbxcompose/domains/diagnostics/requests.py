@@ -9,6 +9,8 @@ from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Command, Query
 
 TYPE = "diagnostics"
+NOT_YET = "has not reported yet"
+"""Message of a part of the robot that has just started."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -106,7 +106,8 @@ def _argument(view: View, skill: Skill, argument: parts.WrittenArgument) -> Iter
             yield wrong_argument.at(argument.span, message, help=help_text)
             return
         finding = wrong_argument.misspelt(argument.span, message, name, arguments, "its arguments", taken=taken)
-        if skill.main and skill.main not in taken and "" not in taken and not nearest(name, arguments):
+        is_only = len(taken - arguments.keys()) == 1  # else it is hardly the main argument that is meant
+        if is_only and skill.main and not taken & {skill.main, ""} and not nearest(name, arguments):
             value = argument.value
             if not isinstance(value, ScalarNode):
                 finding = replace(finding, help=clauses(finding.help, f"write '{skill.name}: ...'"))

@@ -68,15 +68,22 @@ class Deliveries:
         self._started = 0.0  # [s]
         self._unhealthy: set[str] = set()  # names of unhealthy statuses
 
-    def start(self) -> None:
-        """Begin to check: the whole robot is active, and all publishers may publish."""
+    def start(self, *, is_restart: bool) -> None:
+        """Begin to check: the whole robot is active, and all publishers may publish.
+
+        In a process that is restarted, what its predecessor complained of may be over: each subscription has a status.
+        """
         self._started = self._clock.now()
+        self._unhealthy = {self._name(subscription) for subscription in self._bus.subscriptions if is_restart}
         self._every()
+
+    def _name(self, subscription: Subscription[Any]) -> str:
+        return f"{subscription.owner}: {subscription.route[0].lstrip('/')}"
 
     def _look(self) -> None:
         troubled: set[str] = set()
         for subscription in self._bus.subscriptions:
-            name = f"{subscription.reader.owner}: {subscription.route[0].lstrip('/')}"
+            name = self._name(subscription)
             if text := self._trouble(subscription):
                 troubled.add(name)
                 refused = subscription.refusals.total
@@ -191,7 +198,7 @@ class Host:
         """Start everything that waits for the whole robot to be active, with or without the mission of `start`."""
         self._on_order("start")
         self.has_started, self.starts_mission = True, starts_mission
-        self._deliveries.start()
+        self._deliveries.start(is_restart=self.is_restart)
         self._each_active("start")
         for hosted in self.hosted.values():
             hosted.note_start()

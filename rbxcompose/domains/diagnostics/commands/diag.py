@@ -29,6 +29,7 @@ GROUP = "look"
 ON_SYSTEM = requests.TYPE
 FOR_ALL = ("tree", "history")
 _PERIOD = 0.2  # [s] between two requests to a robot that is followed
+_STARTS = 3.0  # [s] that a robot has to report for the first time
 _RESET, _FAINT = "\x1b[0m", "\x1b[2m"
 _COLOURS = {Level.OK: "\x1b[32m", Level.WARN: "\x1b[33m", Level.ERROR: "\x1b[1;31m", Level.STALE: "\x1b[35m"}
 _STEP = "  "
@@ -65,7 +66,10 @@ def _tree(arguments: argparse.Namespace) -> int:
 
 def _show_tree(arguments: argparse.Namespace) -> int:
     folder = find_robot(arguments.robot)
-    tree = answer_of(folder, requests.ShowDiagnostics())
+    tree, deadline = answer_of(folder, requests.ShowDiagnostics()), time.monotonic() + _STARTS
+    while any(line.message == requests.NOT_YET for line in tree.lines) and time.monotonic() < deadline:
+        time.sleep(_PERIOD)
+        tree = answer_of(folder, requests.ShowDiagnostics())
     if arguments.json:
         emit(_document(folder, tree))
     else:

@@ -502,7 +502,8 @@ class Mux(Component[MuxConfig]):
 
 
 def _input(name: str, topic: str, config: MuxConfig, max_rate: float | None) -> In[Any]:
-    return In(registry.message(config.message), topic, qos=config.quality, is_open=True, max_rate=max_rate).named(name)
+    message, qos = registry.message(config.message), config.quality  # who may command need not always do so
+    return In(message, topic, qos=qos, is_open=True, max_rate=max_rate, may_be_silent=True).named(name)
 
 
 def _services(output: str) -> dict[str, Port[Any]]:

@@ -491,7 +491,7 @@ class Policy(sdk.Component[PolicyConfig]):
         if self.goal is not None:
             self.ran += 0.0 if is_paused else dt
             self.pursue(self.goal, problem)
-        words = problem or ("sends" if self.is_on else "is off")
+        words = problem or ("is off" if not self.is_on else "is paused" if is_paused else "sends")
         is_silent = bool(problem) and self.core.last is None
         level = Level.ERROR if is_silent else Level.WARN if problem else Level.OK
         self.status(level, words, **self.core.counts)
