@@ -84,6 +84,59 @@ def test_an_overlay_is_checked_with_the_robot_beside_it(folder: Path) -> None:
     assert project.robot_of(path) is not None
 
 
+@pytest.mark.parametrize(
+    ("written", "wrong", "code"),
+    [
+        ("mission: patrol", "mission: patrl", "RBX4201"),
+        ("outcome: success", "outcome: sucess", "RBX4201"),
+        ("takes: 3 s", "takes: 3 sec", "RBX1003"),
+        ("go_to: corner_4", "go_to: corner_5", "RBX4201"),
+        ("expect:", "expct:", "RBX1001"),
+        ("kind: Test", "kind: Tst", "RBX1304"),
+    ],
+)
+def test_a_test_is_checked_with_its_robot(folder: Path, written: str, wrong: str, code: str) -> None:
+    project, path = Project({}), folder / "missions/tests/patrol.test.yaml"
+    text = path.read_text(encoding="utf-8")
+    assert codes(project, path, text) == {}
+    assert code in codes(project, path, text.replace(written, wrong))[path.name]
+    assert codes(project, path, text) == {}
+
+
+def test_an_open_test_is_checked_again_when_its_robot_changes_until_it_is_closed(folder: Path) -> None:
+    project, path = Project({}), folder / "missions/tests/patrol.test.yaml"
+    robot = folder / "robots/turtlebot/robot.yaml"
+    project.change(path, path.read_text(encoding="utf-8"))
+    broken = robot.read_text(encoding="utf-8").replace("patrol.yaml", "patrl.yaml")
+    assert codes(project, robot, broken)[path.name] == ["RBX4203"]
+    assert project.change(path, None)[path] == []
+    assert path.name not in codes(project, robot, broken)
+    assert codes(project, robot, None) == {}
+
+
+def test_a_system_is_checked_with_its_robots_in_each_profile(folder: Path) -> None:
+    shutil.copytree(ROOT / "systems", folder / "systems")
+    project, path = Project({}), folder / "systems/patrol_two_hosts.yaml"
+    text = path.read_text(encoding="utf-8")
+    assert codes(project, path, text) == {}
+    assert codes(project, path, text.replace("hosts:", "hosst:"))[path.name] == ["RBX1001"]
+    assert codes(project, path, text.replace("turtlebot/robot", "turtlbot/robot")) == {path.name: ["RBX1301"]}
+    profile = "profiles:\n  near:\n    robots:\n      turtlebot:\n        on: dsk\n"
+    assert codes(project, path, text + profile) == {path.name: ["RBX6100"]}
+    robot = folder / "robots/turtlebot/robot.yaml"
+    project.change(path, text)
+    broken = robot.read_text(encoding="utf-8").replace("linked:", "lonked:")
+    assert path.name in codes(project, robot, broken)
+
+
+def test_a_file_that_no_robot_uses_is_marked_while_it_is_open(folder: Path) -> None:
+    shutil.copytree(ROOT / "worlds", folder / "worlds")
+    project, part, world = Project({}), folder / "parts/lift.yaml", folder / "worlds/blank.yaml"
+    for path in (part, world):
+        assert codes(project, path, path.read_text(encoding="utf-8")) == {path.name: ["RBX9007"]}
+        assert codes(project, path, None) == {}
+
+
 def test_a_text_is_checked_also_if_its_file_is_not_there(folder: Path) -> None:
     project, path = Project({}), folder / "missions/patrol.yaml"
     text = path.read_text(encoding="utf-8")

@@ -93,7 +93,6 @@ def joined(parts: Iterable[Outside]) -> Outside:
 _APART = 1000  # from the port of a robot's links to that of what it shares
 
 
-@one_compile()
 def compile_system(
     path: str,
     *,
@@ -101,11 +100,25 @@ def compile_system(
     real: bool = False,
     profiles: Sequence[str] = (),
     unsaved: Mapping[Path, str] = MappingProxyType({}),
+    tries_profiles: bool = False,
 ) -> System:
     """Compile the file of a system with these of its profiles; report all its mistakes, and those of its robots.
 
-    `unsaved` are texts from an editor, by the real path of the file that each replaces.
+    `unsaved` are texts from an editor, by the real path of the file that each replaces. With `tries_profiles`, each
+    profile is tried as well if none was chosen.
     """
+    out = _compiled_system(path, environment, real, profiles, unsaved)
+    for name in out.known_profiles if tries_profiles and not profiles else ():
+        tried = _compiled_system(path, environment, real, [name], unsaved)
+        out.report.extend_new(tried.report)
+        out.sources.update(tried.sources)
+    return out
+
+
+@one_compile()
+def _compiled_system(
+    path: str, environment: Mapping[str, str], real: bool, profiles: Sequence[str], unsaved: Mapping[Path, str]
+) -> System:
     out = System(profiles=tuple(profiles), sources=Texts(unsaved))
     file = find(path)
     if isinstance(file, Finding):
@@ -307,12 +320,10 @@ class _Compiling:
         compilation = self._compile(shown, profile, world, self.outside)
         self.out.sources.update((file, text) for file, text in compilation.sources.items() if file not in places)
         self.out.needed |= compilation.needed
-        known = {(one.code, one.span, one.message) for one in self.out.report}
-        for finding in compilation.report:
-            if finding.span is not None and finding.span.file in places:
-                finding = replace(finding, span=places[finding.span.file])
-            if (finding.code, finding.span, finding.message) not in known:
-                self.out.report.add(finding)
+        self.out.report.extend_new(
+            replace(one, span=places[one.span.file]) if one.span is not None and one.span.file in places else one
+            for one in compilation.report
+        )
         return compilation
 
 

@@ -12,7 +12,6 @@ import re
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import field, replace
-from functools import partial
 from pathlib import Path
 
 from rbxcompose.base.dataclass import dataclass
@@ -59,7 +58,7 @@ class CheckedRobots:
 
     def add(self, compilation: Compilation) -> None:
         """Add the findings of one robot."""
-        self.report.extend(compilation.report)
+        self.report.extend_new(compilation.report)
         self.sources.update(compilation.sources)
         if compilation.plan is not None:
             self.fine.append(compilation.plan)
@@ -82,9 +81,7 @@ def _check(arguments: argparse.Namespace) -> CheckedRobots:
     for robot in wanted.robots:
         checked.add(compiled(robot, arguments, tries_profiles=True))
     for robot, overlay in wanted.overlays:
-        one = compiled(robot, arguments, overlay, tries_profiles=True)
-        one.report = _new(one.report, checked.report)
-        checked.add(one)
+        checked.add(compiled(robot, arguments, overlay, tries_profiles=True))
     for robot in wanted.users:
         one = compiled(robot, arguments, tries_profiles=True)
         if any(file in one.sources for file in wanted.files):
@@ -98,12 +95,6 @@ def _check(arguments: argparse.Namespace) -> CheckedRobots:
     checked.report.extend(wanted.unused(checked.sources, unsaved_of(arguments)))
     checked.report = Report([*only_ours(checked.report, checked.sources, projects)])
     return checked
-
-
-def _new(report: Report, before: Report) -> Report:
-    """Return a report without what was found before."""
-    known = {(each.code, each.span, each.message) for each in before}
-    return Report([each for each in report if (each.code, each.span, each.message) not in known])
 
 
 def _check_tests(tests: list[str], arguments: argparse.Namespace, checked: CheckedRobots) -> None:
@@ -123,15 +114,13 @@ def _check_system(path: str, arguments: argparse.Namespace, checked: CheckedRobo
     from rbxcompose.compiler.systems.reader import compile_system
     from rbxcompose.tools.inspection.plan_text import system_extent  # only needed for systems
 
-    unsaved = unsaved_of(arguments)
-    compiled_with = partial(compile_system, path, environment=os.environ, real=arguments.real, unsaved=unsaved)
-    system = compiled_with(profiles=arguments.profile)
-    tried = () if arguments.profile else system.known_profiles
-    all_ = [system, *(compiled_with(profiles=(name,)) for name in tried)]
-    for one in all_:
-        checked.report.extend(_new(one.report, checked.report))
-        checked.sources.update(one.sources)
-    if not any(one.report.has_errors for one in all_):
+    chosen, unsaved = arguments.profile, unsaved_of(arguments)
+    system = compile_system(
+        path, environment=os.environ, real=arguments.real, profiles=chosen, unsaved=unsaved, tries_profiles=True
+    )
+    checked.report.extend_new(system.report)
+    checked.sources.update(system.sources)
+    if not system.report.has_errors:
         checked.systems.append(f"{system.name} is fine: {system_extent(system)}")
 
 

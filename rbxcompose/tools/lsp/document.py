@@ -23,7 +23,7 @@ from rbxcompose.compiler.sections.missions import INPUT
 from rbxcompose.manifest.files import resolve
 from rbxcompose.manifest.reader import read_file
 from rbxcompose.manifest.registry import naming, section_named
-from rbxcompose.manifest.section import OWN_PORT, PART, ROBOT, SYSTEM, TEST
+from rbxcompose.manifest.section import OVERLAY, OWN_PORT, PART, ROBOT, SYSTEM, TEST
 from rbxcompose.manifest.shapes import kind_of_keys
 from rbxcompose.manifest.tree import (
     Entry,
@@ -40,7 +40,7 @@ from rbxcompose.manifest.tree import (
 from rbxcompose.manifest.yaml_nodes import compose
 from rbxcompose.missions.program.parts import ENDS, STATE
 from rbxcompose.missions.program.program import Skill
-from rbxcompose.tools.lsp.project import MISSION, OVERLAY, kind_of
+from rbxcompose.tools.lsp.project import MISSION, kind_of
 
 SKILL = "skill"
 LARGE = 300  # lines; of longer manifests only the parts near the position are read

@@ -20,7 +20,7 @@ from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.sections.composition import PART_ARGUMENT, args, include, profiles, provides
 from rbxcompose.compiler.sections.missions import INPUT, missions
 from rbxcompose.manifest.registry import section_named
-from rbxcompose.manifest.section import PART, ROBOT, TEST, Section
+from rbxcompose.manifest.section import OVERLAY, PART, ROBOT, TEST, Section
 from rbxcompose.manifest.test_file import STEP_KEYS
 from rbxcompose.manifest.tree import (
     KeyPath,
@@ -39,7 +39,6 @@ from rbxcompose.missions.program.parts import DEEDS, MACHINE_KEYS, Asked, Writte
 from rbxcompose.missions.program.program import Program, Skill
 from rbxcompose.missions.program.registry import keys_taking, kinds, modifier_keys
 from rbxcompose.tools.lsp.project import MISSION as MISSION_DOCUMENT
-from rbxcompose.tools.lsp.project import OVERLAY
 from rbxcompose.tools.lsp.project_files import NO_MEANING, Meanings, NamePiece, ProjectFiles, Symbol
 
 VARIABLE, ITEM, STATE, NODE, BRANCH, INTERRUPT = "variable", "item", "state", "node", "branch", "interrupt"

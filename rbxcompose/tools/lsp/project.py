@@ -11,16 +11,19 @@ from pathlib import Path
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Report
-from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.commands.targets import Targets, robots_below
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.composition.robot_file import read_mission
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.schema.documents import installed_schema
 from rbxcompose.manifest.files import ROBOT_FILE, project_of, shown_name
 from rbxcompose.manifest.reader import Texts, read_file
+from rbxcompose.manifest.section import OVERLAY, ROBOT, SYSTEM, TEST
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.msgs import registry
 
-ROBOT, MISSION, OVERLAY = "Robot", "Mission", "Overlay"
+MISSION = "Mission"
+_USERS = (TEST, SYSTEM)  # kinds that use robots, and that nothing uses: they are checked while they are open
 _KIND = re.compile(r"^kind:[ ]*[\"']?(\w+)", re.MULTILINE)
 _HEADER = re.compile(r"^rbx:", re.MULTILINE)
 _MOST_ROBOTS = 200  # examined per project
@@ -42,16 +45,17 @@ def kind_of(text: str) -> str:
 
 @dataclass(slots=True)
 class _Watched:
-    """A robot: its newest compilation, the files of that, and the robot of the last compilation that had one."""
+    """What was compiled, by its kind: the newest findings and files, and the last robot that could be read."""
 
-    compilation: Compilation
+    kind: str
+    report: Report
     files: frozenset[Path]
     robot: Robot | None
 
 
 @dataclass(slots=True)
 class Project:
-    """All open texts, and the robots that they are part of."""
+    """All open texts, and the robots, tests and systems that they are part of."""
 
     environment: Mapping[str, str]
     unsaved: dict[Path, str] = field(default_factory=dict)
@@ -86,15 +90,14 @@ class Project:
             self.unsaved[path] = text
         before = {file for robot in self._concerned(path) for file in self._watched[robot].files}
         self._alone.pop(path, None)
-        is_gone = text is None and not path.exists()
-        if is_gone:
-            self._watched.pop(path, None)
+        if text is None and path in self._watched and (self._watched[path].kind in _USERS or not path.exists()):
+            del self._watched[path]
         robots = self._robots_of(path)
         for robot in robots:
             self._compile(robot)
         if not robots and (base := self._base_of(path)):
             self._robots_of(base)
-        if not robots and not is_gone:  # where would an editor show what is wrong with it?
+        if not robots and text is not None:  # where would an editor show what is wrong with it?
             self._alone[path] = self._lone_findings(path)
         after = {file for robot in robots for file in self._watched[robot].files}
         return {file: self.findings(file) for file in sorted({path} | before | after)}
@@ -131,20 +134,23 @@ class Project:
         return robot if kind_of(self.text(path)) == OVERLAY and robot.is_file() else None
 
     def _of(self, robot: Path, path: Path) -> Iterator[Finding]:
-        for finding in self._watched[robot].compilation.report:
+        for finding in self._watched[robot].report:
             place = Path(finding.span.file).resolve() if finding.span else robot
             if place == path:
                 yield finding
 
     def _concerned(self, path: Path) -> list[Path]:
-        return [robot for robot, watched in self._watched.items() if path in watched.files]
+        """Return what a file is part of, robots first: these have no profile."""
+        found = [robot for robot, watched in self._watched.items() if path in watched.files]
+        return sorted(found, key=lambda one: self._watched[one].kind in _USERS)
 
     def _robots_of(self, path: Path) -> list[Path]:
-        """Return the robots that a file is part of: itself, or those of its project that use it."""
+        """Return what a file is part of: itself, the robots of its project that use it, and open tests and systems."""
         kind = kind_of(self.text(path))
-        if kind == ROBOT or path in self._watched:
-            return [path]
-        for robot in _robot_files(path):
+        if path in self._watched or kind == ROBOT or (kind in _USERS and path in self.unsaved):
+            return list(dict.fromkeys([path, *self._concerned(path)]))
+        below = robots_below(project_of(path))[:_MOST_ROBOTS] if kind not in _USERS else []
+        for robot in (Path(shown).resolve() for shown in below):
             if robot not in self._watched and kind_of(self.text(robot)) == ROBOT:
                 self._compile(robot)
         return self._concerned(path)
@@ -152,12 +158,30 @@ class Project:
     def _compile(self, path: Path) -> None:
         if self.is_outdated():
             raise OutdatedError
-        made = compile_robot(str(path), environment=self.environment, unsaved=self.unsaved, tries_profiles=True)
-        before = self._watched.get(path)
-        files = frozenset({path, *(Path(shown).resolve() for shown in made.sources)})
+        before, kind = self._watched.get(path), kind_of(self.text(path))
+        if before and kind not in (ROBOT, *_USERS):  # one that is being typed
+            kind = before.kind
+        report, sources, robot = self._compiled(path, kind)
+        files = frozenset({path, *(Path(shown).resolve() for shown in sources)})
         # While a text cannot be read, the names of the last readable robot serve best.
-        robot = made.robot or (before.robot if before else None)
-        self._watched[path] = _Watched(made, files, robot)
+        self._watched[path] = _Watched(kind, report, files, robot or (before.robot if before else None))
+
+    def _compiled(self, path: Path, kind: str) -> tuple[Report, Mapping[str, str], Robot | None]:
+        """Return the findings of a robot, test or system, the texts of its files, and its robot (none of a system)."""
+        if kind == TEST:
+            from rbxcompose.tools.mission_tests.reader import TrialReader  # only needed for tests
+
+            reading = TrialReader(self.environment, self.unsaved)
+            _, report = reading.read(path)
+            robot = next((made.robot for made in reading.robots.values()), None)
+            return Report([*reading.report, *report]), reading.sources, robot
+        if kind == SYSTEM:
+            from rbxcompose.compiler.systems.reader import compile_system  # only needed for systems
+
+            system = compile_system(str(path), environment=self.environment, unsaved=self.unsaved, tries_profiles=True)
+            return system.report, system.sources, None
+        made = compile_robot(str(path), environment=self.environment, unsaved=self.unsaved, tries_profiles=True)
+        return made.report, made.sources, made.robot
 
     def _lone_findings(self, path: Path) -> list[Finding]:
         report, sources = Report(), Texts(self.unsaved)
@@ -167,9 +191,7 @@ class Project:
                 read_program(root, report)
         elif base := self._base_of(path):
             return self._overlay_findings(path, base)
-        else:
-            report.extend(read_file(path, shown_name(path), sources)[1])
-        return list(report)
+        return list(report) or list(Targets(files=[shown_name(path)]).unused({}, self.unsaved))
 
     def _overlay_findings(self, path: Path, base: Path) -> list[Finding]:
         """Return the findings in an overlay when it is applied to the robot beside it."""
@@ -177,12 +199,6 @@ class Project:
             str(base), overlays=[str(path)], environment=self.environment, unsaved=self.unsaved, tries_profiles=True
         )
         return [finding for finding in made.report if finding.span and Path(finding.span.file).resolve() == path]
-
-
-def _robot_files(path: Path) -> list[Path]:
-    folder = project_of(path) / "robots"
-    found = sorted(folder.rglob("*.yaml"))[:_MOST_ROBOTS] if folder.is_dir() else []
-    return [robot.resolve() for robot in found]
 
 
 class Newest:

@@ -16,10 +16,10 @@ from rbxcompose.compiler.sections.composition import include, profiles
 from rbxcompose.compiler.sections.missions import missions
 from rbxcompose.manifest.files import ROBOT_FILE, project_of, resolve
 from rbxcompose.manifest.registry import naming, section_named, sections
-from rbxcompose.manifest.section import PART, ROBOT
+from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
 from rbxcompose.manifest.tree import NOWHERE, KeyPath, MappingNode, ScalarNode, TreeNode, at, entries_of
 from rbxcompose.tools.lsp.document import quick_tree
-from rbxcompose.tools.lsp.project import OVERLAY, kind_of
+from rbxcompose.tools.lsp.project import kind_of
 
 
 @dataclass(frozen=True, slots=True)

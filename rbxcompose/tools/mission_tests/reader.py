@@ -466,14 +466,14 @@ class TrialReader:
     """Reads the tests of one run; each robot is compiled once with each profile, and its findings are reported once.
 
     `unsaved` are texts in place of files, by their real paths. `sources` are the texts of all files, `report` has the
-    findings on robots.
+    findings on robots, `robots` has these by file and profile.
     """
 
     environment: Mapping[str, str]
     unsaved: Mapping[Path, str] = field(default_factory=dict)
     sources: dict[str, str] = field(default_factory=dict)
     report: Report = field(default_factory=Report)
-    _robots: dict[tuple[str, str], Compilation] = field(default_factory=dict)
+    robots: dict[tuple[str, str], Compilation] = field(default_factory=dict)
     _kept_back: dict[Finding, str] = field(default_factory=dict)  # the finding in a test of a robot with errors
 
     def read(self, path: Path) -> tuple[Trial | None, Report]:
@@ -552,13 +552,13 @@ class TrialReader:
         shown = name if isinstance(file, str) else shown_name(file)
         chosen = _text(root, "profile", "the name of a profile", report) if "profile" in root else None
         key = name, chosen.text if chosen is not None else ""
-        if key not in self._robots:
+        if key not in self.robots:
             profiles = [chosen.text] if chosen is not None else []
             made = compile_robot(shown, profiles=profiles, environment=self.environment, unsaved=self.unsaved)
-            self._robots[key] = made
+            self.robots[key] = made
             self.report.extend(finding for finding in made.report if not _is_of_profile(finding))
             self.sources.update(made.sources)
-        made = self._robots[key]
+        made = self.robots[key]
         if made.robot is not None:
             registry.choose(made.robot.manifest.messages)
         lost = [finding for finding in made.report if _is_of_profile(finding)]
