@@ -27,11 +27,15 @@ class Client:
             words, cwd=folder, env=os.environ.copy(), stdin=pipe, stdout=pipe, stderr=pipe
         )
         self.told: deque[dict[str, Any]] = deque()  # notifications that nobody has waited for yet
+        self.questions: list[dict[str, Any]] = []  # of the server
         self.number = 0
         self.errors = b""
 
     def __enter__(self) -> Self:
-        capabilities = {"textDocument": {"publishDiagnostics": {"relatedInformation": True}}}
+        capabilities = {
+            "textDocument": {"publishDiagnostics": {"relatedInformation": True}},
+            "workspace": {"didChangeWatchedFiles": {"dynamicRegistration": True}},
+        }
         try:
             self.ask("initialize", processId=None, rootUri=ROOT.as_uri(), capabilities=capabilities)
         except BaseException:
@@ -98,4 +102,6 @@ class Client:
             size = int(value) if name.lower() == b"content-length" else size
         assert size, "the server has gone"
         message: dict[str, Any] = json.loads(self.process.stdout.read(size))
+        if {"id", "method"} <= message.keys():
+            self.questions.append(message)
         return message

@@ -137,6 +137,16 @@ def test_a_file_that_no_robot_uses_is_marked_while_it_is_open(folder: Path) -> N
         assert codes(project, path, None) == {}
 
 
+def test_an_open_mission_is_marked_while_no_robot_has_it(folder: Path) -> None:
+    project, path = Project({}), folder / "missions/patrol.yaml"
+    robot = folder / "robots/turtlebot/robot.yaml"
+    text = robot.read_text(encoding="utf-8")
+    without = "\n".join(line for line in text.split("\n") if "missions/patrol.yaml" not in line)
+    assert codes(project, path, path.read_text(encoding="utf-8")) == {}
+    assert codes(project, robot, without)[path.name] == ["RBX9007"]
+    assert codes(project, robot, text) == {}
+
+
 def test_a_text_is_checked_also_if_its_file_is_not_there(folder: Path) -> None:
     project, path = Project({}), folder / "missions/patrol.yaml"
     text = path.read_text(encoding="utf-8")

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from tests.conftest import ROOT
 from tests.lsp.client import Client
 from tests.soak import Soak, rare
 
@@ -86,6 +87,34 @@ def test_a_mistake_in_a_mission_is_told_where_it_was_made_although_the_robot_is_
     assert target["uri"] == (project / "robots/turtlebot/robot.yaml").as_uri()
     client.tell("textDocument/didClose", textDocument=document)
     assert client.diagnostics(path.as_uri()) == []  # what was saved is right
+
+
+def test_files_that_change_on_disk_are_checked_again_with_the_robots_that_are_known(
+    client: Client, project: Path
+) -> None:
+    robot, mission = project / ROBOT, project / MISSION
+    text = mission.read_text("utf-8")
+    opened(client, robot)
+    assert client.diagnostics(robot.as_uri()) == []
+
+    def found(sort: int) -> list[str]:
+        client.tell("workspace/didChangeWatchedFiles", changes=[{"uri": mission.as_uri(), "type": sort}])
+        return [finding["code"] for path in (mission, robot) for finding in client.diagnostics(path.as_uri())]
+
+    mission.write_text(text.replace("go_to: dock", "go_to: dok"), "utf-8")
+    assert found(2) == ["RBX4103"]
+    mission.unlink()
+    assert found(3) == ["RBX1301"]
+    mission.write_text(text, "utf-8")
+    assert found(1) == []
+
+
+def test_the_editor_is_asked_for_news_of_what_robots_are_made_of(client: Client) -> None:
+    client.ask("textDocument/hover", textDocument={"uri": ROOT.as_uri()}, position=AT)  # the question comes before
+    (wanted,) = [one for question in client.questions for one in question["params"].get("registrations", ())]
+    assert wanted["method"] == "workspace/didChangeWatchedFiles"
+    patterns = [watcher["globPattern"] for watcher in wanted["registerOptions"]["watchers"]]
+    assert {"**/*.yaml", "**/*.yml", "**/*.urdf", "**/*.xacro", "**/*.msg", "**/*.pgm"} <= set(patterns)
 
 
 def test_a_name_is_found_and_renamed_in_the_texts_of_the_editor_and_in_files_that_are_not_open(

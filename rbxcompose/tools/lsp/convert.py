@@ -33,6 +33,12 @@ _OUTLINED = {
 }
 
 
+def real_path(uri: str) -> Path | None:
+    """Return the real path of a document, None if it is not a file."""
+    written = to_fs_path(uri)
+    return None if not written or "\0" in written else Path(written).resolve()
+
+
 class Converter:
     """Knows the units in which the editor counts, and its names for files."""
 
@@ -43,11 +49,8 @@ class Converter:
 
     def path(self, uri: str) -> Path | None:
         """Return the real path of a document, None if it is not a file; its name is remembered for the answers."""
-        written = to_fs_path(uri)
-        if not written or "\0" in written:
-            return None
-        path = Path(written).resolve()
-        self._uris[path] = uri
+        if (path := real_path(uri)) is not None:
+            self._uris[path] = uri
         return path
 
     def uri(self, path: Path) -> str:

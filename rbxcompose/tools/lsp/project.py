@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import field
 from pathlib import Path
@@ -79,37 +79,37 @@ class Project:
         read_file(path, str(path), sources)
         return sources.get(str(path), "")
 
-    def change(self, path: Path, text: str | None) -> FoundByFile:
-        """Take a new text (None: the saved one counts again) and return the findings of all files concerned.
+    @property
+    def known(self) -> set[Path]:
+        """Return the open files, and all that was compiled."""
+        return {*self.unsaved, *self._watched}
 
-        A file without findings has an empty list, so that its old findings are cleared.
-        """
-        if text is None:
-            self.unsaved.pop(path, None)
-        else:
-            self.unsaved[path] = text
-        before = {file for robot in self._concerned(path) for file in self._watched[robot].files}
-        self._alone.pop(path, None)
-        if text is None and path in self._watched and (self._watched[path].kind in _USERS or not path.exists()):
-            del self._watched[path]
-        robots = self._robots_of(path)
-        for robot in robots:
-            self._compile(robot)
-        if not robots and (base := self._base_of(path)):
-            self._robots_of(base)
-        if not robots and text is not None:  # where would an editor show what is wrong with it?
-            self._alone[path] = self._lone_findings(path)
-        after = {file for robot in robots for file in self._watched[robot].files}
-        return {file: self.findings(file) for file in sorted({path} | before | after)}
+    def change(self, path: Path, text: str | None) -> FoundByFile:
+        """Take one new text in the way of `change_all`."""
+        return self.change_all({path: text})
 
     def change_all(self, texts: Mapping[Path, str | None]) -> FoundByFile:
-        """Take several new texts in the way of `change`.
+        """Take new texts (None: the saved one counts again) and return the findings of all files concerned.
+
+        A file without findings has an empty list, so that its old findings are cleared.
 
         Raises:
             OutdatedError: if the project has become outdated; it must not be used any more.
         """
-        files = {file: None for path, text in texts.items() for file in self.change(path, text)}
-        return {file: self.findings(file) for file in files}
+        self.unsaved = {path: text for path, text in {**self.unsaved, **texts}.items() if text is not None}
+        files = {*texts, *self._files(robot for path in texts for robot in self._concerned(path))}
+        for path in texts.keys() & self._watched.keys() - self.unsaved.keys():
+            if self._watched[path].kind in _USERS or not path.exists():
+                del self._watched[path]
+        robots = dict.fromkeys(robot for path in texts for robot in self._robots_of(path))
+        for robot in robots:
+            self._compile(robot)
+        files.update(self._files(robots))
+        for file in files:
+            self._alone.pop(file, None)
+            if file in self.unsaved and not self._concerned(file):  # where would an editor show what is wrong with it?
+                self._alone[file] = self._lone_findings(file)
+        return {file: self.findings(file) for file in sorted(files)}
 
     def findings(self, path: Path) -> list[Finding]:
         """Return the known findings in a file, from all robots."""
@@ -132,6 +132,9 @@ class Project:
         """Return the robot that an overlay is assumed to belong to: the one beside it."""
         robot = path.parent / ROBOT_FILE
         return robot if kind_of(self.text(path)) == OVERLAY and robot.is_file() else None
+
+    def _files(self, robots: Iterable[Path]) -> Iterator[Path]:
+        return (file for robot in robots for file in self._watched[robot].files)
 
     def _of(self, robot: Path, path: Path) -> Iterator[Finding]:
         for finding in self._watched[robot].report:
@@ -249,6 +252,12 @@ class Newest:
         self._due = loop.time() + pause
         if self._task is None or self._task.done():
             self._task = loop.create_task(self._work())
+
+    def compile_again(self, pause: float) -> None:
+        """Compile all that is known after a pause [s], because files have changed on disk."""
+        unsaved = self.unsaved
+        for path in self.project.known | self._waiting.keys():
+            self.change(path, unsaved.get(path), pause)
 
     def close(self) -> None:
         """Stop the thread; its current work becomes outdated."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from lsprotocol import types
+from pygls.capabilities import get_capability
 from pygls.exceptions import JsonRpcException
 from pygls.lsp.server import LanguageServer
 from pygls.protocol import json_rpc
@@ -15,7 +16,7 @@ import rbxcompose
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.tools.lsp.answers import define, describe, outline
 from rbxcompose.tools.lsp.completion import complete
-from rbxcompose.tools.lsp.convert import Converter
+from rbxcompose.tools.lsp.convert import Converter, real_path
 from rbxcompose.tools.lsp.document import Document
 from rbxcompose.tools.lsp.mentions import SymbolIndex, symbol_index_references
 from rbxcompose.tools.lsp.project import PAUSE, FoundByFile, Newest, Project
@@ -26,6 +27,9 @@ P = TypeVar("P")
 R = TypeVar("R")
 SWITCH = 0.001  # [s] that an answer waits for the other thread, which may be compiling
 TRIGGERS = (" ", ":", "$", "{", ".", "-", "[", ",")
+_MADE_OF = ("yaml", "yml", "urdf", "xacro", "srdf", "msg", "srv", "action", "pgm", "png")  # endings of a robot's files
+_ON_DISK = types.WORKSPACE_DID_CHANGE_WATCHED_FILES
+_REGISTERS = "workspace.did_change_watched_files.dynamic_registration"
 
 
 _Notice = types.DidOpenTextDocumentParams | types.DidSaveTextDocumentParams | types.DidChangeTextDocumentParams
@@ -73,9 +77,20 @@ class Session:
         if path is not None and self.newest.has(path):
             self.newest.change(path, None)
 
+    def changed_on_disk(self, params: types.DidChangeWatchedFilesParams) -> None:
+        """Check everything again, unless the editor has the texts of all these files."""
+        paths = (real_path(change.uri) for change in params.changes)
+        if not all(path is None or self.newest.has(path) for path in paths):
+            self.newest.compile_again(PAUSE)
+
     def begun(self, _: object) -> None:
-        """Prepare for the first request."""
+        """Prepare for the first request, and ask for news of files that change on disk."""
         self.newest.prepare()
+        if get_capability(self.server.client_capabilities, _REGISTERS, False):
+            watchers = [types.FileSystemWatcher(f"**/*.{ending}") for ending in _MADE_OF]
+            options = types.DidChangeWatchedFilesRegistrationOptions(watchers)
+            wanted = types.RegistrationParams([types.Registration(_ON_DISK, _ON_DISK, options)])
+            self.server.client_register_capability(wanted)
 
     def ended(self, _: object) -> None:
         """Stop the thread."""
@@ -202,6 +217,7 @@ def make_server(environment: Mapping[str, str]) -> LanguageServer:
         types.TEXT_DOCUMENT_DID_SAVE: session.opened,
         types.TEXT_DOCUMENT_DID_CHANGE: session.changed,
         types.TEXT_DOCUMENT_DID_CLOSE: session.closed,
+        _ON_DISK: session.changed_on_disk,
         types.INITIALIZED: session.begun,
         types.SHUTDOWN: session.ended,
         types.TEXT_DOCUMENT_COMPLETION: session.completion,
