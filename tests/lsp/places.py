@@ -15,6 +15,7 @@ TWINS = ROOT / "robots/twins/robot.yaml"
 HEAD = ROOT / "robots/head_only/robot.yaml"
 LOOK = ROOT / "missions/look_around.yaml"
 PATROL = ROOT / "missions/patrol.yaml"
+TRIAL = ROOT / "missions/tests/patrol.test.yaml"
 BATTERY = ROOT / "parts/battery.yaml"
 
 

@@ -11,7 +11,7 @@ from rbxcompose.missions.program.registry import modifier_keys
 from rbxcompose.tools.lsp.completion import complete
 from rbxcompose.tools.lsp.document import Document
 from tests.loops import for_all
-from tests.lsp.places import BATTERY, HEAD, LOOK, PATROL, ROBOT, TWINS, Editor
+from tests.lsp.places import BATTERY, HEAD, LOOK, PATROL, ROBOT, TRIAL, TWINS, Editor
 
 PLACES = ["dock", "corner_1", "corner_2", "corner_3", "corner_4"]
 COMPONENTS = ["battery", "base", "go_to", "charger", "cmd_vel"]
@@ -19,7 +19,7 @@ COMPONENTS = ["battery", "base", "go_to", "charger", "cmd_vel"]
 
 @pytest.fixture(scope="module")
 def editor() -> Editor:
-    return Editor(ROBOT, TWINS, HEAD)
+    return Editor(ROBOT, TWINS, HEAD, TRIAL)
 
 
 @for_all(
@@ -49,6 +49,8 @@ def editor() -> Editor:
         (PATROL, "timeout: 10 s", "timeout: 10 ", ["s", "min"]),
         (PATROL, "afterwards: continue", "afterwards: ", ["continue"]),
         (PATROL, "optional: true", "optional: ", ["true"]),
+        (TRIAL, "mission: patrol", "mission: ", ["patrol"]),
+        (TRIAL, "go_to: corner_1", "go_to: ", PLACES),
         (TWINS, "      dock: dock\n      runtime: 60 s", "      ", ["reach", "warn", "error"]),
         (LOOK, "      head_pan_joint: $side\n", "      head_", ["head_pan_joint", "head_tilt_joint"]),
         (

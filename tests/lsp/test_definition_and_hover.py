@@ -11,12 +11,12 @@ from rbxcompose.tools.lsp.completion import complete
 from rbxcompose.tools.lsp.document import Document
 from tests.conftest import ROOT
 from tests.loops import for_all
-from tests.lsp.places import BATTERY, PATROL, ROBOT, TWINS, Editor, line_of
+from tests.lsp.places import BATTERY, PATROL, ROBOT, TRIAL, TWINS, Editor, line_of
 
 
 @pytest.fixture(scope="module")
 def editor() -> Editor:
-    return Editor(ROBOT, TWINS)
+    return Editor(ROBOT, TWINS, TRIAL)
 
 
 @for_all(
@@ -36,6 +36,9 @@ def editor() -> Editor:
         (PATROL, "$low", 2, PATROL, "  low:\n"),
         (PATROL, "$corner", 3, PATROL, "for: corner"),
         (PATROL, "corner_2", 3, ROBOT, "  corner_2: {"),
+        (TRIAL, "mission: patrol", 10, ROBOT, "  patrol: ../.."),
+        (TRIAL, "../../robots/turtlebot/robot.yaml", 8, ROBOT, "# yaml-language-server"),
+        (TRIAL, "go_to: corner_4", 8, ROBOT, "  corner_4: {"),
         (TWINS, "part: rbx:parts/battery.yaml", 20, BATTERY, "# yaml-language-server"),
         (BATTERY, "level: battery.battery_level", 9, BATTERY, "  battery:\n    type"),
     ],
@@ -103,3 +106,7 @@ def test_a_hover_tells_what_something_is(
 ) -> None:
     found = editor.hover(path, words, offset)
     assert [text for text in told if text not in found] == [], found
+
+
+def test_a_key_of_a_test_has_no_value_of_its_robot(editor: Editor, repository: Path) -> None:
+    assert editor.hover(TRIAL, "name: recharges", 2) == "Its name: lower-case letters, digits and underscores."

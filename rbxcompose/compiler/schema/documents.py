@@ -8,23 +8,32 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache, lru_cache, partial
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Annotated, Any, get_type_hints
 
-from rbxcompose.base.config import Name, Time, field_docs
+from rbxcompose.base.config import NAMES, PLACE, Name, Refers, Time, field_docs
 from rbxcompose.base.files import replace_file
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.schema.mission import mission_schema, skills_for
 from rbxcompose.compiler.schema.robot import document, or_empty, overlay_schema, part_schema, robot_schema
 from rbxcompose.compiler.schema.scalars import DEFINITIONS, SHARED, Schema, opened, schemas_of
+from rbxcompose.compiler.sections.composition import PROFILE
+from rbxcompose.compiler.sections.missions import MissionName
 from rbxcompose.manifest import system_file, test_file
 from rbxcompose.manifest.documents import ManifestHeader
+from rbxcompose.manifest.fields import FileName
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT, SYSTEM, TEST
 from rbxcompose.msgs.registry import Types, chosen
 from rbxcompose.sdk import registry
 
 STEP = "step"
-WORDS: dict[str, Any] = {"robot": str, "also": list[str], "profile": Name, "mission": Name, "with": dict[Name, Any]}
+WORDS: dict[str, Any] = {
+    "robot": FileName,
+    "also": list[FileName],
+    "profile": Annotated[Name, Refers(PROFILE, is_reported=True)],
+    "mission": MissionName,
+    "with": dict[Name, Any],
+}
 _ABOUT = {
     STEP: "A skill, a named node or a state; a skill may be followed by its main argument, or a map of its arguments.",
     "ended": "How it ended: `success`, `failure`, `halted`, `skipped`, `running`, or an outcome of its own.",
@@ -72,7 +81,8 @@ def _step(time: Schema) -> Schema:
         "at": {**time, "description": _ABOUT["at"]},
     }
     mapping = {"properties": properties, "minProperties": 1, "maxProperties": 1 + len(properties)}
-    return {"type": ["string", "object"], "minLength": 1, **mapping, "description": _ABOUT[STEP]}
+    argument = {"additionalProperties": {NAMES: PLACE}}
+    return {"type": ["string", "object"], "minLength": 1, **mapping, **argument, "description": _ABOUT[STEP]}
 
 
 def own_schema(kind: str, model: type[ManifestHeader], types: Iterable[str]) -> Schema:

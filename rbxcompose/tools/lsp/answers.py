@@ -16,6 +16,7 @@ from rbxcompose.manifest import tree
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.registry import naming
+from rbxcompose.manifest.section import EVERYWHERE
 from rbxcompose.missions.analysis.examined import base_names, views
 from rbxcompose.missions.engine.world import POSE as POSE_NAME
 from rbxcompose.missions.language.grammar import Takes
@@ -321,7 +322,7 @@ def _type(spot: Spot) -> str:
 def _value(spot: Spot) -> str:
     """Return the value in the composed robot with its file, line and column, and the values it replaced."""
     robot = spot.known.robot
-    if robot is None or spot.document.is_mission:
+    if robot is None or spot.document.kind not in EVERYWHERE:
         return ""
     path = below_profile(spot.cursor.place)
     node = tree.at(robot.manifest.root, path)
