@@ -293,10 +293,10 @@ class Report:
         """Add several findings."""
         self.findings.extend(findings)
 
-    def extend_new(self, findings: Iterable[Finding]) -> None:
-        """Add those of several findings whose code, place and message are not there yet."""
+    def new_among(self, findings: Iterable[Finding]) -> list[Finding]:
+        """Return those of several findings whose code, place and message are not there yet."""
         known = {(finding.code, finding.span, finding.message) for finding in self.findings}
-        self.extend(each for each in findings if (each.code, each.span, each.message) not in known)
+        return [each for each in findings if (each.code, each.span, each.message) not in known]
 
     @property
     def has_errors(self) -> bool:

@@ -110,7 +110,7 @@ def compile_system(
     out = _compiled_system(path, environment, real, profiles, unsaved)
     for name in out.known_profiles if tries_profiles and not profiles else ():
         tried = _compiled_system(path, environment, real, [name], unsaved)
-        out.report.extend_new(tried.report)
+        out.report.extend(out.report.new_among(tried.report))
         out.sources.update(tried.sources)
     return out
 
@@ -320,10 +320,11 @@ class _Compiling:
         compilation = self._compile(shown, profile, world, self.outside)
         self.out.sources.update((file, text) for file, text in compilation.sources.items() if file not in places)
         self.out.needed |= compilation.needed
-        self.out.report.extend_new(
+        moved = (
             replace(one, span=places[one.span.file]) if one.span is not None and one.span.file in places else one
             for one in compilation.report
         )
+        self.out.report.extend(self.out.report.new_among(moved))
         return compilation
 
 

@@ -58,7 +58,7 @@ class CheckedRobots:
 
     def add(self, compilation: Compilation) -> None:
         """Add the findings of one robot."""
-        self.report.extend_new(compilation.report)
+        self.report.extend(compilation.report)
         self.sources.update(compilation.sources)
         if compilation.plan is not None:
             self.fine.append(compilation.plan)
@@ -81,7 +81,9 @@ def _check(arguments: argparse.Namespace) -> CheckedRobots:
     for robot in wanted.robots:
         checked.add(compiled(robot, arguments, tries_profiles=True))
     for robot, overlay in wanted.overlays:
-        checked.add(compiled(robot, arguments, overlay, tries_profiles=True))
+        one = compiled(robot, arguments, overlay, tries_profiles=True)
+        one.report = Report(checked.report.new_among(one.report))
+        checked.add(one)
     for robot in wanted.users:
         one = compiled(robot, arguments, tries_profiles=True)
         if any(file in one.sources for file in wanted.files):
@@ -118,7 +120,7 @@ def _check_system(path: str, arguments: argparse.Namespace, checked: CheckedRobo
     system = compile_system(
         path, environment=os.environ, real=arguments.real, profiles=chosen, unsaved=unsaved, tries_profiles=True
     )
-    checked.report.extend_new(system.report)
+    checked.report.extend(checked.report.new_among(system.report))
     checked.sources.update(system.sources)
     if not system.report.has_errors:
         checked.systems.append(f"{system.name} is fine: {system_extent(system)}")
