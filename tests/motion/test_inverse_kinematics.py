@@ -9,15 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rbxcompose.base.arrays import Array
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.groups import ArmJoint, JointSpace, chain
+from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, JointSpace, chain
 from rbxcompose.domains.arms.motion.inverse_kinematics import (
     EDGE,
     PoseSearch,
     PoseSolutions,
     PoseTarget,
     descended,
+    nearest_poses,
     solved,
 )
 from rbxcompose.domains.servos.limits import MotionLimits
@@ -196,3 +198,19 @@ def test_a_search_ends_with_its_restarts_or_its_time(arm: ArmKinematics) -> None
         assert found.attempts == restarts + 1
     late = ended(solved(PoseSearch(arm, SPACE, far, start, lambda values: True, seed=1, is_late=lambda: True)))
     assert late.attempts == 1
+
+
+def test_a_search_leaves_joints_alone_that_do_not_move_the_tip() -> None:
+    description = description_of(six_joints().replace('parent link="l3"', 'parent link="l1"'))
+    forked = ArmKinematics(description, ArmGroup(SPACE.names, "l0", "tip"))  # j2 and j3 are a branch of their own
+    target, start = PoseTarget(forked.tip_pose(np.full(6, 0.4)), any_orientation=True), np.full(6, 0.2)
+    for search in (solved, nearest_poses):
+        tries = list[Array]()
+
+        def is_free(values: Array, tries: list[Array] = tries) -> bool:
+            tries.append(values)
+            return len(tries) > 3  # so that it begins from random positions
+
+        ended(search(PoseSearch(forked, SPACE, target, start, is_free, seed=1)))
+        assert len(tries) > 3
+        assert all((values[1:3] == 0.2).all() for values in tries)

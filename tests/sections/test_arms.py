@@ -219,6 +219,54 @@ def test_an_arm_of_other_arms_has_the_joints_of_all_in_the_order_of_the_body(tmp
     assert (config.base, config.tip) == ("right_arm_elbow_flex_servo_link", config_of(project, "wrist").tip)
 
 
+LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+SIDE = f"""<link name="SIDE_upper"/><link name="SIDE_tip"/><link name="SIDE_finger"/>
+<joint name="SIDE_turn" type="revolute"><parent link="base"/><child link="SIDE_upper"/><origin xyz="0 AT 0"/>
+{LIMIT}</joint><joint name="SIDE_bend" type="revolute"><parent link="SIDE_upper"/><child link="SIDE_tip"/>
+<origin xyz="0.4 0 0"/>{LIMIT}</joint><joint name="SIDE_close" type="revolute"><parent link="SIDE_tip"/>
+<child link="SIDE_finger"/>{LIMIT}</joint>"""
+SIDES = {"left": "0.3", "right": "-0.3"}
+TWO_ARMS = """
+body: {urdf: two.urdf}
+buses: {servos: {type: dynamixel, rate: 50 Hz}}
+actuators:
+JOINTS
+controllers:
+  left_arm: {type: joint_trajectory, joints: [left_turn, left_bend]}
+  right_arm: {type: joint_trajectory, joints: [right_turn, right_bend]}
+  both_arms: {type: joint_trajectory, joints: [left_turn, left_bend, right_turn, right_bend], start: inactive}
+  left_hand: {type: gripper, joint: left_close, HAND}
+  right_hand: {type: gripper, joint: right_close, HAND}
+arms:
+  left: {chain: {from: base, to: left_tip}, controller: left_arm}
+  right: {chain: {from: base, to: right_tip}, controller: right_arm}
+  both: {groups: [FIRST, LAST], controller: both_arms, gripper: LAST_hand, poses: {ahead: {left_turn: 0 deg}}}
+trackers: {chase: {arm: both, frame: base, rest: ahead}}
+"""
+
+
+@pytest.mark.parametrize(("first", "last"), [("left", "right"), ("right", "left")])
+def test_an_arm_of_two_branches_begins_at_the_first_joint_that_moves_its_tip(
+    tmp_path: Path, first: str, last: str
+) -> None:
+    names = [f"{side}_{joint}" for side in SIDES for joint in ("turn", "bend", "close")]
+    servos = [f"  {name}_servo: {{bus: servos, model: XL430-W250, id: {id_}}}" for id_, name in enumerate(names, 1)]
+    joints = [f"  {name}: {{actuator: {name}_servo, limits: {{acceleration: 1 rad/s^2}}}}" for name in names]
+    hand = "model: one_sided, pad_width: 1 cm, finger_length: 5 cm, opening: [1 cm, 5 cm]"
+    robot = TWO_ARMS.replace("JOINTS", "\n".join((*servos, "joints:", *joints))).replace("HAND", hand)
+    branches = "".join(SIDE.replace("SIDE", side).replace("AT", at) for side, at in SIDES.items())
+    project = Project(tmp_path)
+    project.check(
+        robot.replace("FIRST", first).replace("LAST", last),
+        files={"robots/one/two.urdf": f'<robot name="two"><link name="base"/>{branches}</robot>'},
+    )
+    assert project.findings == []
+    assert set(config_of(project, "both").joints) == {name for name in names if "close" not in name}
+    assert (config_of(project, "both").base, config_of(project, "both").tip) == ("base", f"{last}_tip")
+    tracker = config_of(project, "chase")
+    assert (tracker.shoulder, tracker.length) == ((0.0, float(SIDES[last]), 0.0), 0.4)
+
+
 @pytest.mark.parametrize(
     ("text", "code", "words"),
     [

@@ -15,6 +15,7 @@ from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.robot import Robot, RobotMission
 from rbxcompose.compiler.model.skills import constants
 from rbxcompose.domains.arms.motion.grasps import least_width, reach_of, solid_of, widths_of
+from rbxcompose.domains.arms.motion.groups import way_up
 from rbxcompose.domains.arms.motion.scene import PlacedObject, settled
 from rbxcompose.domains.arms.section_models import SpotModel
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms, hand_in
@@ -82,22 +83,18 @@ def length_of(robot: Robot, body: Body, arm: ArmOfRobot) -> float:
 
     No place farther away can be reached, whatever the directions of the joints are.
     """
-    total, link = 0.0, arm.group.tip
-    while True:
-        joint = body.joint_above[link]
+    total, way = 0.0, way_up(body, arm.group)
+    for joint in way:
         if joint.slides:
             limits = limits_in(robot.manifest.contents, joint)
             ends = (limits.lower, limits.upper)
             total += max(math.inf if end is None else abs(end) for end in ends)
-        if joint.name == arm.group.joints[0]:
-            return total
-        total += math.hypot(*joint.origin.translation)
-        link = joint.parent
+    return total + sum(math.hypot(*joint.origin.translation) for joint in way[:-1])
 
 
 def first_joint_in(body: Body, arm: ArmOfRobot, frame: str) -> Vector3 | None:
     """Return where the first joint of an arm is in the frame of a link [m]; None if other joints move one of them."""
-    first = body.joints[arm.group.joints[0]]
+    first = way_up(body, arm.group)[-1]
     if _movers(body, first.parent) != _movers(body, frame):
         return None
     poses = body.poses({})

@@ -47,6 +47,9 @@ class ArmKinematics:
         self._base = self.whole.q({})
         self._tip = self.whole.frames[group.tip]
         self._way = list(self.body.joints_above(group.tip))[::-1]
+        leaders = {leader_of(joint, self.body.joints)[0] for joint in self._way}
+        self.moves_tip = np.array([name in leaders for name in group.joints])
+        """Which joints of the arm move its tip, of shape (n,)."""
         entries = [entry for name in self.whole.places if (entry := self._entry(name)) is not None]
         self._entries = _arrays([one for one in entries if not one.turns])
         self._turning = _arrays([one for one in entries if one.turns])

@@ -60,8 +60,14 @@ def carrying(body: Body, links: Sequence[str]) -> ArmGroup | None:
 def together(body: Body, parts: Sequence[ArmGroup]) -> ArmGroup:
     """Return the joints of several arms as one, in the order of the body; its tip is that of the last one."""
     whole = group_of(body, (joint for part in parts for joint in part.joints))
-    first = next(part.base for part in parts if whole.joints[0] in part.joints)
-    return ArmGroup(whole.joints, first, parts[-1].tip)
+    first = way_up(body, ArmGroup(whole.joints, whole.base, parts[-1].tip))[-1].name
+    return ArmGroup(whole.joints, next(part.base for part in parts if first in part.joints), parts[-1].tip)
+
+
+def way_up(body: Body, group: ArmGroup) -> list[BodyJoint]:
+    """Return all joints from the tip up to the last of the arm's own above it; the others are on branches beside it."""
+    above = list(body.joints_above(group.tip))
+    return above[: max(index for index, joint in enumerate(above) if joint.name in group.joints) + 1]
 
 
 def moved_links(body: Body, joints: Iterable[str]) -> dict[str, frozenset[str]]:

@@ -129,6 +129,10 @@ class PoseSearch:
     is_late: Callable[[], bool] = lambda: False
     guesses: Sequence[Array] = ()
 
+    def random(self, count: int) -> Array:
+        """Return random positions, of shape (count, n); joints that do not move the tip stay where they are."""
+        return np.where(self.kinematics.moves_tip, self.space.samples(count, self.seed), self.space.clamped(self.start))
+
 
 def solved(search: PoseSearch) -> Generator[None, None, PoseSolutions]:
     """Return solutions within the limits of joints; it yields after some attempts."""
@@ -148,8 +152,8 @@ def solved(search: PoseSearch) -> Generator[None, None, PoseSolutions]:
         ):
             (free if search.is_free(values) else colliding).append(values)
         if attempts == 1:
-            random = space.samples(search.restarts, search.seed)
-            firsts = np.concatenate((*(space.clamped(guess)[None] for guess in search.guesses), random))
+            guesses = (space.clamped(guess)[None] for guess in search.guesses)
+            firsts = np.concatenate((*guesses, search.random(search.restarts)))
         if len(free) >= search.enough or search.is_late() or not len(firsts):
             break
         yield
@@ -310,7 +314,7 @@ def nearest_poses(search: PoseSearch) -> Generator[None, None, tuple[Array, ...]
     free: list[Array] = []
     colliding: list[Array] = []
     first = space.clamped(search.start)
-    for sample in (first, *map(space.clamped, search.guesses), *space.samples(FIRSTS, search.seed)):
+    for sample in (first, *map(space.clamped, search.guesses), *search.random(FIRSTS)):
         end = _approached(kinematics, target, sample, bounds_of(space))
         end = space.nearest_turns(end, search.start)
         (free if is_free(end) else colliding).append(end)
@@ -438,7 +442,7 @@ def kept_solutions(
     colliding: list[Array] = []
     nearest, attempts = (math.inf, math.inf), 0
     guesses = (start,) if posture is None else (start, posture.guess(start))
-    for guess in (*map(space.clamped, guesses), *space.samples(RESTARTS, search.seed)):
+    for guess in (*map(space.clamped, guesses), *search.random(RESTARTS)):
         attempts += 1
         values = there.projected(guess, space)
         if values is not None and kept.is_kept(values) and target.is_met(kinematics.tip_pose(values)):

@@ -13,7 +13,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Related, Span, kind
 from rbxcompose.base.units import ANGLE, LENGTH, Quantity, format_quantity
 from rbxcompose.domains.arms import section_models
-from rbxcompose.domains.arms.motion.groups import ArmGroup, carrying, chain, group_of, moved_links, together
+from rbxcompose.domains.arms.motion.groups import ArmGroup, carrying, chain, group_of, moved_links, together, way_up
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.link_pairs import LinkPair, PairReason
 from rbxcompose.domains.body.model import Body, BodyJoint
@@ -359,7 +359,8 @@ def _unknown_controllers(reading: Reading[ArmModel], name: str, model: ArmModel)
 def _gripper_elsewhere(
     reading: Reading[ArmModel], name: str, gripper: str, there: ControllerConfig, group: ArmGroup, known: Body
 ) -> Iterator[Finding]:
-    moved, last = moved_links(known, group.joints), group.joints[-1]
+    moved = moved_links(known, group.joints)
+    last = next(joint.name for joint in way_up(known, group) if joint.name in group.joints)
     for joint in there.claimed:
         if joint not in known.joints:
             continue  # reported where the controller is

@@ -12,7 +12,7 @@ from pydantic import Field
 from rbxcompose.base.config import ARM, Config, Length, LinkName, Name, Refers
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import kind
-from rbxcompose.domains.arms.motion.groups import ArmGroup
+from rbxcompose.domains.arms.motion.groups import ArmGroup, way_up
 from rbxcompose.domains.arms.sections.arms import arms
 from rbxcompose.domains.arms.sections.heads import HEAD
 from rbxcompose.domains.body.model import Body
@@ -131,10 +131,6 @@ def trackers(reading: Reading[TrackerModel]) -> dict[str, TrackerOfRobot]:
 def _reach(known: Body, group: ArmGroup) -> tuple[tuple[float, float, float], float]:
     """Return where the first joint of an arm is in the frame of its base, and how long its links are from there [m]."""
     poses = known.poses({})
-    links, link = [group.tip], group.tip
-    while known.joint_above[link].name != group.joints[0]:
-        link = known.joint_above[link].parent
-        links.append(link)
-    places = [poses[one].translation for one in links]
+    places = [poses[joint.child].translation for joint in way_up(known, group)]
     length = sum(math.dist(place, other) for place, other in pairwise(places))
     return poses[group.base].inverse().apply(places[-1]), length
