@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rbxcompose.commands import main as command
@@ -40,6 +41,8 @@ def test_a_plan_begins_and_ends_where_it_was_asked_to(capsys: pytest.CaptureFixt
 def test_what_inverse_kinematics_finds_is_where_forward_kinematics_ends(capsys: pytest.CaptureFixture[str]) -> None:
     solutions = answered(capsys, "ik", REACH, "--frame", "torso_link", "--any-orientation")["solutions"]
     assert isinstance(solutions, list)
+    each = np.array([[*solution.values()] for solution in solutions])
+    assert (np.abs(each[:, None] - each).max(-1) > 1e-3).sum() == len(each) * (len(each) - 1), "none twice"
     goal = ", ".join(f"{name}: {value} rad" for name, value in solutions[0].items())
     found, root = (answered(capsys, "fk", text) for text in (f"{{{goal}}}", "resting"))
     assert found["frame"] == root["frame"] == "base_footprint"
@@ -104,6 +107,7 @@ def test_a_picture_tells_the_cells_that_the_tip_gets_to(capsys: pytest.CaptureFi
         (["picture", "reach", "--out", "x.png", "--cell", "1 mm"], "a cell is at least 2 mm"),
         (["plan", "wav"], "did you mean 'wave'?"),
         (["plan", "{right_arm_elbow: 1 deg}"], "no joint of this arm"),
+        (["plan", "{x: 0.4, z: 0.5}"], "'x' is no joint of this arm"),
         (["plan", "{right_arm_elbow_flex_joint: 1}"], "must be an angle or a length"),
         (["plan", "{right_arm_shoulder_pan_joint: -115 deg, right_arm_shoulder_lift_joint: 69 deg}"], "goal_in_coll"),
         (["ik", "{x: 2 m}"], "goal_out_of_reach: the tip got within"),

@@ -50,7 +50,14 @@ from rbxcompose.domains.arms.command_line import (
 from rbxcompose.domains.arms.goals import goal_of
 from rbxcompose.domains.arms.motion import figures as measures
 from rbxcompose.domains.arms.motion.groups import moved_links
-from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseSolutions, PoseTarget, Posture, searched
+from rbxcompose.domains.arms.motion.inverse_kinematics import (
+    PoseSearch,
+    PoseSolutions,
+    PoseTarget,
+    Posture,
+    apart,
+    searched,
+)
 from rbxcompose.domains.arms.motion.path_constraints import KeptTip
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest, Planning
 from rbxcompose.domains.arms.motion.reach import DIRECTIONS, Cut, ReachMap, reached
@@ -241,8 +248,9 @@ def run_inverse(arguments: argparse.Namespace, robot: ArmOfRobot, works: ArmWork
     """
     target = _target(arguments, works, start := values_of(works, robot, arguments.start))
     found = _found(arguments, works, robot, target, start)
-    each = [dict(zip(works.space.names, values.tolist(), strict=True)) for values in found.free]
-    missed = [target.error(works.kinematics.tip_pose(values)) for values in found.free]
+    free = apart(found.free)
+    each = [dict(zip(works.space.names, values.tolist(), strict=True)) for values in free]
+    missed = [target.error(works.kinematics.tip_pose(values)) for values in free]
     if arguments.json:
         data = {"solutions": each, "colliding": len(found.colliding), "attempts": found.attempts}
         errors = [{"away": away, "angle": angle} for away, angle in missed]

@@ -399,14 +399,14 @@ def searched(search: PoseSearch, posture: Posture | None = None) -> Generator[No
     if not found.free and target.is_approximate:
         near = yield from nearest_poses(replace(search, guesses=(*guesses, *found.colliding)))
         exact = tuple(item for item in near if target.is_met(search.kinematics.tip_pose(item)))  # missed by restarts
-        found = replace(found, free=_apart(exact or near)[: search.enough], is_approximate=bool(near) and not exact)
+        found = replace(found, free=apart(exact or near)[: search.enough], is_approximate=bool(near) and not exact)
     if posture is None or found.is_approximate:
         return found
     free = []
     for array in found.free:
         free.append(slid(search, array, posture))
         yield
-    return replace(found, free=_apart(nearest_first(search.space, posture, free)))
+    return replace(found, free=apart(nearest_first(search.space, posture, free)))
 
 
 def nearest_first(space: JointSpace, posture: Posture, solutions: Iterable[Array]) -> tuple[Array, ...]:
@@ -414,8 +414,8 @@ def nearest_first(space: JointSpace, posture: Posture, solutions: Iterable[Array
     return tuple(sorted(solutions, key=lambda values: posture.distance(space, values)))
 
 
-def _apart(solutions: Iterable[Array]) -> tuple[Array, ...]:
-    """Return them without those that have come to where another one is: a way that one has not, that has not either."""
+def apart(solutions: Iterable[Array]) -> tuple[Array, ...]:
+    """Return solutions without those that are where another one is: a way that one has not, that has not either."""
     found: list[Array] = []
     for solution in solutions:
         if all(float(np.abs(solution - other).max()) > APART for other in found):
