@@ -200,6 +200,22 @@ def test_a_search_ends_with_its_restarts_or_its_time(arm: ArmKinematics) -> None
     assert late.attempts == 1
 
 
+def test_the_nearest_pose_is_free_though_each_joint_is_a_little_off(arm: ArmKinematics) -> None:
+    target = PoseTarget(Transform3((3.0, 0.1, 0.3)), any_orientation=True)  # out of reach
+
+    def nearest(most: float) -> Array:
+        """Return the first pose whose tip is before a wall [m]."""
+        search = PoseSearch(arm, SPACE, target, np.zeros(6), lambda values: tip(values) < most, seed=1)
+        return ended(nearest_poses(search))[0]
+
+    def tip(values: Array) -> float:
+        return arm.tip_pose(values).translation[0]
+
+    wall = tip(nearest(math.inf)) + 1e-6  # it would touch there
+    found = nearest(wall)
+    assert all(tip(found + sign * 0.004 * joint) < wall for joint in np.eye(6) for sign in (1.0, -1.0))
+
+
 def test_a_search_leaves_joints_alone_that_do_not_move_the_tip() -> None:
     description = description_of(six_joints().replace('parent link="l3"', 'parent link="l1"'))
     forked = ArmKinematics(description, ArmGroup(SPACE.names, "l0", "tip"))  # j2 and j3 are a branch of their own

@@ -300,20 +300,28 @@ MOST_APPROACH_STEPS = 200  # of one approach, at most
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e8  # of what the greatest joint weighs
 STILL = 1e-6  # of the square of the error, by which a step that is worth it makes that less
 WAYS, POINTS = 5, 40  # ways to positions that collide, and points on each, where the last free one is looked for
+OFF = 0.005  # [rad or m] by which a joint may be elsewhere than where it was sent: a tick of an AX-12
 AS_NEAR = 1.0  # tolerances by which others may be farther away than the nearest one
 
 
 def nearest_poses(search: PoseSearch) -> Generator[None, None, tuple[Array, ...]]:
     """Return free positions of joints whose tip is as near to the target as was found, the nearest first.
 
-    It is never farther away than at the start, if that is free and within the limits; without any that are free,
-    nothing is returned. What is nearer counts in tolerances of the target. It yields while it works, and ends with what
-    it has when it `is_late`.
+    They are free, too, if a joint is a little off, so that the arm does not collide where it comes to rest. None is
+    farther away than the start, if that is free and within the limits; without any that are free, nothing is returned.
+    What is nearer counts in tolerances of the target. It yields while it works, and ends with what it has when it
+    `is_late`.
     """
-    kinematics, space, target, is_free = search.kinematics, search.space, search.target, search.is_free
+    kinematics, space, target = search.kinematics, search.space, search.target
     free: list[Array] = []
     colliding: list[Array] = []
     first = space.clamped(search.start)
+    off = OFF * np.eye(len(first))[kinematics.moves_tip]
+    offs = np.vstack((np.zeros(len(first)), off, -off))
+
+    def is_free(values: Array) -> bool:
+        return all(map(search.is_free, space.clamped(values + offs)))
+
     for sample in (first, *map(space.clamped, search.guesses), *search.random(FIRSTS)):
         end = _approached(kinematics, target, sample, bounds_of(space))
         end = space.nearest_turns(end, search.start)
@@ -331,7 +339,7 @@ def nearest_poses(search: PoseSearch) -> Generator[None, None, tuple[Array, ...]
         free += next(([at] for at in nearer if is_free(at)), [])
         yield
     if not free or excess(first) < min(map(excess, free)):
-        free += [first] if is_free(first) else []
+        free += [first] if search.is_free(first) else []
     ordered = sorted(free, key=excess)
     return tuple(one for one in ordered if excess(one) <= excess(ordered[0]) + AS_NEAR)
 
