@@ -37,7 +37,7 @@ ROOMS: dict[str, Cost] = {
     "commands": Cost(code=2710, files=24, small=3, imports=343),
     "compiler": Cost(code=7824, files=53, small=1, imports=881),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
-    "domains/arms": Cost(code=12858, files=64, small=1, imports=1118),
+    "domains/arms": Cost(code=12864, files=64, small=1, imports=1118),
     "domains/bases": Cost(code=2194, files=17, small=0, imports=198),
     "domains/body": Cost(code=3609, files=27, small=2, imports=365),
     "domains/console": Cost(code=3606, files=20, small=0, imports=260),
@@ -62,7 +62,7 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114220,
+    "lines of code": 114226,
     "files": 750,
     "files of 1 to 30 lines of code": 42,
     "lines of imports": 10463,

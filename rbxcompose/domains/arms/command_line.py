@@ -214,20 +214,26 @@ def positions_in(works: ArmWorks, robot: ArmOfRobot, written: str) -> dict[str, 
     if not written.startswith("{"):
         message = clauses(f"there is no pose '{written}'", suggest(written, robot.model.poses, "poses"))
         raise NotDoneError(NO_MOTION.at(None, message))
-    return read_joints(written, {joint.name: LENGTH if joint.slides else ANGLE for joint in works.space.joints})
+    positions = read_joints(written, {joint.name: LENGTH if joint.slides else ANGLE for joint in works.space.joints})
+    if unknown := next((name for name in positions if name not in works.space.names), ""):
+        raise NotDoneError(NO_MOTION.at(None, unknown_joint(unknown, works.space.names)))
+    return positions
 
 
 def read_joints(written: str, dimensions: Mapping[str, Dimension]) -> dict[str, float]:
     """Return '{JOINT: POSITION, ...}' as positions [rad or m] of joints, of which some measure these dimensions.
 
     Raises:
-        NotDoneError: if it is something else, there is no such joint, or a position measures something else.
+        NotDoneError: if it is something else, or a position measures something else.
     """
-    if unknown := sorted(keys_of(written) - dimensions.keys()):  # whatever it is given
-        raise NotDoneError(NO_MOTION.at(None, unknown_joint(unknown[0], dimensions)))
-    read = read_written(dict[str, JointPosition], written)
+    try:
+        read = read_written(dict[str, JointPosition], written)
+    except NotDoneError:
+        if unknown := sorted(keys_of(written) - dimensions.keys()):  # which may be why it is no position
+            raise NotDoneError(NO_MOTION.at(None, unknown_joint(unknown[0], dimensions))) from None
+        raise
     for name, position in read.items():
-        if position.dimension != dimensions[name]:
+        if position.dimension != dimensions.get(name, position.dimension):
             word = "slides" if dimensions[name] == LENGTH else "turns"
             raise NotDoneError(NO_MOTION.at(None, f"'{name}' {word}, and this is {position.dimension.phrase}"))
     return {name: position.value for name, position in read.items()}
