@@ -23,23 +23,30 @@ from rbxcompose.testing import Bench, FakeLine, FakePort, FakeServo, instance
 from tests.soak import rare
 
 LIMITS = {"lower": -2.0, "upper": 2.0, "velocity": 1.5, "acceleration": 8.0}
-CONFIG: dict[str, Any] = {
-    "joints": {
-        name: {**LIMITS, "servos": [{"id": id_, "model": "AX-12"}]} for id_, name in enumerate(("pan", "tilt"), 1)
-    }
-}
+
+
+def config_of(model: str) -> dict[str, Any]:
+    joints = enumerate(("pan", "tilt"), 1)
+    return {"joints": {name: {**LIMITS, "servos": [{"id": id_, "model": model}]} for id_, name in joints}}
 
 
 class Head:
     """Two joints on a twin, with faults by name: when, what, of which joint, how long."""
 
-    def __init__(self, *faults: tuple[float, str, str, float | None], twin: str = "servo", rate: float = 50.0) -> None:
+    def __init__(
+        self,
+        *faults: tuple[float, str, str, float | None],
+        twin: str = "servo",
+        rate: float = 50.0,
+        model: str = "AX-12",
+    ) -> None:
         named = {
             f"fault_{index}": {"at": at, "fault": fault, "joint": joint, "lasts": lasts}
             for index, (at, fault, joint, lasts) in enumerate(faults)
         }
         self.robot = Bench(
-            instance("servos", "servo_bus", {**CONFIG, "twin": twin, "faults": named, "rate": rate}), start=False
+            instance("servos", "servo_bus", {**config_of(model), "twin": twin, "faults": named, "rate": rate}),
+            start=False,
         )
         self.states = self.robot.collect("/joint_states", JointState)
         driver = self.robot.component("servos")
@@ -115,6 +122,21 @@ def test_a_joint_that_is_not_heard_is_a_fault_and_comes_back_without_torque(faul
     assert head.modes() == [JointMode.RELAXED, JointMode.RELAXED]
 
 
+@pytest.mark.parametrize("model", ["AX-12", "XL430-W250", "XL-320"])
+def test_a_joint_whose_servo_was_without_supply_for_a_moment_is_relaxed_with_the_reason(model: str) -> None:
+    head = Head((2.0, "power_off", "pan", 0.2), model=model)
+    head.robot.advance(0.5)
+    head.go("pan", 1.0)
+    head.robot.advance(1.2)
+    assert head.modes() == [JointMode.ACTIVE, JointMode.RELAXED]
+    head.robot.advance(1.3)
+    assert head.modes() == [JointMode.RELAXED, JointMode.RELAXED]
+    assert any("servo 1 of joint 'pan' has lost its torque" in text for text in head.robot.texts())
+    head.go("pan", 0.5)
+    head.robot.advance(2.0)
+    assert head.states[-1].position[0] == pytest.approx(0.5, abs=0.006)
+
+
 @pytest.mark.parametrize("fault", ["overload", "undervoltage"])
 def test_an_error_of_the_hardware_keeps_a_joint_disabled(fault: str) -> None:
     head = Head((1.0, fault, "pan", 2.0))
@@ -136,12 +158,14 @@ def test_a_jammed_joint_stays_and_goes_on_afterwards() -> None:
 
 def test_a_bus_that_is_unplugged_recovers_by_itself_relaxed() -> None:
     head = Head((1.0, "unplug", "", 2.0))
+    statuses = head.robot.statuses("servos")
     head.robot.advance(0.5)
     head.go("pan", 1.0)
     head.robot.advance(1.0)
     told = len(head.states)
     head.robot.advance(1.0)
     assert len(head.states) == told
+    assert statuses[-1].message == "the bus of servos has gone"
     head.robot.advance(1.5)
     assert head.modes() == [JointMode.RELAXED, JointMode.RELAXED]
     assert any("is back" in text for text in head.robot.texts())

@@ -48,7 +48,7 @@ ROOMS: dict[str, Cost] = {
     "domains/policies": Cost(code=889, files=6, small=0, imports=73),
     "domains/power": Cost(code=439, files=5, small=0, imports=31),
     "domains/programs": Cost(code=3848, files=26, small=0, imports=372),
-    "domains/servos": Cost(code=7849, files=47, small=2, imports=559),
+    "domains/servos": Cost(code=7895, files=47, small=2, imports=559),
     "domains/vision": Cost(code=2558, files=24, small=1, imports=302),
     "domains/worlds": Cost(code=4463, files=36, small=3, imports=517),
     "manifest": Cost(code=3590, files=19, small=1, imports=272),
@@ -62,7 +62,7 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114226,
+    "lines of code": 114272,
     "files": 750,
     "files of 1 to 30 lines of code": 42,
     "lines of imports": 10463,

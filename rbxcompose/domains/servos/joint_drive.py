@@ -153,6 +153,7 @@ class JointDrive(ABC):
         self._stamps: dict[int, float] = {}
         self._warmth: dict[int, float] = {}
         self._errors: dict[int, str] = {}
+        self._is_limp = False
         self._requests: list[joint_states.JointRequest] = []
 
     @property
@@ -232,16 +233,32 @@ class JointDrive(ABC):
         """Move with this speed at most [rad/s or m/s]; return whether that is slower than before."""
         if fastest >= self.joint.limits.speed:
             return False
-        limits = replace(self.joint.limits, velocity=fastest)
+        self._keep_to(replace(self.joint.limits, velocity=fastest))
+        return True
+
+    def narrow(self, lower: float, upper: float) -> bool:
+        """Move within this range [rad or m], if it can at all; return whether that is narrower than before."""
+        limits = self.joint.limits
+        least, greatest = limits.clamped(lower), limits.clamped(upper)
+        if least - limits.clamped(-math.inf) <= self.per_tick and limits.clamped(math.inf) - greatest <= self.per_tick:
+            return False
+        if lower <= greatest and least <= upper:
+            self._keep_to(replace(limits, lower=least, upper=greatest))
+        return True
+
+    def _keep_to(self, limits: MotionLimits) -> None:
         self.joint, self.rules = replace(self.joint, limits=limits), replace(self.rules, limits=limits)
         if self.limiter is not None:
             self.limiter.limits = limits
-        return True
 
     def was_cut(self) -> None:
         """Go on from where the joint is: a servo has stopped by itself, since the bus was silent for too long."""
         if self.limiter is not None and math.isfinite(self.measured.position):
             self.limiter.put(self.measured.position)
+
+    def lost_torque(self) -> None:
+        """Give up in the next cycle: a servo has no torque any more."""
+        self._is_limp = True
 
     @property
     def error(self) -> str:
@@ -263,7 +280,7 @@ class JointDrive(ABC):
 
     def _inputs(self, requests: Iterable[joint_states.JointRequest]) -> joint_states.JointInputs:
         position, at = self.measured.position, self.measured_at
-        return joint_states.JointInputs(position, at, self.warmest, self.error, tuple(requests))
+        return joint_states.JointInputs(position, at, self.warmest, self.error, self._is_limp, tuple(requests))
 
     def relax(self) -> None:
         """Switch torque off in the next cycle, until the next command."""
@@ -285,6 +302,7 @@ class JointDrive(ABC):
         """Return what is to be written in the cycle that ends `dt` [s] from `now`, one after the other."""
         inputs = self._inputs(self._requests)
         self._requests.clear()
+        self._is_limp = False
         was_blocked = self.condition.is_blocked
         self.condition, actions = joint_states.step_joint(self.condition, inputs, now, self.policy)
         if was_blocked and not self.condition.is_blocked:

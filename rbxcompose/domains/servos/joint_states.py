@@ -113,6 +113,8 @@ class JointInputs:
     """[degC]; None while unknown."""
     hardware_error: str = ""
     """What the servo reports, such as `overload`; empty if nothing."""
+    has_lost_torque: bool = False
+    """Whether a servo has none though it was switched on, as after a moment without supply."""
     requests: tuple[JointRequest, ...] = ()
 
 
@@ -167,6 +169,8 @@ class JointCondition:
     """What a fault was for; it stays until the joint is enabled again."""
     is_lost: bool = False
     """A fault because measurements are missing; it ends when there are new ones."""
+    has_lost_torque: bool = False
+    """A fault for one cycle: who leads the joint gives up, and the next command switches torque on where it is."""
     rest_until: float | None = None
     """When the thermal rest may end [s]; None if the joint does not rest."""
     position: float | None = None
@@ -181,7 +185,7 @@ class JointCondition:
         """The state that people see: the strongest of what blocks the joint."""
         if not self.is_enabled:
             return JointMode.DISABLED
-        if self.hardware_error or self.is_lost:
+        if self.hardware_error or self.is_lost or self.has_lost_torque:
             return JointMode.FAULT
         return JointMode.RESTING if self.rest_until is not None else self.base
 
@@ -224,8 +228,12 @@ class _Cycle:
         is_known = before.base is not JointMode.UNKNOWN
         is_lost = (was_lost and self.is_stale) or (is_known and self.age > self.policy.fault_after)
         error, until = self.inputs.hardware_error or before.hardware_error, self._rest_until()
-        if (is_lost, error, until) != (was_lost, before.hardware_error, before.rest_until):  # seldom: a copy takes long
-            self.state = replace(before, is_lost=is_lost, hardware_error=error, rest_until=until)
+        is_limp = self.inputs.has_lost_torque and before.base in WITH_TORQUE
+        now, then = (is_lost, error, until, is_limp), (was_lost, before.hardware_error, before.rest_until)
+        if now != (*then, before.has_lost_torque):  # seldom: a copy takes long
+            self.state = replace(
+                before, is_lost=is_lost, hardware_error=error, rest_until=until, has_lost_torque=is_limp
+            )
         if self.state.is_lost:
             self._lose()
         elif self.state.is_blocked:
@@ -342,6 +350,8 @@ class _Cycle:
             return f"the servo reported {state.hardware_error}; enable the joint when that is mended"
         if state.is_lost:
             return f"nothing has been measured for {self.age:.2f} s"
+        if state.has_lost_torque:
+            return "its servo has lost its torque, as after a moment without supply"
         if state.rest_until is None:
             return ""
         resume, left = self.policy.thermal.resume, max(0.0, state.rest_until - self.now)

@@ -106,7 +106,30 @@ def keep_speeds(bus: ServoBus, drive: JointDrive) -> Iterator[str]:
             yield f"servo {servo.id} of joint '{joint.name}' turns at most {most:.3g} rad/s"
 
 
-TORQUE_LIMIT, MOST = "torque_limit", "max_torque"
+RANGE = ("min_position", "max_position")
+
+
+def keep_ranges(bus: ServoBus, drive: JointDrive) -> Iterator[str]:
+    """Limit a joint that is given positions to those that its servos take; yield sentences on what is narrower now.
+
+    Raises:
+        PortError: if the bus has gone.
+    """
+    joint = drive.joint
+    for servo in joint.servos if joint.mode == "position" else ():
+        is_endless = joint.is_continuous and servo.model.family.is_endless
+        if is_endless or (reading := bus.read([servo.id], RANGE).get(servo.id)) is None:
+            continue
+        ticks = [reading.values[end] for end in RANGE]
+        if ticks[0] <= servo.ends[0] and ticks[1] >= servo.ends[1]:
+            continue
+        lower, upper = sorted(joint.transmission.position(servo.angle(tick)) for tick in ticks)
+        if drive.narrow(lower, upper):
+            names = " and ".join(f"{end} {tick}" for end, tick in zip(RANGE, ticks, strict=True))
+            yield f"joint '{joint.name}' goes from {lower:.3g} to {upper:.3g} only: servo {servo.id} has {names}"
+
+
+TORQUE, TORQUE_LIMIT, MOST = "torque_enable", "torque_limit", "max_torque"
 
 
 class TorqueLimits:
@@ -154,7 +177,7 @@ def raw_limit(servo: JointServo, most: int) -> int:
 WATCHDOG = "bus_watchdog"
 MODE = "operating_mode"
 DELAY = "return_delay"
-_KEPT = (MODE, DELAY, "min_position", "max_position")  # outlive the supply, and change without torque only
+_KEPT = (MODE, DELAY, *RANGE)  # outlive the supply, and change without torque only
 _FIRED = -1  # what `bus_watchdog` reads after it has stopped a servo
 
 
@@ -282,7 +305,7 @@ class ServoCycle:
         use_next(self.items, self.bus, now)
 
     def limit(self, drives: Iterable[JointDrive]) -> Iterator[str]:
-        """Write the torque limits of servos, and keep to the speeds that they take; yield what is slower now.
+        """Write the torque limits of servos, and keep to their speeds and ranges; yield what is less now.
 
         Raises:
             PortError: if the bus has gone.
@@ -291,6 +314,7 @@ class ServoCycle:
             for servo in drive.joint.servos:
                 self.torques.write(self.bus, servo)
             yield from keep_speeds(self.bus, drive)
+            yield from keep_ranges(self.bus, drive)
 
     def end(self, *, is_kept: bool = False) -> None:
         """Switch all torque off, or stop what turns if it is kept; twice, since nobody confirms a group write."""
@@ -320,23 +344,31 @@ class ServoCycle:
         items = slow_items(drives[id_].joint.servo(id_).model)
         if (slow := self.bus.read([id_], items).get(id_)) is not None:
             drives[id_].take(id_, slow)
-            self._care(drives[id_], drives[id_].joint.servo(id_), slow.values)
+            self._care(id_, drives, slow.values)
 
     def _keep_torque(self, id: int, drives: Mapping[int, JointDrive]) -> None:
-        """Write the torque limit of a servo again, if it has forgotten it without its supply."""
+        """See whether a servo has lost its torque without its supply; write its limit again, if it has forgotten it."""
         drive, servo = drives[id], drives[id].joint.servo(id)
-        if TORQUE_LIMIT not in servo.model.items or drive.hindrance or drive.error:
+        if drive.hindrance or drive.error:
             return
-        reading = self.bus.read([id], [TORQUE_LIMIT]).get(id)
-        if reading is not None and (note := self.torques.keep(self.bus, servo, reading.values)):
+        limit = [TORQUE_LIMIT] if TORQUE_LIMIT in servo.model.items else []
+        if (reading := self.bus.read([id], [TORQUE, *limit]).get(id)) is None:
+            return
+        if drive.has_torque and not reading.values[TORQUE] and not reading.alert:  # else its error says why
+            drive.lost_torque()
+            self.notes.append(f"servo {id} of joint '{drive.joint.name}' has lost its torque: was it without supply?")
+        if limit and (note := self.torques.keep(self.bus, servo, reading.values)):
             self.notes.append(note)
 
-    def _care(self, drive: JointDrive, servo: JointServo, values: Mapping[str, int]) -> None:
+    def _care(self, id: int, drives: Mapping[int, JointDrive], values: Mapping[str, int]) -> None:
         """Arm a watchdog that has stopped a servo, or that it has forgotten without its supply."""
+        drive, has_forgotten = drives[id], values.get(WATCHDOG) == 0 and self.watchdog > 0
         if has_fired(values):
             drive.was_cut()
-        if has_fired(values) or (values.get(WATCHDOG) == 0 and self.watchdog > 0):
-            arm(self.bus, servo, self.watchdog)
+        if has_fired(values) or has_forgotten:
+            arm(self.bus, drive.joint.servo(id), self.watchdog)
+        if has_forgotten:
+            self._keep_torque(id, drives)
 
     def _mimic(self) -> None:
         """Let joints follow those which they mimic, with and without torque."""

@@ -215,9 +215,9 @@ def joint_report(
     notes = {name: words for name, words in {**own, **controllers}.items() if words}
     bad = [name for name, drive in drives.items() if drive.mode in (JointMode.FAULT, JointMode.RESTING)]
     level = Level.ERROR if bad or is_lost else Level.WARN if notes else Level.OK
-    message = "; ".join(f"{name}: {words}" for name, words in notes.items()) or f"{len(drives)} joints"
+    words = "; ".join([GONE] * is_lost + [f"{name}: {words}" for name, words in notes.items()])
     kept = {"periods_met": f"{100 * periods.share_met:.2f} %", "late": f"{1e3 * periods.late(0.99):.1f} ms"}
-    return level, message, {**{name: drive.mode for name, drive in drives.items()}, **kept}
+    return level, words or f"{len(drives)} joints", {**{name: drive.mode for name, drive in drives.items()}, **kept}
 
 
 GONE = "the bus of servos has gone"
@@ -431,7 +431,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.cycle.run(self.now, self.period, () if self.is_parking else self.controllers.leading)
         self.reboots.step(self.now)
         while self.cycle.notes:
-            self.info(self.cycle.notes.pop(0))
+            self.warn(self.cycle.notes.pop(0))
         if self.now - self.published_at >= self.pause:
             self.published_at = self.now
             self.publish()

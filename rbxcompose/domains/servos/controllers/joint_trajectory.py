@@ -100,13 +100,15 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
             goal_time=config.tolerance.goal_time,
         )
         self.problem = ""
-        self.follower = trajectory_follower.TrajectoryFollower(
-            {name: joint.rules for name, joint in site.joints.items()}, policy
-        )
+        self.follower = trajectory_follower.TrajectoryFollower(self._rules(), policy)
         follow = trajectory_follower.TrajectoryWay(site.action(FOLLOW), self._trajectory, result_of)
         self.goals = trajectory_follower.TrajectoryGoals(
             self.follower, {FOLLOW: follow, MOVE: trajectory_follower.move_way(site.action(MOVE))}
         )
+
+    def _rules(self) -> dict[str, trajectory.JointRules]:
+        """Return what joints may now: a servo may have been found to have less room than its joint was given."""
+        return {name: joint.rules for name, joint in self.site.joints.items()}
 
     @property
     def leads(self) -> bool:
@@ -115,6 +117,7 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
 
     def accept(self, port: str, goal: Any) -> str:
         """Replace what leads the joints."""
+        self.follower.joints = self._rules()
         self.goals.replace(port)
         return ""
 

@@ -12,7 +12,7 @@ from rbxcompose.base.config import JointName
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.units import LENGTH, SPEED
 from rbxcompose.domains.servos.controller import Controller, ControllerConfig, controller
-from rbxcompose.domains.servos.limits import stopping_speed
+from rbxcompose.domains.servos.limits import MotionLimits, stopping_speed
 from rbxcompose.msgs.control_msgs import SingleJointPosition as Move
 from rbxcompose.msgs.stamps import to_seconds, to_time
 from rbxcompose.msgs.std_msgs import Float64, Header
@@ -73,13 +73,16 @@ class LinearController(Controller[LinearConfig]):
         """Set up how it moves."""
         config = self.config
         self.joint = self.site.joints[config.joint]
-        self.limits = self.joint.rules.limits
-        self.policy = LinearPolicy(
-            config.speed, config.dead_band, config.stall_after, acceleration=self.limits.acceleration
-        )
+        acceleration = self.joint.rules.limits.acceleration
+        self.policy = LinearPolicy(config.speed, config.dead_band, config.stall_after, acceleration=acceleration)
         self.move: LinearMove | None = None
         self.followed: ServedGoal[Any, Any, Any] | None = None  # the goal to which it moves
         self.last = ""  # why the last command failed, was changed or refused
+
+    @property
+    def limits(self) -> MotionLimits:
+        """Return where its joint may be."""
+        return self.joint.rules.limits
 
     @property
     def leads(self) -> bool:
