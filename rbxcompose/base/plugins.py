@@ -196,7 +196,7 @@ class Plugins:
         except (Exception, SystemExit) as error:  # third-party code may raise anything
             if name in self.shipped or name not in self.third_party:
                 raise
-            raise self.broken(name, f"{type(error).__name__}: {error}") from error
+            raise self.broken(name, f"{type(error).__name__}: {error}", _place(error)) from error
 
     def overshadowed(self, name: str) -> str:
         """Return the message for a name of ours that other packages register as well; empty if none does."""
@@ -206,17 +206,28 @@ class Plugins:
         """Return the message for a plug-in of another package that has the name of one of ours."""
         return f"the {self.family} '{name}' of {self._packages(name)} is left out: rbxcompose has one of this name"
 
-    def broken(self, name: str, reason: str) -> BrokenPluginError:
+    def broken(self, name: str, reason: str, place: str = "") -> BrokenPluginError:
         """Return the error that reports why a plug-in cannot be used."""
-        return BrokenPluginError(
-            f"the {self.family} '{plain(name, 60)}' of {self._packages(name)} cannot be used: {plain(reason)}"
-        )
+        what = f"{self.family} '{plain(name, 60)}' of {self._packages(name)}"
+        return BrokenPluginError(f"the {what} cannot be used: {plain(reason)}{plain(place)}")
 
     def _packages(self, name: str) -> str:
         if not (entries := self.third_party.get(name, ())):
             return _NAME
         packages = sorted({f"'{plain(entry.dist.name, 60)}'" if entry.dist else entry.module for entry in entries})
         return f"package{'s' if len(packages) > 1 else ''} {' and '.join(packages)}"
+
+
+def _place(error: BaseException) -> str:
+    """Return the innermost place in the package that an error passed through first and is not ours, in brackets."""
+    found, package, trace = "", "", error.__traceback__
+    while trace is not None:
+        of = trace.tb_frame.f_globals.get("__name__", "").partition(".")[0]
+        package = package or (of if of not in (_NAME, "importlib", "contextlib") else "")
+        if package and of == package and not (file := trace.tb_frame.f_code.co_filename).startswith("<"):
+            found = f" ({os.path.basename(file)}:{trace.tb_lineno})"
+        trace = trace.tb_next
+    return found
 
 
 def load_all_foreign() -> None:

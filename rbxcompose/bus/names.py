@@ -7,26 +7,14 @@ import struct
 from typing import NamedTuple
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.sdk.ports import name_problem
 
-LONGEST_NAME = 247  # rmw's limit: 255 bytes less the prefixes that some middleware adds
 TRANSFORMS = ("/tf", "/tf_static")  # topics of transforms
 ADMIN = "rbx/"  # prefix of the keys that are not part of ROS 2
 EXCHANGE_DOMAIN = 0  # of what robots share
 DENIED = "rbx_denied/"  # prefix of keys at which messages of other hosts are denied
 
-_NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _DDS = re.compile(r"(\w+)::(\w+)::dds_::(\w+)_")
-
-
-def name_problem(name: str) -> str:
-    """Return what is wrong with `name` as a ROS name, or nothing if it is fine."""
-    if not name:
-        return "a name cannot be empty"
-    if len(name) > LONGEST_NAME:
-        return f"a name has at most {LONGEST_NAME} characters, this one {len(name)}"
-    if not _NAME.fullmatch(name):
-        return f"'{name}' is not a ROS name: words of letters, digits and '_', not starting with a digit, joined by '/'"
-    return ""
 
 
 def resolve(name: str, namespace: str = "") -> str:

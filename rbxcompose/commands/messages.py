@@ -15,7 +15,6 @@ import yaml
 from rbxcompose.base.findings import Finding, Report, kind
 from rbxcompose.base.printable import FORBIDDEN
 from rbxcompose.bus.graph import GraphName, WireType, find
-from rbxcompose.bus.names import name_problem
 from rbxcompose.commands.console import INTERRUPTED, NotDoneError, emit, refuse, write_report
 from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, SAID_NO, Guest, ReceivedMessage, silence, wanted
 from rbxcompose.manifest.reader import read_text
@@ -25,7 +24,7 @@ from rbxcompose.msgs.cdr import CdrError, decode
 from rbxcompose.msgs.plain import from_plain, to_plain
 from rbxcompose.msgs.types import Interface, Message
 from rbxcompose.sdk.bound import Ended, Outcome, Reply
-from rbxcompose.sdk.ports import Qos
+from rbxcompose.sdk.ports import Qos, name_problem
 
 NO_TYPE = kind("RBX9021")
 MOST_SHOWN = 128  # values of a list that text shows; JSON shows all

@@ -112,6 +112,21 @@ class HasPorts(Protocol):
     bound: dict[str, Any]  # the live object of each port, by name
 
 
+LONGEST_NAME = 247  # rmw's limit: 255 bytes less the prefixes that some middleware adds
+_NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+
+
+def name_problem(name: str) -> str:
+    """Return what is wrong with `name` as a ROS name, or nothing if it is fine."""
+    if not name:
+        return "a name cannot be empty"
+    if len(name) > LONGEST_NAME:
+        return f"a name has at most {LONGEST_NAME} characters, this one {len(name)}"
+    if not _NAME.fullmatch(name):
+        return f"'{name}' is not a ROS name: words of letters, digits and '_', not starting with a digit, joined by '/'"
+    return ""
+
+
 class Port(Generic[B]):
     """A named end of a wire. `topic` is its ROS name, relative to the robot's namespace unless it starts with `/`."""
 

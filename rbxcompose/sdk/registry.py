@@ -18,7 +18,7 @@ from rbxcompose.base.plugins import BrokenPluginError, Plugins
 from rbxcompose.base.units import NUMBER
 from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import In, Port, ServesAction, ServesTopic
+from rbxcompose.sdk.ports import In, Port, ServesAction, ServesTopic, name_problem
 
 T = TypeVar("T", bound=type[Component[Any]])
 K = TypeVar("K", bound=Capability)
@@ -32,7 +32,8 @@ def component(name: str) -> Callable[[T], T]:
 
     Raises:
         TypeError: if it is not a subclass of `Component`.
-        ValueError: if another class has this name, or a port or a method refers to a port that it does not have.
+        ValueError: if another class has this name, a port cannot have its name or its topic, or a port or a method
+            refers to a port that it does not have.
     """
 
     def register(cls: T) -> T:
@@ -41,6 +42,7 @@ def component(name: str) -> Callable[[T], T]:
         other = _TYPES.get(name)
         if other is not None and (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
             raise ValueError(f"two component types are named '{name}': {other.__module__} and {cls.__module__}")
+        _require_names(cls)
         _require_ends(cls)
         _require_handled(cls)
         cls.type_name = name
@@ -48,6 +50,19 @@ def component(name: str) -> Callable[[T], T]:
         return cls
 
     return register
+
+
+_OF_INSTANCES = ("name", "config", "context", "bound", "at_end")
+
+
+def _require_names(cls: type[Component[Any]]) -> None:
+    """Raise ValueError if a port hides what every component has, such as `stop`, or its topic is no name in ROS."""
+    for name, port in inspect.getmembers(cls, lambda member: isinstance(member, Port)):
+        where = f"{cls.__module__}.{cls.__qualname__}.{name}"
+        if name in _OF_INSTANCES or hasattr(Component, name):
+            raise ValueError(f"{where} hides what every component has under this name: give the port another one")
+        if port.topic and (problem := name_problem(port.topic)):
+            raise ValueError(f"{where}: {problem}")
 
 
 def _require_ends(cls: type[Component[Any]]) -> None:

@@ -15,7 +15,6 @@ from rbxcompose.bus.names import (
     data_key,
     dds_type,
     decode_attachment,
-    name_problem,
     resolve,
 )
 from rbxcompose.bus.tokens import EndpointToken, EntityKind, NodeToken, endpoint_pattern, gid, parse_token, session_of
@@ -23,7 +22,7 @@ from rbxcompose.bus.wire import SERVICE_QOS, WIRE_PROFILES, RosQos, queue_depth,
 from rbxcompose.msgs.example_interfaces import AddTwoInts
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.std_msgs import String
-from rbxcompose.sdk.ports import Qos
+from rbxcompose.sdk.ports import Qos, name_problem
 from tests.loops import for_all
 
 JAZZY = WIRE_PROFILES["jazzy"]

@@ -47,6 +47,7 @@ class Bench:
     is_silent: bool = False
     temperature: float | None = 30.0
     error: str = ""
+    is_limp: bool = False
     torque: bool | None = None
     goal: float | None = None
     actions: tuple[JointAction, ...] = field(default=())
@@ -56,7 +57,8 @@ class Bench:
         self.now += dt
         if not self.is_silent:
             self.measured_at = self.now
-        inputs = JointInputs(self.position, self.measured_at, self.temperature, self.error, requests)
+        inputs = JointInputs(self.position, self.measured_at, self.temperature, self.error, requests, self.is_limp)
+        self.is_limp = False
         self.state, self.actions = step_joint(self.state, inputs, self.now, self.policy)
         for action in self.actions:
             self._apply(action)
@@ -106,7 +108,7 @@ class AnyJoint(RuleBasedStateMachine):
     )
     def cycle(self, requests: list[JointRequest], dt: float) -> None:
         self.bench.step(dt=dt)
-        was_blocked = self.bench.state.is_blocked
+        was_blocked = self.bench.state.is_blocked and not self.bench.state.has_lost_torque
         actions = self.bench.step(*requests, dt=0.0)
         if was_blocked and Enable(True) not in requests:
             assert not [action for action in actions if isinstance(action, WriteGoal | TorqueOn | Pursue)]
@@ -116,6 +118,10 @@ class AnyJoint(RuleBasedStateMachine):
     @rule(position=st.sampled_from([None, 0.1, 0.2, math.nan]), is_silent=st.booleans())
     def measure(self, position: float | None, is_silent: bool) -> None:
         self.bench.position, self.bench.is_silent = position, is_silent
+
+    @rule()
+    def lose_torque(self) -> None:
+        self.bench.is_limp = True
 
     @rule(temperature=st.sampled_from([None, 30.0, 50.0, 61.0]), error=st.sampled_from(["", "", "overload"]))
     def heat(self, temperature: float | None, error: str) -> None:
@@ -233,6 +239,17 @@ def test_an_error_of_the_hardware_stays_a_fault_until_it_is_mended_and_the_joint
     assert bench.refusal(MoveTo(1.0)) == "the servo reported overload; enable the joint when that is mended"
     assert bench.refusal(Enable(True)) == ""
     assert bench.mode() == JointMode.RELAXED
+
+
+def test_a_joint_whose_servo_has_lost_its_torque_is_a_fault_for_one_cycle_and_relaxed() -> None:
+    bench = active()
+    bench.is_limp = True
+    assert "has lost its torque" in bench.refusal(MoveTo(1.0))
+    assert (bench.mode(), bench.torque) == (JointMode.FAULT, False)
+    bench.is_limp = True  # which nobody expects otherwise now
+    assert bench.step() == ()
+    assert bench.mode() == JointMode.RELAXED
+    assert bench.step(MoveTo(1.0)) == (WriteGoal(0.3), TorqueOn(), Pursue(MoveTo(1.0)))
 
 
 def test_a_hot_joint_rests_until_both_the_time_is_over_and_it_has_cooled_down_and_then_recovers() -> None:

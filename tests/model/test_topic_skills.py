@@ -92,6 +92,20 @@ def test_ends_and_halts_are_ports_of_the_same_class(word: str) -> None:
         component("toy_broken_hand")(Hand)
 
 
+@pytest.mark.parametrize(
+    ("name", "topic", "problem"),
+    [
+        ("stop", "stop", r"Wrong\.stop hides what every component has"),
+        ("config", "config", r"Wrong\.config hides what every component has"),
+        ("raw", "my raw", r"Wrong\.raw: 'my raw' is not a ROS name"),
+    ],
+)
+def test_a_port_hides_nothing_that_components_have_and_has_a_topic_of_ros(name: str, topic: str, problem: str) -> None:
+    wrong = type("Wrong", (Component,), {name: In(Empty, topic)})
+    with pytest.raises(ValueError, match=problem):
+        component("toy_wrong_port")(wrong)
+
+
 @pytest.mark.parametrize(("method", "meant"), [("on_rwa", "on_raw"), ("accept_gripp", "accept_grip")])
 def test_a_misspelt_handler_is_refused(method: str, meant: str) -> None:
     class Misspelt(Component[Config]):

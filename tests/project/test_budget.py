@@ -32,8 +32,8 @@ class Cost(NamedTuple):
 ROOMS: dict[str, Cost] = {
     "__init__": Cost(code=1, files=1, small=1, imports=0),
     "__main__": Cost(code=8, files=1, small=1, imports=3),
-    "base": Cost(code=3800, files=25, small=3, imports=215),
-    "bus": Cost(code=2395, files=17, small=0, imports=161),
+    "base": Cost(code=3808, files=25, small=3, imports=215),
+    "bus": Cost(code=2395, files=17, small=0, imports=162),
     "commands": Cost(code=2710, files=24, small=3, imports=343),
     "compiler": Cost(code=7824, files=53, small=1, imports=881),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
@@ -55,14 +55,14 @@ ROOMS: dict[str, Cost] = {
     "missions": Cost(code=12031, files=78, small=3, imports=1030),
     "msgs": Cost(code=1579, files=14, small=3, imports=95),
     "runtime": Cost(code=7773, files=38, small=0, imports=680),
-    "sdk": Cost(code=1407, files=8, small=0, imports=162),
+    "sdk": Cost(code=1426, files=8, small=0, imports=162),
     "testing": Cost(code=384, files=5, small=2, imports=57),
     "tools": Cost(code=17800, files=116, small=8, imports=1863),
 }
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114272,
+    "lines of code": 114288,
     "files": 750,
     "files of 1 to 30 lines of code": 42,
     "lines of imports": 10463,

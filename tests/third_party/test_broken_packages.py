@@ -62,15 +62,18 @@ def checked(folder: Path, type_: str) -> Checked:
 @pytest.mark.parametrize(
     ("module", "reason"),
     [
-        ("import no_such_module", "ModuleNotFoundError: No module named 'no_such_module'"),
-        ("raise SystemExit(3)", "SystemExit: 3"),
+        ("import no_such_module", "ModuleNotFoundError: No module named 'no_such_module' (odd_module.py:1)"),
+        ("raise SystemExit(3)", "SystemExit: 3 (odd_module.py:1)"),
         ("def broken(:", "SyntaxError: invalid syntax"),
         (
             "from rbxcompose.sdk import component\n@component('odd')\nclass Odd: pass",
             "odd_module.Odd is not a subclass",
         ),
         ("", "declares no class by @component('odd')"),
-        (LIKE_A_COMPONENT.format(name="odd") + "raise RuntimeError('too late')", "RuntimeError: too late"),
+        (
+            LIKE_A_COMPONENT.format(name="odd") + "raise RuntimeError('too late')",
+            "RuntimeError: too late (odd_module.py:7)",
+        ),
         (LIKE_A_COMPONENT.format(name="go_to"), "ValueError: two component types are named 'go_to'"),
     ],
     ids=["import", "exit", "syntax", "class", "nothing", "late", "other_name"],

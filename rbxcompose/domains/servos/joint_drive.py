@@ -280,7 +280,7 @@ class JointDrive(ABC):
 
     def _inputs(self, requests: Iterable[joint_states.JointRequest]) -> joint_states.JointInputs:
         position, at = self.measured.position, self.measured_at
-        return joint_states.JointInputs(position, at, self.warmest, self.error, self._is_limp, tuple(requests))
+        return joint_states.JointInputs(position, at, self.warmest, self.error, tuple(requests), self._is_limp)
 
     def relax(self) -> None:
         """Switch torque off in the next cycle, until the next command."""

@@ -113,9 +113,9 @@ class JointInputs:
     """[degC]; None while unknown."""
     hardware_error: str = ""
     """What the servo reports, such as `overload`; empty if nothing."""
+    requests: tuple[JointRequest, ...] = ()
     has_lost_torque: bool = False
     """Whether a servo has none though it was switched on, as after a moment without supply."""
-    requests: tuple[JointRequest, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

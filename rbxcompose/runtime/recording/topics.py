@@ -8,13 +8,12 @@ from fnmatch import fnmatchcase
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Severity, kind
-from rbxcompose.bus.names import name_problem
 from rbxcompose.bus.tokens import EndpointToken, EntityKind
 from rbxcompose.bus.wire import ros_qos
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import DefinitionError, FieldType, Structures, parse_type, type_hash
 from rbxcompose.msgs.packages import joined, parts, short
-from rbxcompose.sdk.ports import Qos
+from rbxcompose.sdk.ports import Qos, name_problem
 
 UNREADABLE = kind("RBX9201")
 DAMAGED = kind("RBX9202", Severity.WARNING)
