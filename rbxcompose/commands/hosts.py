@@ -305,9 +305,13 @@ def label_of(shares: Shares, host: str, robot: str) -> str:
 
 
 def follow_commands(
-    commands: Mapping[str, Sequence[str]], optional: Collection[str] = (), begun: Callable[[], None] = lambda: None
+    commands: Mapping[str, Sequence[str]],
+    optional: Collection[str] = (),
+    begun: Callable[[], None] = lambda: None,
+    *,
+    ends_all: bool = True,
 ) -> int:
-    """Run commands at once and show what they print; if one fails, end the others. Return the exit code.
+    """Run commands at once and show what they print; if one fails, it `ends_all`. Return the exit code.
 
     Those of the labels that are `optional` may fail. Once each has printed something, all have `begun`.
     """
@@ -323,7 +327,7 @@ def follow_commands(
         running = [Running(command, partial(show, label)) for label, command in commands.items()]
         needed = [one for label, one in zip(commands, running, strict=True) if label not in optional]
         while any(item.poll() is None for item in running):
-            if interrupts or any(item.poll() for item in needed):
+            if interrupts or (ends_all and any(item.poll() for item in needed)):
                 for one in running:
                     one.end()
             time.sleep(_LOOK)
@@ -335,12 +339,13 @@ def follow_commands(
 
 
 def follow_all(shares: Shares, words: Callable[[str], Sequence[str]]) -> int:
-    """Run a verb for each share, and show each line as it comes."""
+    """Run a verb for each share, and show each line as it comes; those that fail leave the others alone."""
     commands = {
         label_of(shares, host, robot): remote.rbxcompose(words(robot), has_terminal=True)
         for (host, robot), remote in shares.items()
     }
-    return follow_commands(commands, [label_of(shares, *key) for key, share in shares.items() if share.is_former])
+    former = [label_of(shares, *key) for key, share in shares.items() if share.is_former]
+    return follow_commands(commands, former, ends_all=False)
 
 
 def ask_all(shares: Shares, words: Callable[[str], Sequence[str]], *, in_json: bool, tolerates: str = "") -> int:
@@ -360,7 +365,7 @@ def ask_all(shares: Shares, words: Callable[[str], Sequence[str]], *, in_json: b
             break
         if not tries:
             sys.stderr.write(f"an 'up' is on its way here: asks again for {', '.join(left)}\n")
-    codes = {label: abs(entry.wait()) for label, entry in done.items()}
+    codes, not_up = {label: abs(entry.wait()) for label, entry in done.items()}, list[str]()
     if 0 in codes.values():
         counts = {" ".join(key): NOT_UP.code if share.is_former else tolerates for key, share in shares.items()}
         done = {
@@ -368,10 +373,12 @@ def ask_all(shares: Shares, words: Callable[[str], Sequence[str]], *, in_json: b
             for label, entry in done.items()
             if not (code := counts[label]) or not any(code in line for line in entry.lines)
         }
+        not_up = [" ".join(key) for key, share in shares.items() if " ".join(key) not in done and not share.is_former]
     if in_json:
         emit(json.dumps({"hosts": [_data(label, entry) for label, entry in done.items()]}))
     else:
         texts = ["\n".join([f"{label}:", *(f"  {line}" for line in entry.lines)]) for label, entry in done.items()]
+        texts += [f"{label}:\n  is not up" for label in not_up]
         emit("\n\n".join(texts))
     return max(codes[label] for label in done)
 

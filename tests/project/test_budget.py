@@ -34,7 +34,7 @@ ROOMS: dict[str, Cost] = {
     "__main__": Cost(code=8, files=1, small=1, imports=3),
     "base": Cost(code=3808, files=25, small=3, imports=215),
     "bus": Cost(code=2395, files=17, small=0, imports=162),
-    "commands": Cost(code=2710, files=24, small=3, imports=343),
+    "commands": Cost(code=2716, files=24, small=3, imports=343),
     "compiler": Cost(code=7824, files=53, small=1, imports=881),
     "domains/__init__": Cost(code=0, files=1, small=0, imports=0),
     "domains/arms": Cost(code=12864, files=64, small=1, imports=1118),
@@ -62,7 +62,7 @@ ROOMS: dict[str, Cost] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114288,
+    "lines of code": 114295,
     "files": 750,
     "files of 1 to 30 lines of code": 42,
     "lines of imports": 10463,

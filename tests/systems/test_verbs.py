@@ -311,3 +311,26 @@ def test_a_start_on_several_hosts_is_over_once_each_has_said_something(last_word
     commands = {host: [sys.executable, "-S", "-c", text] for host, text in texts.items()}
     assert hosts.follow_commands(commands, begun=lambda: begun.append(True)) == 0
     assert any(begun) is bool(last_words)
+
+
+def test_who_only_shows_goes_on_on_the_other_hosts_if_one_fails(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    flag = tmp_path / "flag"
+    flag.touch()
+    texts = {
+        "lost": "import os, sys; os.remove(sys.argv[1]); sys.exit(255)",
+        "whole": "import os, sys\nwhile os.path.exists(sys.argv[1]): pass\nprint('goes on')",
+    }
+    commands = {host: [sys.executable, "-S", "-c", text, str(flag)] for host, text in texts.items()}
+    assert hosts.follow_commands(commands, ends_all=False) == 255
+    assert "whole | goes on" in capfd.readouterr().out
+
+
+def test_down_names_each_host_also_where_the_end_of_another_one_came_first(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    up(monkeypatch)
+    answer_like_a_host_without(monkeypatch, "b")
+    assert main(["down", "s.yaml"]) == 0
+    assert "here b:\n  is not up\n" in capfd.readouterr().out

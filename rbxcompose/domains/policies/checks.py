@@ -32,7 +32,7 @@ def _examined(robot: Robot, made: RobotComponent) -> Iterator[Finding]:
         network = PolicyNetwork(path) if find_spec("onnxruntime") else None
     except PolicyNetworkError as error:
         node = at(robot.manifest.root, made.place("model"))
-        written = node.text if isinstance(node, ScalarNode) else ""
+        written = str(node.filled or node.text) if isinstance(node, ScalarNode) else ""
         if path.exists() or not written.startswith("/"):  # a whole path is one on the computer of the robot
             where = robot.value(*made.place("model"))
             yield unusable_policy.at(where, str(error).replace(str(path), written))
