@@ -247,6 +247,7 @@ def test_after_a_connection_was_lost_it_is_checked_and_compared_again(
 
     def losing(answer: Callable[[dict[str, Any]], Any], given: dict[str, Any]) -> Any:
         if loses:
+            gateway.is_away = True
             gateway.drop()
         return answer(given)
 
@@ -255,7 +256,8 @@ def test_after_a_connection_was_lost_it_is_checked_and_compared_again(
     page = edits(open_page(page_name="mission"))
     expect(page.get_by_text("It is not known whether the robot runs what is saved: the connection")).to_be_visible()
     expect(page.get_by_text("Not checked")).to_be_visible()
-    loses = False
+    loses = gateway.is_away = False
+    page.get_by_role("button", name="Try now").click()
     expect(page.get_by_text("No mistakes")).to_be_visible()
     expect(page.locator(".live-changes")).to_be_empty()
     expect(page.get_by_text("It could not be checked")).to_have_count(0)
