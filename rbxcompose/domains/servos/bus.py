@@ -26,7 +26,7 @@ _RARE = ("hardware_error", "bus_watchdog")  # of models that have them
 
 
 SELDOM = 10
-"""In one of so many cycles, whether a servo has torque is read instead, and its torque limit."""
+"""In one of so many cycles, whether a servo has torque is read instead, or its torque limit."""
 
 
 def slow_items(model: ServoModel) -> list[str]:

@@ -336,7 +336,8 @@ class ServoCycle:
             drives[id_].take(id_, reading)
         ids, self._count = list(drives), self._count + 1
         if self._count % SELDOM == 0:  # turns of their own: no number of servos keeps one of them from its turn
-            self._keep_torque(ids[self._keep % len(ids)], drives)
+            turn, number = divmod(self._keep, len(ids))  # each is read by itself: no cycle has room for both
+            self._keep_torque(ids[number], drives, (TORQUE, TORQUE_LIMIT)[turn % 2])
             self._keep += 1
             return
         id_ = ids[self._turn % len(ids)]
@@ -346,18 +347,16 @@ class ServoCycle:
             drives[id_].take(id_, slow)
             self._care(id_, drives, slow.values)
 
-    def _keep_torque(self, id: int, drives: Mapping[int, JointDrive]) -> None:
+    def _keep_torque(self, id: int, drives: Mapping[int, JointDrive], *names: str) -> None:
         """See whether a servo has lost its torque without its supply; write its limit again, if it has forgotten it."""
         drive, servo = drives[id], drives[id].joint.servo(id)
-        if drive.hindrance or drive.error:
+        known = [name for name in names if name in servo.model.items]
+        if not known or drive.hindrance or drive.error or (reading := self.bus.read([id], known).get(id)) is None:
             return
-        limit = [TORQUE_LIMIT] if TORQUE_LIMIT in servo.model.items else []
-        if (reading := self.bus.read([id], [TORQUE, *limit]).get(id)) is None:
-            return
-        if drive.has_torque and not reading.values[TORQUE] and not reading.alert:  # else its error says why
+        if drive.has_torque and not reading.values.get(TORQUE, 1) and not reading.alert:  # else its error says why
             drive.lost_torque()
             self.notes.append(f"servo {id} of joint '{drive.joint.name}' has lost its torque: was it without supply?")
-        if limit and (note := self.torques.keep(self.bus, servo, reading.values)):
+        if TORQUE_LIMIT in known and (note := self.torques.keep(self.bus, servo, reading.values)):
             self.notes.append(note)
 
     def _care(self, id: int, drives: Mapping[int, JointDrive], values: Mapping[str, int]) -> None:
@@ -368,7 +367,7 @@ class ServoCycle:
         if has_fired(values) or has_forgotten:
             arm(self.bus, drive.joint.servo(id), self.watchdog)
         if has_forgotten:
-            self._keep_torque(id, drives)
+            self._keep_torque(id, drives, TORQUE, TORQUE_LIMIT)
 
     def _mimic(self) -> None:
         """Let joints follow those which they mimic, with and without torque."""
