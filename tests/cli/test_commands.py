@@ -21,9 +21,10 @@ from rbxcompose.base.plugins import file_of
 from rbxcompose.commands import main as command
 from rbxcompose.commands import verbs
 from rbxcompose.runtime.folder import STATE, ComponentState, RobotFolder, RobotState, StopState
-from rbxcompose.runtime.log import Record, start_new
+from rbxcompose.runtime.log import NAME, LogFile, Record, start_new
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.testing.golden import Golden
+from rbxcompose.tools.commands import down
 from tests.loops import for_all
 
 ROOT = Path(__file__).parents[2]
@@ -241,6 +242,22 @@ def test_ps_shows_who_has_stopped_a_robot(holds: dict[str, str], line: str, caps
     assert command.main(["ps", "--json"]) == 0
     expected = {"by": "the command 'stop'", "time": 12.34, "holds": holds}
     assert json.loads(capsys.readouterr().out)["stop"] == expected
+
+
+def test_down_says_what_failed_at_the_end_and_not_what_did_before(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = LogFile(written("a").path / NAME)
+
+    def say(level: Level, text: str) -> list[str]:
+        log.write(Record(1.0, level, "servos", text))
+        return []
+
+    say(Level.ERROR, "something else")
+    monkeypatch.setattr(down, "_end", lambda folder: say(Level.ERROR, "servo 1 may still turn") + say(Level.WARN, "so"))
+    assert command.main(["down", "a"]) == 0
+    assert capsys.readouterr().out == "servos: servo 1 may still turn\na is down\n"
+    log.close()
 
 
 @pytest.mark.parametrize("wanted", ["a", "/robots/a/robot.yaml", "/robots/a"])

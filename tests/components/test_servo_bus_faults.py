@@ -39,19 +39,27 @@ class Head:
         twin: str = "servo",
         rate: float = 50.0,
         model: str = "AX-12",
+        **settings: Any,
     ) -> None:
         named = {
             f"fault_{index}": {"at": at, "fault": fault, "joint": joint, "lasts": lasts}
             for index, (at, fault, joint, lasts) in enumerate(faults)
         }
         self.robot = Bench(
-            instance("servos", "servo_bus", {**config_of(model), "twin": twin, "faults": named, "rate": rate}),
+            instance(
+                "servos", "servo_bus", {**config_of(model), "twin": twin, "faults": named, "rate": rate, **settings}
+            ),
             start=False,
         )
         self.states = self.robot.collect("/joint_states", JointState)
         driver = self.robot.component("servos")
         assert isinstance(driver, ServoBusDriver)
         self.driver = driver
+
+    def servo(self, id: int) -> FakeServo:
+        bus: Any = self.driver.cycle.bus
+        found: FakeServo = bus.line[id]
+        return found
 
     def modes(self) -> list[str]:
         return [str(drive.mode) for drive in self.driver.cycle.drives.values()]
@@ -135,6 +143,85 @@ def test_a_joint_whose_servo_was_without_supply_for_a_moment_is_relaxed_with_the
     head.go("pan", 0.5)
     head.robot.advance(2.0)
     assert head.states[-1].position[0] == pytest.approx(0.5, abs=0.006)
+
+
+def test_a_servo_that_answers_late_gets_its_mode_and_what_a_new_one_had_of_its_own_goes() -> None:
+    joints = config_of("XL430-W250")["joints"]
+    joints["pan"]["mode"] = "velocity"
+    head = Head((0.0, "power_off", "pan", 1.5), (0.0, "power_off", "tilt", 1.5), model="XL430-W250", joints=joints)
+    pan, tilt = head.servo(1), head.servo(2)
+    pan.set("operating_mode", 3)
+    statuses = head.robot.statuses("servos")
+    head.robot.advance(1.1)
+    assert (statuses[-1].level, statuses[-1].message.count("no servo answers at id")) == (2, 2)
+    head.robot.advance(0.39)
+    tilt.set("goal_speed", 5)  # as one that somebody has used before
+    head.robot.advance(2.0)
+    assert (pan.get("operating_mode"), tilt.get("goal_speed")) == (1, 0)
+    assert statuses[-1].level == 0
+
+
+def test_a_joint_that_something_holds_is_reported_and_goes_on_from_there() -> None:
+    head = Head((0.0, "jam", "pan", 3.9))
+    statuses = head.robot.statuses("servos")
+    head.robot.advance(0.5)
+    head.go("pan", 1.0)
+    head.robot.advance(3.0)
+    assert "pan: it is at 0, and was told to be at 1" in statuses[-1].message
+    head.go("pan", 1.0)
+    head.robot.advance(0.04)
+    assert abs(head.servo(1).get("goal_position") - 512) < 30
+    head.robot.advance(4.0)
+    assert head.states[-1].position[0] == pytest.approx(1.0, abs=0.006)
+    assert statuses[-1].level == 0
+
+
+def test_servos_of_a_joint_that_are_apart_and_one_of_another_model_are_reported() -> None:
+    joints = config_of("XL430-W250")["joints"]
+    joints["pan"]["servos"].append({"id": 3, "model": "XL430-W250"})
+    head = Head(model="XL430-W250", joints=joints)
+    statuses = head.robot.statuses("servos")
+    head.servo(3).move_to(3000)
+    head.servo(2).set("model_number", 1020)
+    head.robot.advance(0.1)
+    head.driver.prepare()
+    head.robot.advance(1.1)
+    assert statuses[-1].message == "pan: its servos are 1.46 apart; tilt: servo 2 is XM430-W350, not XL430-W250"
+
+
+def test_a_servo_that_does_not_answer_at_the_end_is_named() -> None:
+    head = Head()
+    head.robot.advance(0.5)
+    head.servo(1).faults.is_mute = True
+    head.robot.host.shutdown()
+    assert "servos: servo 1 did not answer at the end, and may still have torque" in head.robot.texts()
+
+
+def test_a_joint_that_something_holds_on_its_way_is_not_parked_and_holds() -> None:
+    head = Head(on_shutdown="park", park={"pan": 0.0})
+    head.robot.advance(0.5)
+    head.go("pan", 1.0)
+    head.robot.advance(2.0)
+    head.servo(1).faults.is_jammed = True
+    head.robot.host.brake()
+    head.robot.advance(3.0)
+    assert not head.driver.is_at_rest
+    head.robot.host.shutdown()
+    assert head.servo(1).get("torque_enable") == 1
+    assert "servos: joints are not parked: they hold" in head.robot.texts()
+
+
+def test_a_joint_of_several_turns_stays_when_its_servo_has_counted_anew() -> None:
+    joints = config_of("XL430-W250")["joints"]
+    joints["pan"] |= {"is_continuous": True, "lower": None, "upper": None}
+    head = Head(model="XL430-W250", joints=joints)
+    head.robot.advance(0.5)
+    head.go("pan", 10.0)
+    head.robot.advance(10.0)
+    head.servo(1).move_to(head.servo(1).get("present_position") % 4096)
+    head.robot.advance(0.1)
+    head.go("pan", 10.0)
+    assert head.modes() == [JointMode.FAULT, JointMode.RELAXED]
 
 
 @pytest.mark.parametrize("fault", ["overload", "undervoltage"])

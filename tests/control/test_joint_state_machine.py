@@ -234,9 +234,9 @@ def test_an_error_of_the_hardware_stays_a_fault_until_it_is_mended_and_the_joint
     bench.error = "overload"
     assert bench.step() == (TorqueOff(),)
     assert bench.mode() == JointMode.FAULT
-    assert bench.refusal(Enable(True)) == "the servo still reports overload"
+    assert bench.refusal(Enable(True)) == "the servo still reports overload; if it has shut down, reboot it"
     bench.error = ""
-    assert bench.refusal(MoveTo(1.0)) == "the servo reported overload; enable the joint when that is mended"
+    assert bench.refusal(MoveTo(1.0)).startswith("the servo reported overload; when that is mended, enable the joint")
     assert bench.refusal(Enable(True)) == ""
     assert bench.mode() == JointMode.RELAXED
 
@@ -249,7 +249,9 @@ def test_a_joint_whose_servo_has_lost_its_torque_is_a_fault_for_one_cycle_and_re
     bench.is_limp = True  # which nobody expects otherwise now
     assert bench.step() == ()
     assert bench.mode() == JointMode.RELAXED
+    assert "has lost its torque" in bench.state.note  # until something is done about it
     assert bench.step(MoveTo(1.0)) == (WriteGoal(0.3), TorqueOn(), Pursue(MoveTo(1.0)))
+    assert bench.state.note == ""
 
 
 def test_a_hot_joint_rests_until_both_the_time_is_over_and_it_has_cooled_down_and_then_recovers() -> None:

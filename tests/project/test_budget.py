@@ -48,7 +48,7 @@ ROOMS: dict[str, Cost] = {
     "domains/policies": Cost(code=889, files=6, small=0, imports=73),
     "domains/power": Cost(code=439, files=5, small=0, imports=31),
     "domains/programs": Cost(code=3848, files=26, small=0, imports=372),
-    "domains/servos": Cost(code=7895, files=47, small=2, imports=559),
+    "domains/servos": Cost(code=7981, files=47, small=2, imports=559),
     "domains/vision": Cost(code=2558, files=24, small=1, imports=302),
     "domains/worlds": Cost(code=4463, files=36, small=3, imports=517),
     "manifest": Cost(code=3590, files=19, small=1, imports=272),
@@ -57,19 +57,19 @@ ROOMS: dict[str, Cost] = {
     "runtime": Cost(code=7773, files=38, small=0, imports=680),
     "sdk": Cost(code=1426, files=8, small=0, imports=162),
     "testing": Cost(code=384, files=5, small=2, imports=57),
-    "tools": Cost(code=17800, files=116, small=8, imports=1863),
+    "tools": Cost(code=17808, files=116, small=8, imports=1865),
 }
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 114295,
+    "lines of code": 114389,
     "files": 750,
     "files of 1 to 30 lines of code": 42,
-    "lines of imports": 10463,
+    "lines of imports": 10464,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 370,
-    "tell, tells, told": 254,
+    "tell, tells, told": 255,
     "names that are 'one'": 1809,
     "modules that 'check robots/turtlebot' imports": 217,
     "pages of findings in code": 0,

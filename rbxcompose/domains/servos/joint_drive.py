@@ -126,6 +126,10 @@ Writes = Mapping[int, Raw]
 """Raw values by id of the servo."""
 
 
+FAR = 0.2  # [rad] of a servo between where it is and where it should be, which is no lag and no sag of a joint at rest
+STRAYED = 0.5  # [s] that it stands there
+
+
 class JointDrive(ABC):
     """Carries out what is asked of one joint, within its limits and as its state permits."""
 
@@ -148,11 +152,22 @@ class JointDrive(ABC):
         """How the last single command was changed; empty if it was not."""
         self.hindrance = ""
         """Why it takes no commands for a while; empty if it does."""
+        self.stranger = ""
+        """Which of its servos is not what it was said to be; empty if none."""
+        self.astray = ""
+        """Where it stands instead of where it was commanded; empty if it is there."""
+        self.missing = ""
+        """Which servos have never been heard, when they should have; empty if all have."""
+        self.is_back = False
+        """Whether all of its servos are heard again, or at last, since this cycle."""
+        self._is_away, self._begun, self._stands, self._told = False, math.inf, math.inf, math.nan
         self._positions: dict[int, float] = {}  # of each servo, as the joint counts
         self._ticks: dict[int, int] = {}  # of wheels, without their jumps after each turn
         self._stamps: dict[int, float] = {}
         self._warmth: dict[int, float] = {}
         self._errors: dict[int, str] = {}
+        self._raws: dict[int, int] = {}  # of servos that turn without end
+        self._jump = ""
         self._is_limp = False
         self._requests: list[joint_states.JointRequest] = []
 
@@ -213,6 +228,10 @@ class JointDrive(ABC):
     def _measure(self, servo: JointServo, raw: int, speed: int, stamp: float) -> None:
         if self.joint.mode == "velocity":
             raw = self._ticks[servo.id] = self._unrolled(servo, raw)
+        elif self.joint.is_continuous and servo.model.family.is_endless:
+            if abs(raw - self._raws.get(servo.id, raw)) > servo.model.family.ticks // 2:  # no cycle is that long
+                self._jump = "another position, since it counts turns anew without supply"
+            self._raws[servo.id] = raw
         self._stamps[servo.id] = stamp
         self._positions |= self.joint.positions({servo.id: raw})
         if len(self._positions) < len(self.joint.servos):
@@ -279,8 +298,8 @@ class JointDrive(ABC):
         return self.hindrance or next(reasons, "")
 
     def _inputs(self, requests: Iterable[joint_states.JointRequest]) -> joint_states.JointInputs:
-        position, at = self.measured.position, self.measured_at
-        return joint_states.JointInputs(position, at, self.warmest, self.error, tuple(requests), self._is_limp)
+        position, at, error = self.measured.position, self.measured_at, self.error or self._jump
+        return joint_states.JointInputs(position, at, self.warmest, error, tuple(requests), self._is_limp)
 
     def relax(self) -> None:
         """Switch torque off in the next cycle, until the next command."""
@@ -302,7 +321,7 @@ class JointDrive(ABC):
         """Return what is to be written in the cycle that ends `dt` [s] from `now`, one after the other."""
         inputs = self._inputs(self._requests)
         self._requests.clear()
-        self._is_limp = False
+        self._is_limp, self._jump = False, ""
         was_blocked = self.condition.is_blocked
         self.condition, actions = joint_states.step_joint(self.condition, inputs, now, self.policy)
         if was_blocked and not self.condition.is_blocked:
@@ -311,7 +330,7 @@ class JointDrive(ABC):
         for action in actions:
             match action:
                 case joint_states.WriteGoal(position=position):
-                    self.limiter = Limiter(self.joint.limits, position)
+                    self.limiter, self._told = Limiter(self.joint.limits, position), position
                     writes.append(self._goal(position))
                 case joint_states.TorqueOn():
                     writes.append(self._same({"torque_enable": 1}))
@@ -323,7 +342,55 @@ class JointDrive(ABC):
                     self.limiter.brake()
                 case joint_states.Refuse(request=request, reason=reason) if not isinstance(request, joint_states.Relax):
                     self.refused = reason
+        self._watch(now)
         return [*writes, *self._moved(dt)] if self.has_torque else writes
+
+    def _watch(self, now: float) -> None:
+        """Note whether its servos are heard, and whether it is where it should be."""
+        never = self.condition.measured_at == -math.inf
+        is_away = never or self.condition.is_lost
+        self.is_back, self._is_away = self._is_away and not is_away, is_away
+        if never:
+            self._begun = min(self._begun, now)
+            silent = [str(id_) for id_ in self.joint.ids if id_ not in self._stamps]
+            is_late = now - self._begun > self.policy.fault_after
+            self.missing = f"no servo answers at id {' and '.join(silent)}" if is_late else ""
+        elif self.missing:
+            self.missing = ""
+        if self.joint.mode == "position":
+            self._note_stray(now)
+
+    def _note_stray(self, now: float) -> None:
+        """Go on from where it is, at the next command, if it stands far from where it was told to be.
+
+        It has fallen, or something holds it. Its servo would get there at once, as fast as it can.
+        """
+        limiter, position = self.limiter, self.measured.position
+        is_there = not self.is_far_from(self._told)
+        if limiter is None or not self.has_torque or is_there or not limiter.is_settled:
+            self._stands, self.astray = math.inf, ""
+        elif abs(self.measured.velocity) > self._far:  # in a second: it moves
+            self._stands = math.inf
+        elif now - (since := min(self._stands, now)) < STRAYED:
+            self._stands = since
+        else:
+            self.astray = f"it is at {position:.3g}, and was told to be at {self._told:.3g}"
+            if self.joint.limits.clamped(position) == position:
+                limiter.reseed(position)
+
+    def is_far_from(self, position: float) -> bool:
+        """Return whether it is somewhere else, and not only a little behind or below."""
+        return abs(self.measured.position - position) > self._far
+
+    @property
+    def _far(self) -> float:
+        return abs(FAR * self.joint.transmission.slope(0.0))
+
+    @property
+    def discord(self) -> str:
+        """Return how far its servos are apart, as if one were not fixed to it; empty if they are not."""
+        apart = max(self._positions.values()) - min(self._positions.values()) if len(self._positions) > 1 else 0.0
+        return f"its servos are {apart:.3g} apart" if apart > self._far and self.joint.mode == "position" else ""
 
     def _same(self, raw: Raw) -> Writes:
         return dict.fromkeys(self.joint.ids, raw)
@@ -378,6 +445,7 @@ class PositionDrive(JointDrive):
         before = self.joint.raws(limiter.position)
         limiter.step(dt)
         goal = self.joint.raws(limiter.position)
+        self._told = limiter.position
         if goal != before:
             yield {id_: {"goal_position": raw} for id_, raw in goal.items()}
 

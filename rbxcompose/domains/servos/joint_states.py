@@ -29,6 +29,8 @@ class JointMode(StrEnum):
     """Without torque until it has cooled down."""
 
 
+_FELL = "its servo has lost its torque, as after a moment without supply"
+_MEND = "when that is mended, enable the joint, or reboot it if its servo has shut down"
 WITH_TORQUE = frozenset({JointMode.HOLDING, JointMode.ACTIVE})
 
 
@@ -171,6 +173,8 @@ class JointCondition:
     """A fault because measurements are missing; it ends when there are new ones."""
     has_lost_torque: bool = False
     """A fault for one cycle: who leads the joint gives up, and the next command switches torque on where it is."""
+    has_fallen: bool = False
+    """Since then, it has had no torque, and nobody has relaxed it."""
     rest_until: float | None = None
     """When the thermal rest may end [s]; None if the joint does not rest."""
     position: float | None = None
@@ -231,8 +235,14 @@ class _Cycle:
         is_limp = self.inputs.has_lost_torque and before.base in WITH_TORQUE
         now, then = (is_lost, error, until, is_limp), (was_lost, before.hardware_error, before.rest_until)
         if now != (*then, before.has_lost_torque):  # seldom: a copy takes long
+            fell = before.has_fallen or is_limp
             self.state = replace(
-                before, is_lost=is_lost, hardware_error=error, rest_until=until, has_lost_torque=is_limp
+                before,
+                is_lost=is_lost,
+                hardware_error=error,
+                rest_until=until,
+                has_lost_torque=is_limp,
+                has_fallen=fell,
             )
         if self.state.is_lost:
             self._lose()
@@ -257,6 +267,8 @@ class _Cycle:
                 self._switch_off()
             case Relax():
                 self._switch_off()
+                if self.state.has_fallen:
+                    self.state = replace(self.state, has_fallen=False)
             case Hold():
                 self._hold()
             case MoveTo() | MoveAt():
@@ -266,7 +278,7 @@ class _Cycle:
         """Return why the joint is as it is; empty if there is nothing to say."""
         warn = self.policy.thermal.warn
         warm = f"{self.temperature:g} degC is above {warn:g} degC" if (self.temperature or -math.inf) > warn else ""
-        return self._block_reason() or self._age_reason() or warm
+        return self._block_reason() or self._age_reason() or (_FELL if self.state.has_fallen else "") or warm
 
     def _rest_until(self) -> float | None:
         thermal, until = self.policy.thermal, self.state.rest_until
@@ -326,13 +338,13 @@ class _Cycle:
 
     def _become(self, base: JointMode) -> None:
         if base is not self.state.base:
-            self.state = replace(self.state, base=base)
+            self.state = replace(self.state, base=base, has_fallen=self.state.has_fallen and base not in WITH_TORQUE)
 
     def _objection(self, request: JointRequest) -> str:
         match request:
             case Enable(on=on):
                 error = self.inputs.hardware_error
-                return f"the servo still reports {error}" if on and error else ""
+                return f"the servo still reports {error}; if it has shut down, reboot it" if on and error else ""
             case Relax():
                 return ""
             case MoveTo(position=position) if not math.isfinite(position):
@@ -347,11 +359,11 @@ class _Cycle:
         if not state.is_enabled:
             return "it is disabled"
         if state.hardware_error:
-            return f"the servo reported {state.hardware_error}; enable the joint when that is mended"
+            return f"the servo reported {state.hardware_error}; {_MEND}"
         if state.is_lost:
             return f"nothing has been measured for {self.age:.2f} s"
         if state.has_lost_torque:
-            return "its servo has lost its torque, as after a moment without supply"
+            return _FELL
         if state.rest_until is None:
             return ""
         resume, left = self.policy.thermal.resume, max(0.0, state.rest_until - self.now)

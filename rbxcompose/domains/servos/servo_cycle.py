@@ -12,7 +12,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.servos.bus import FAST, SELDOM, ServoBus, slow_items
 from rbxcompose.domains.servos.curves import JointSample
 from rbxcompose.domains.servos.joint_drive import JointDrive, JointServo, ServoJoint, Writes
-from rbxcompose.domains.servos.models import EXTENDED, ServoModel
+from rbxcompose.domains.servos.models import EXTENDED, ServoModel, model_of_number
 
 PERIOD = 0.1  # [s] between two uses of one item
 
@@ -106,6 +106,19 @@ def keep_speeds(bus: ServoBus, drive: JointDrive) -> Iterator[str]:
             yield f"servo {servo.id} of joint '{joint.name}' turns at most {most:.3g} rad/s"
 
 
+def strangeness(bus: ServoBus, servo: JointServo) -> Iterator[str]:
+    """Yield in words that a servo is of another model than it was said to be.
+
+    Raises:
+        PortError: if the bus has gone.
+    """
+    reading = bus.read([servo.id], [NUMBER]).get(servo.id)
+    if reading is not None and (number := reading.values[NUMBER]) != servo.model.number:
+        model = model_of_number(number)
+        yield f"servo {servo.id} is {model.name if model else f'of model number {number}'}, not {servo.model.name}"
+
+
+NUMBER = "model_number"
 RANGE = ("min_position", "max_position")
 
 
@@ -178,6 +191,7 @@ WATCHDOG = "bus_watchdog"
 MODE = "operating_mode"
 DELAY = "return_delay"
 _KEPT = (MODE, DELAY, *RANGE)  # outlive the supply, and change without torque only
+_PROFILE = ("goal_speed", "profile_acceleration")  # of its way to a position; 0 is as fast as it can
 _FIRED = -1  # what `bus_watchdog` reads after it has stopped a servo
 
 
@@ -191,7 +205,7 @@ def prepare(bus: ServoBus, joints: Iterable[ServoJoint], watchdog: float, delay:
     """
     for joint in joints:
         for servo in joint.servos:
-            names = [name for name in _KEPT if name in servo.model.items]
+            names = [name for name in (*_KEPT, *_PROFILE) if name in servo.model.items]
             if (reading := bus.read([servo.id], names).get(servo.id)) is None:
                 continue
             changed = _changes(joint, servo, reading.values)
@@ -201,6 +215,10 @@ def prepare(bus: ServoBus, joints: Iterable[ServoJoint], watchdog: float, delay:
                 bus.write({servo.id: {"torque_enable": 0}}, is_confirmed=True)
                 bus.write({servo.id: changed}, is_confirmed=True)
                 yield f"servo {servo.id} of joint '{joint.name}' now has {_shown(changed)}"
+            profile = {name: 0 for name in _PROFILE if joint.mode == "position" and reading.values.get(name)}
+            if profile:
+                bus.write({servo.id: profile}, is_confirmed=True)
+                yield f"servo {servo.id} of joint '{joint.name}' was slower than it can be: {_shown(profile)} now"
             arm(bus, servo, watchdog)
 
 
@@ -311,17 +329,28 @@ class ServoCycle:
             PortError: if the bus has gone.
         """
         for drive in drives:
+            strangers: list[str] = []
             for servo in drive.joint.servos:
                 self.torques.write(self.bus, servo)
+                strangers += strangeness(self.bus, servo)
+            drive.stranger = "; ".join(strangers)
             yield from keep_speeds(self.bus, drive)
             yield from keep_ranges(self.bus, drive)
 
-    def end(self, *, is_kept: bool = False) -> None:
-        """Switch all torque off, or stop what turns if it is kept; twice, since nobody confirms a group write."""
+    def end(self, *, is_kept: bool = False) -> list[int]:
+        """Switch all torque off, or stop what turns if it is kept; return the ids of servos that do not confirm it.
+
+        It is written twice, since nobody confirms a group write.
+
+        Raises:
+            PortError: if the bus has gone.
+        """
         wheels = [id_ for drive in self.drives.values() if drive.joint.mode == "velocity" for id_ in drive.joint.ids]
         ids, item = (wheels, "goal_velocity") if is_kept else (self.ids, "torque_enable")
         for _ in range(2):
             self.bus.write({id_: {item: 0} for id_ in ids})
+        left = self.bus.read(ids, [item]) if ids else {}
+        return [id_ for id_ in ids if id_ not in left or left[id_].values[item]]
 
     def _write(self, stages: list[list[Writes]]) -> None:
         for stage in zip_longest(*stages):

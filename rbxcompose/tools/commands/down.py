@@ -6,11 +6,13 @@ import argparse
 import json
 from typing import TYPE_CHECKING
 
+from rbxcompose.base.levels import Level
 from rbxcompose.commands.console import NotDoneError, emit
 from rbxcompose.commands.lookup import NO_ANSWER, NOT_UP, add_addressed_robot, answer_soon, awaited_robot, known_state
 from rbxcompose.commands.options import EACH
 from rbxcompose.runtime.control import supervisor_of
 from rbxcompose.runtime.folder import RobotFolder, RobotState
+from rbxcompose.runtime.log import NAME, Follower
 from rbxcompose.runtime.processes import Process, wait_until_ended
 from rbxcompose.runtime.requests import BringDown
 from rbxcompose.runtime.supervision.leftovers import end_leftovers, kill_supervisor
@@ -34,7 +36,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """End the robot: orderly if its supervisor answers, else by force."""
     folder = awaited_robot(arguments.robot or arguments.path)
-    report = _end(folder)
+    log = Follower(folder.path / NAME)
+    try:
+        log.read()  # what came before is no matter of its end
+        report = _end(folder)
+        report += [f"{record.source}: {record.text}" for record in log.read() if record.level is Level.ERROR]
+    finally:
+        log.close()
     if arguments.json:
         emit(json.dumps({"robot": folder.path.name, "told": report}))
         return 0

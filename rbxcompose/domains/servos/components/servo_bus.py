@@ -207,13 +207,21 @@ def _joint_state(samples: Iterable[tuple[JointDrive, JointSample]], stamp: int) 
     )
 
 
+def note_of(drive: JointDrive) -> str:
+    """Return the most important of what there is to say about a joint; empty if there is nothing."""
+    said = (drive.missing, drive.condition.note, drive.stranger, drive.discord, drive.refused, drive.astray)
+    return next(filter(None, said), drive.clamped)
+
+
 def joint_report(
     drives: Mapping[str, JointDrive], controllers: Mapping[str, str], periods: Periods, *, is_lost: bool
 ) -> tuple[Level, str, dict[str, object]]:
     """Return level, words and values of diagnostics: how the joints are, with the notes of controllers."""
-    own = {name: drive.condition.note or drive.refused or drive.clamped for name, drive in drives.items()}
+    own = {name: note_of(drive) for name, drive in drives.items()}
     notes = {name: words for name, words in {**own, **controllers}.items() if words}
-    bad = [name for name, drive in drives.items() if drive.mode in (JointMode.FAULT, JointMode.RESTING)]
+    bad = [
+        name for name, drive in drives.items() if drive.missing or drive.mode in (JointMode.FAULT, JointMode.RESTING)
+    ]
     level = Level.ERROR if bad or is_lost else Level.WARN if notes else Level.OK
     words = "; ".join([GONE] * is_lost + [f"{name}: {words}" for name, words in notes.items()])
     kept = {"periods_met": f"{100 * periods.share_met:.2f} %", "late": f"{1e3 * periods.late(0.99):.1f} ms"}
@@ -429,6 +437,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
         if self.is_parking:
             self.park_the_rest()
         self.cycle.run(self.now, self.period, () if self.is_parking else self.controllers.leading)
+        if back := [drive for drive in self.cycle.drives.values() if drive.is_back]:
+            self.prepare(*back)  # it may be another servo, or as it was sold
         self.reboots.step(self.now)
         while self.cycle.notes:
             self.warn(self.cycle.notes.pop(0))
@@ -635,7 +645,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
         drive, wanted = self.cycle.drives[name], self.config.park.get(name)
         if not self.is_parking or wanted is None or not drive.has_torque or self.lost_at > -math.inf:
             return False
-        return abs(drive.commanded.position - drive.joint.limits.clamped(wanted)) > drive.per_tick
+        wanted = drive.joint.limits.clamped(wanted)
+        return abs(drive.commanded.position - wanted) > drive.per_tick or drive.is_far_from(wanted)
 
     def stop(self) -> None:
         """Bring all joints to rest, and refuse what moves them."""
@@ -671,9 +682,11 @@ class ServoBusDriver(Component[ServoBusConfig]):
     def end_torque(self) -> None:
         """Relax the joints; those that are to hold, or are not parked since this driver failed, only stop turning."""
         try:
-            self.cycle.end(is_kept=self.keeps_torque)
+            if deaf := self.cycle.end(is_kept=self.keeps_torque):
+                left = "may still turn" if self.keeps_torque else "may still have torque"
+                self.context.log(Level.ERROR, f"{_servo_names(deaf)} did not answer at the end, and {left}")
         except PortError as error:
-            self.warn(f"the torque of joints is left as it was: {error}")
+            self.context.log(Level.ERROR, f"the torque of joints is left as it was: {error}")
 
 
 def cycles_between(config: ServoBusConfig) -> int:
