@@ -160,6 +160,7 @@ class JointDrive(ABC):
         """Which servos have never been heard, when they should have; empty if all have."""
         self.is_back = False
         """Whether all of its servos are heard again, or at last, since this cycle."""
+        self._far = abs(FAR * joint.transmission.slope(0.0))
         self._is_away, self._begun, self._stands, self._told = False, math.inf, math.inf, math.nan
         self._positions: dict[int, float] = {}  # of each servo, as the joint counts
         self._ticks: dict[int, int] = {}  # of wheels, without their jumps after each turn
@@ -366,8 +367,7 @@ class JointDrive(ABC):
         It has fallen, or something holds it. Its servo would get there at once, as fast as it can.
         """
         limiter, position = self.limiter, self.measured.position
-        is_there = not self.is_far_from(self._told)
-        if limiter is None or not self.has_torque or is_there or not limiter.is_settled:
+        if limiter is None or not self.is_far_from(self._told) or not limiter.is_settled or not self.has_torque:
             self._stands, self.astray = math.inf, ""
         elif abs(self.measured.velocity) > self._far:  # in a second: it moves
             self._stands = math.inf
@@ -381,10 +381,6 @@ class JointDrive(ABC):
     def is_far_from(self, position: float) -> bool:
         """Return whether it is somewhere else, and not only a little behind or below."""
         return abs(self.measured.position - position) > self._far
-
-    @property
-    def _far(self) -> float:
-        return abs(FAR * self.joint.transmission.slope(0.0))
 
     @property
     def discord(self) -> str:
